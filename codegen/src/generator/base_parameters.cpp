@@ -1,0 +1,107 @@
+// generator - rank decision on unscaled random columns: a column that is rounding noise must not pass as a parameter.
+#include "codegen/src/generator/base_parameters.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "codegen/src/generator/tape.hpp"
+
+namespace armcal::codegen {
+namespace {
+
+using Real = long double;
+using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
+using Vector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+
+// Inputs are of order one, so are the columns; a dependent column leaves about 1e-17, a true one more than 1e-4.
+constexpr Real kIndependent = 1e-9L;
+
+Matrix RandomColumns(const Graph& graph, const std::vector<std::vector<Expr>>& row, int states) {
+  std::vector<Expr> roots;
+  for (const auto& r : row) roots.insert(roots.end(), r.begin(), r.end());
+  const Tape tape(graph, roots);
+  const int n = static_cast<int>(row.size()), p = static_cast<int>(row[0].size());
+  Matrix W(states * n, p);
+  std::mt19937_64 random(1);
+  for (int k = 0; k < states; ++k) {
+    std::vector<Real> inputs(graph.inputs().size());
+    for (Real& x : inputs) x = 6.0L * (static_cast<Real>(random() >> 11) / 9007199254740992.0L) - 3.0L;
+    const auto values = tape.EvaluateAt<Real>(inputs);
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < p; ++c) W(k * n + i, c) = values[i * p + c];
+  }
+  return W;
+}
+
+std::vector<int> Preference(const Robot& robot) {
+  std::vector<int> order;
+  const int n = robot.joints();
+  const auto add = [&](int j, std::initializer_list<int> kinds) {
+    for (const int k : kinds) order.push_back(kBodyBlock * j + k);
+  };
+  for (int j = 0; j < n; ++j)
+    if (robot.joint[j].kinematics.type == JointType::kPrismatic) add(j, {0});
+  for (int j = 0; j < n; ++j) add(j, {9, 4, 5, 6, 8, 1, 2});
+  for (int j = 0; j < n; ++j) add(j, {10});
+  for (int j = n - 1; j >= 0; --j) add(j, {7, 3});
+  for (int j = n - 1; j >= 0; --j)
+    if (robot.joint[j].kinematics.type == JointType::kRevolute) add(j, {0});
+  return order;
+}
+
+// Twelve digits: far above the long double noise, so that the same file gives the same bytes everywhere.
+double Rounded(Real value) {
+  if (std::abs(value) < 1e-11L) return 0;
+  char text[40];
+  std::snprintf(text, sizeof text, "%.12Lg", value);
+  return std::strtod(text, nullptr);
+}
+
+}  // namespace
+
+BaseParameters FindBaseParameters(const Graph& graph, const std::vector<std::vector<Expr>>& row, const Robot& robot) {
+  const int p = static_cast<int>(row[0].size());
+  const Matrix W = RandomColumns(graph, row, 3 * p / robot.joints() + 10);
+  std::vector<int> chosen;
+  std::vector<Vector> q;                  // orthonormal basis of the chosen columns
+  Matrix r = Matrix::Zero(p, p);          // chosen columns in that basis (upper triangle), by column
+  Matrix dependent = Matrix::Zero(p, p);  // all columns in that basis
+  for (const int c : Preference(robot)) {
+    Vector v = W.col(c);
+    Vector h = Vector::Zero(p);
+    for (int pass = 0; pass < 2; ++pass)  // twice is enough
+      for (std::size_t k = 0; k < q.size(); ++k) {
+        const Real s = q[k].dot(v);
+        h[k] += s;
+        v -= s * q[k];
+      }
+    dependent.col(c) = h;
+    const Real norm = v.norm() / std::sqrt(static_cast<Real>(v.size()));
+    if (norm < kIndependent) continue;
+    h[q.size()] = v.norm();
+    dependent.col(c) = h;
+    r.col(q.size()) = h;
+    q.push_back(v / v.norm());
+    chosen.push_back(c);
+  }
+  const int rank = static_cast<int>(chosen.size());
+  const Matrix coefficients =
+      r.topLeftCorner(rank, rank).template triangularView<Eigen::Upper>().solve(dependent.topRows(rank));
+  Eigen::MatrixXd merge(rank, p);
+  for (int i = 0; i < rank; ++i)
+    for (int c = 0; c < p; ++c) merge(i, c) = Rounded(coefficients(i, c));
+  std::vector<int> order(rank);
+  for (int i = 0; i < rank; ++i) order[i] = i;
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return chosen[a] < chosen[b]; });
+  BaseParameters base;
+  Eigen::MatrixXd sorted(rank, p);
+  for (int i = 0; i < rank; ++i) {
+    base.column.push_back(chosen[order[i]]);
+    sorted.row(i) = merge.row(order[i]);
+  }
+  base.map = sorted * SlideMap(robot);
+  return base;
+}
+
+}  // namespace armcal::codegen

@@ -1,0 +1,56 @@
+// generator - one effect record as read from its file; knows no robot.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace armcal::codegen {
+
+struct LinearParameter {
+  std::string name, unit;
+  std::map<std::string, std::string> rows;  // row ("j", "k", "all") -> expression
+  std::vector<std::string> index;           // array parameter: the values its index [i] takes; empty: a scalar
+  std::string sd;                           // default prior standard deviation, expression over robot constants
+  double amplitude = 0;                     // when fixed
+  bool fixed_amplitude = false;
+  double lower, upper;       // bounds; +-infinity where none
+  double process_noise = 0;  // variance per second, relative to sd^2
+};
+
+struct NonlinearParameter {
+  std::string name, unit;
+  std::string lower, upper, initial;  // expressions over robot constants
+  bool logarithmic = false;
+};
+
+struct Search {
+  std::string how = "linear";  // linear | profile | spectral | spline | onset | shared
+  std::string signal;          // spectral, spline: over which signal
+  int grid = 10;               // profile: points per nonlinear parameter
+  double minimum_s = 0;        // onset: shortest stretch
+};
+
+struct EffectRecord {
+  std::string name, title, source, path, text;
+  std::string kind_class;  // static | stateful | run_state | sensor
+  std::string scope;       // joint | pair | arm | body
+  std::vector<std::string> inputs, signals, let, confusable_with, needs;
+  std::vector<LinearParameter> linear;
+  std::vector<NonlinearParameter> nonlinear;
+  std::string replaces;
+  bool depends_on_estimate = false;
+  bool on_target = true;
+  bool friction_law = false;   // the robot's own friction, not a candidate
+  double generic_penalty = 0;  // added to the score a flexible term must beat
+  Search search;
+};
+
+// Throws io::InputError: file, key, what was expected.
+EffectRecord ReadEffect(const std::filesystem::path& path);
+
+// All *.toml of a folder by name, in alphabetical order.
+std::map<std::string, EffectRecord> ReadCatalogue(const std::filesystem::path& folder);
+
+}  // namespace armcal::codegen

@@ -1,0 +1,23 @@
+// generator - prints the straight-line part of a graph; used by emit.cpp.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "codegen/src/generator/emit.hpp"
+
+namespace armcal::codegen {
+
+std::string NumberText(double value);  // shortest text that reads back to the same double
+
+struct Assignment {
+  std::string target;  // "front[3]"
+  Expr value;
+};
+
+// Statements that compute all assignments. input: C++ text of a graph input by name.
+std::string EmitStatements(const Graph& graph, const std::vector<Assignment>& assignments,
+                           const std::function<std::string(const std::string&)>& input, Passport& passport);
+
+}  // namespace armcal::codegen

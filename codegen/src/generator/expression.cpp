@@ -1,0 +1,168 @@
+// generator - a precedence-climbing parser; every error names its column.
+#include "codegen/src/generator/expression.hpp"
+
+#include <cctype>
+#include <charconv>
+
+#include "host_sim/io/input_error.hpp"
+
+namespace armcal::codegen {
+namespace {
+
+// Cubic B-spline of unit knot spacing with support [0, 4], by truncated powers; u is clamped so that none of them
+// grows.
+Expr CardinalSpline(Graph& g, Expr u) {
+  const Expr x = g.Binary(Op::kMin, g.Binary(Op::kMax, u, g.Constant(0)), g.Constant(4));
+  Expr sum = g.Constant(0);
+  const double binomial[] = {1, -4, 6, -4};
+  for (int k = 0; k < 4; ++k) {
+    const Expr p = g.Binary(Op::kMax, x - static_cast<double>(k), g.Constant(0));
+    sum = sum + binomial[k] / 6 * (p * p * p);
+  }
+  return sum;
+}
+
+class Parser {
+ public:
+  Parser(Graph& graph, const std::string& text, const Scope& scope, const std::string& where)
+      : g_(graph), text_(text), scope_(scope), where_(where) {}
+
+  Expr Whole() {
+    const Expr e = Sum();
+    if (Peek() != '\0') Fail("an operator or the end");
+    return e;
+  }
+
+ private:
+  [[noreturn]] void Fail(const std::string& expected) {
+    throw io::InputError(where_ + ": \"" + text_ + "\", column " + std::to_string(at_ + 1) + ": expected " + expected);
+  }
+  char Peek() {
+    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_]))) ++at_;
+    return at_ < text_.size() ? text_[at_] : '\0';
+  }
+  bool Accept(char c) { return Peek() == c ? (++at_, true) : false; }
+  void Expect(char c) {
+    if (!Accept(c)) Fail(std::string("'") + c + "'");
+  }
+
+  Expr Sum() {
+    Expr e = Product();
+    for (;;) {
+      if (Accept('+')) e = e + Product();
+      else if (Accept('-')) e = e - Product();
+      else return e;
+    }
+  }
+  Expr Product() {
+    Expr e = Factor();
+    for (;;) {
+      if (Accept('*')) e = e * Factor();
+      else if (Accept('/')) e = e / Factor();
+      else return e;
+    }
+  }
+  Expr Factor() {
+    if (Accept('-')) return -Factor();
+    const Expr base = Primary();
+    if (!Accept('^')) return base;
+    return g_.Binary(Op::kPow, base, Factor());
+  }
+  Expr Primary() {
+    const char c = Peek();
+    if (Accept('(')) {
+      const Expr e = Sum();
+      Expect(')');
+      return e;
+    }
+    if (std::isdigit(static_cast<unsigned char>(c)) || c == '.') {
+      double value = 0;
+      const auto [end, error] = std::from_chars(text_.data() + at_, text_.data() + text_.size(), value);
+      if (error != std::errc()) Fail("a number");
+      at_ = end - text_.data();
+      return g_.Constant(value);
+    }
+    if (!std::isalpha(static_cast<unsigned char>(c)) && c != '_') Fail("a number, a name or '('");
+    const std::size_t begin = at_;
+    const std::string name = Name();
+    if (Accept('(')) return Call(name, begin);
+    std::vector<std::string> indices;
+    if (Accept('[')) {
+      do {
+        Peek();
+        indices.push_back(Name());
+      } while (Accept(','));
+      Expect(']');
+    }
+    Expr value;
+    if (!scope_.lookup(name, indices, value)) {
+      at_ = begin;
+      Fail("a known name instead of '" + name + "'");
+    }
+    return value;
+  }
+  std::string Name() {
+    const std::size_t begin = at_;
+    while (at_ < text_.size() && (std::isalnum(static_cast<unsigned char>(text_[at_])) || text_[at_] == '_')) ++at_;
+    if (at_ == begin) Fail("a name");
+    return text_.substr(begin, at_ - begin);
+  }
+  double ConstantOf(Expr e) {
+    const Node& n = g_.nodes()[e.id()];
+    if (n.op != Op::kConstant) Fail("a constant index and count in bspline");
+    return n.value;
+  }
+  Expr Call(const std::string& name, std::size_t begin) {
+    std::vector<Expr> a;
+    if (!Accept(')')) {
+      do a.push_back(Sum());
+      while (Accept(','));
+      Expect(')');
+    }
+    const auto need = [&](std::size_t count) {
+      if (a.size() != count) {
+        at_ = begin;
+        Fail(std::to_string(count) + " argument(s) to " + name);
+      }
+    };
+    static const std::pair<const char*, Op> unary[] = {{"abs", Op::kAbs},   {"sign", Op::kSign}, {"sin", Op::kSin},
+                                                       {"cos", Op::kCos},   {"exp", Op::kExp},   {"log", Op::kLog},
+                                                       {"tanh", Op::kTanh}, {"sqrt", Op::kSqrt}, {"cbrt", Op::kCbrt}};
+    for (const auto& [word, op] : unary)
+      if (name == word) return need(1), g_.Unary(op, a[0]);
+    static const std::pair<const char*, Op> binary[] = {{"min", Op::kMin}, {"max", Op::kMax}, {"pow", Op::kPow}};
+    for (const auto& [word, op] : binary)
+      if (name == word) return need(2), g_.Binary(op, a[0], a[1]);
+    if (name == "sgn") return need(1), scope_.sgn(a[0]);
+    if (name == "step") return need(1), 0.5 * (g_.Unary(Op::kSign, a[0]) + 1.0);
+    if (name == "clamp") return need(3), g_.Binary(Op::kMin, g_.Binary(Op::kMax, a[0], a[1]), a[2]);
+    if (name == "sech") {
+      need(1);
+      const Expr e = g_.Unary(Op::kExp, -g_.Unary(Op::kAbs, a[0]));  // at most 1: no overflow
+      return 2.0 * e / (e * e + 1.0);
+    }
+    if (name == "bspline") {
+      need(5);
+      const double i = ConstantOf(a[3]), n = ConstantOf(a[4]);
+      const Expr x = g_.Binary(Op::kMin, g_.Binary(Op::kMax, a[0], a[1]), a[2]);
+      const Expr u = (n - 3) * ((x - a[1]) / (a[2] - a[1]));  // n splines: n-3 intervals
+      return CardinalSpline(g_, u - (i - 3));
+    }
+    at_ = begin;
+    Fail("a known function instead of '" + name + "'");
+  }
+
+  Graph& g_;
+  const std::string& text_;
+  const Scope& scope_;
+  const std::string& where_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace
+
+Expr ParseExpression(Graph& graph, const std::string& text, const Scope& scope, const std::string& where) {
+  return Parser(graph, text, scope, where).Whole();
+}
+
+}  // namespace armcal::codegen

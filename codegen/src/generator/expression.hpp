@@ -1,0 +1,27 @@
+// generator - the text of an expression -> graph; knows no effect kind and no robot.
+//
+// Grammar: + - * / ^ ( ), numbers, names, name[index], functions. Total: division by zero gives zero, log and sqrt see
+// only what is above zero, pow(x, y) needs x >= 0 (x^2, x^3, x^4 take any x). Functions:
+//   abs sign sgn sin cos exp log tanh sqrt cbrt  min max pow  clamp(x, lo, hi)  step(x) (0 below, 1 above)  sech(x)
+//   bspline(x, lo, hi, i, n): the i-th (0..n-1) of n cubic B-splines on [lo, hi], x clamped to that range
+// sgn is the sign law of the caller (sign or tanh(x / width)); sign is the plain one.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "codegen/src/generator/graph.hpp"
+
+namespace armcal::codegen {
+
+struct Scope {
+  // Value of a name or name[index, ...]; indices are the texts between the brackets. Returns false for an unknown name.
+  std::function<bool(const std::string& name, const std::vector<std::string>& indices, Expr& value)> lookup;
+  std::function<Expr(Expr)> sgn;  // the sign law
+};
+
+// Throws io::InputError: `where`, column, what was expected.
+Expr ParseExpression(Graph& graph, const std::string& text, const Scope& scope, const std::string& where);
+
+}  // namespace armcal::codegen

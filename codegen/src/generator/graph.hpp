@@ -1,0 +1,101 @@
+// generator - a hash-consed expression graph; knows no robot and no text.
+//
+// Normal form: signs outward (a*(-b) = -(a*b)), differences in one order (b-a = -(a-b)), constants folded, 0 and +-1
+// removed. Equal expressions are one node, so nothing is computed twice.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+namespace armcal::codegen {
+
+enum class Op : std::uint8_t {
+  kConstant,
+  kInput,
+  kNegate,
+  kAdd,
+  kSubtract,
+  kMultiply,
+  kDivide,  // kDivide: 0 where the divisor is 0
+  kSin,
+  kCos,
+  kExp,
+  kLog,
+  kTanh,
+  kCbrt,
+  kSqrt,
+  kAbs,
+  kSign,
+  kMin,
+  kMax,
+  kPow,
+};
+
+struct Node {
+  Op op;
+  int a = -1, b = -1;  // operands; kInput: a = input number
+  double value = 0;    // kConstant
+};
+
+class Graph;
+
+// A handle; copies are cheap. Valid as long as its graph.
+class Expr {
+ public:
+  Expr() = default;
+  Expr(Graph* graph, int id) : graph_(graph), id_(id) {}
+  int id() const { return id_; }
+  Graph* graph() const { return graph_; }
+  bool IsConstant(double value) const;
+  bool IsZero() const { return IsConstant(0); }
+
+ private:
+  Graph* graph_ = nullptr;
+  int id_ = -1;
+};
+
+class Graph {
+ public:
+  Graph() = default;
+  Graph(const Graph&) = delete;
+  Graph& operator=(const Graph&) = delete;
+
+  Expr Constant(double value);
+  Expr Input(const std::string& name);  // the same name gives the same node
+  Expr Unary(Op op, Expr a);
+  Expr Binary(Op op, Expr a, Expr b);
+  void Name(Expr e, const std::string& name);  // a readable name for the emitted temporary; the first one stays
+
+  const std::vector<Node>& nodes() const { return nodes_; }
+  const std::vector<std::string>& inputs() const { return inputs_; }
+  const std::unordered_map<int, std::string>& names() const { return names_; }
+
+ private:
+  Expr Make(Op op, int a, int b, double value = 0);
+  Expr Negate(Expr a);
+
+  std::vector<Node> nodes_;
+  std::vector<std::string> inputs_;
+  std::unordered_map<int, std::string> names_;
+  std::unordered_map<std::string, int> input_ids_;
+  std::unordered_map<std::string, int> known_;
+};
+
+Expr operator-(Expr a);
+Expr operator+(Expr a, Expr b);
+Expr operator-(Expr a, Expr b);
+Expr operator*(Expr a, Expr b);
+Expr operator/(Expr a, Expr b);
+Expr operator*(double a, Expr b);
+Expr operator+(Expr a, double b);
+Expr operator-(Expr a, double b);
+
+// The value of one node operation; shared by folding and by every evaluator.
+template <class T>
+T ApplyOp(Op op, T a, T b);
+
+}  // namespace armcal::codegen
+
+#include "codegen/src/generator/apply_op.hpp"

@@ -1,0 +1,210 @@
+// generator - binds a record's names to a robot's joints; the scopes joint, pair, arm and body differ only here.
+#include "codegen/src/generator/instance.hpp"
+
+#include <charconv>
+#include <cmath>
+
+#include "codegen/src/generator/expression.hpp"
+#include "codegen/src/generator/rigid_body.hpp"
+#include "host_sim/io/input_error.hpp"
+
+namespace armcal::codegen {
+namespace {
+
+const char* const kBodyNames[] = {"m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"};
+
+// Constants of one joint that records may use.
+bool RobotConstant(const Joint& j, const std::string& name, double& value) {
+  const double range[] = {j.position_limit_rad[0], j.position_limit_rad[1]};
+  if (name == "torque_limit") value = j.torque_limit_Nm;
+  else if (name == "torque_noise") value = j.torque_noise_Nm;
+  else if (name == "speed_limit") value = j.speed_limit_radps;
+  else if (name == "acceleration_limit") value = j.acceleration_limit_radps2;
+  else if (name == "position_lower") value = range[0];
+  else if (name == "position_upper") value = range[1];
+  else if (name == "v_min") value = j.v_min_radps;
+  else if (name == "pi") value = 3.14159265358979323846;
+  else return false;
+  return true;
+}
+
+// Everything a record's expressions may name, for one row and one array index.
+class Names {
+ public:
+  Names(Graph& g, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
+        const ModelQuantities& quantities)
+      : g_(g), record_(record), robot_(robot), joints_(joints), quantities_(quantities) {}
+
+  int row = 0;        // the joint whose row is being written
+  std::string index;  // text of the array index i
+  std::map<std::string, Expr> unknowns;
+
+  Scope scope() {
+    const auto sgn = [this](Expr x) {
+      return robot_.sign_law == "tanh" ? g_.Unary(Op::kTanh, (1 / robot_.sign_width_radps) * x)
+                                       : g_.Unary(Op::kSign, x);
+    };
+    return {[this](const std::string& name, const std::vector<std::string>& indices, Expr& value) {
+              return Find(name, indices, value);
+            },
+            sgn};
+  }
+
+ private:
+  bool JointOf(const std::vector<std::string>& indices, int& joint) const {
+    if (indices.empty()) return joint = joints_.empty() ? row : joints_[0], true;
+    const std::string& text = indices[0];
+    if (text == "r") return joint = row, true;
+    if (text == "j" && !joints_.empty()) return joint = joints_[0], true;
+    if (text == "k" && joints_.size() > 1) return joint = joints_[1], true;
+    int number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc() || end != text.data() + text.size() || number < 1 || number > robot_.joints())
+      return false;
+    return joint = number - 1, true;
+  }
+  bool Find(const std::string& name, const std::vector<std::string>& indices, Expr& value) {
+    if (const auto it = unknowns.find(name); it != unknowns.end() && indices.empty()) return value = it->second, true;
+    if (name == "i" && indices.empty() && !index.empty()) {
+      double number = 0;
+      const auto [end, error] = std::from_chars(index.data(), index.data() + index.size(), number);
+      if (error != std::errc() || end != index.data() + index.size()) return false;
+      return value = g_.Constant(number), true;
+    }
+    for (const std::string& line : record_.let) {
+      const auto equals = line.find('=');
+      std::string defined = line.substr(0, equals);
+      while (!defined.empty() && defined.back() == ' ') defined.pop_back();
+      if (equals != std::string::npos && defined == name && indices.empty())
+        return value = ParseExpression(g_, line.substr(equals + 1), scope(), record_.path + ": let " + name), true;
+    }
+    if (name == "t" && indices.empty()) return value = g_.Input("t"), true;
+    if (name == "Y" && indices.size() == 2) return Body(indices, value);
+    int joint = 0;
+    if (!JointOf(indices, joint)) return false;
+    for (const char* quantity : {"q", "qd", "qdd", "temp"})
+      if (name == quantity) return value = g_.Input(InputName(quantity, joint)), true;
+    if (name == "tau_rigid") return value = quantities_.tau_rigid(joint), true;
+    if (name == "tau_gravity") return value = quantities_.tau_gravity(joint), true;
+    double constant = 0;
+    if (RobotConstant(robot_.joint[joint], name, constant)) return value = g_.Constant(constant), true;
+    return false;
+  }
+  // Y[flange, mx] or Y[flange, i] with a parameter name as the array index
+  bool Body(const std::vector<std::string>& indices, Expr& value) {
+    const int body = indices[0] == "flange" ? robot_.joints() - 1 : std::atoi(indices[0].c_str()) - 1;
+    const std::string& name = indices[1] == "i" ? index : indices[1];
+    if (body < 0 || body >= robot_.joints()) return false;
+    for (int p = 0; p < 10; ++p)
+      if (name == kBodyNames[p]) return value = quantities_.body(row, body, p), true;
+    return false;
+  }
+
+  Graph& g_;
+  const EffectRecord& record_;
+  const Robot& robot_;
+  const std::vector<int>& joints_;
+  const ModelQuantities& quantities_;
+};
+
+double ConstantValue(Graph& g, const std::string& text, const Robot& robot, const std::vector<int>& joints,
+                     const std::string& where) {
+  const int joint = joints.empty() ? robot.joints() - 1 : joints[0];
+  const Scope scope{[&](const std::string& name, const std::vector<std::string>& indices, Expr& value) {
+                      double constant = 0;
+                      if (!indices.empty() || !RobotConstant(robot.joint[joint], name, constant)) return false;
+                      return value = g.Constant(constant), true;
+                    },
+                    [&](Expr x) { return g.Unary(Op::kSign, x); }};
+  const Expr e = ParseExpression(g, text, scope, where);
+  const Node& n = g.nodes()[e.id()];
+  if (n.op == Op::kConstant) return n.value;
+  return -g.nodes()[n.a].value;  // constants fold, so this is a negated one
+}
+
+std::string Suffix(const std::vector<int>& joints) {
+  std::string s;
+  for (const int j : joints) s += (s.empty() ? "" : "_") + std::to_string(j + 1);
+  return s;
+}
+
+}  // namespace
+
+ModelQuantities QuantitiesAsInputs(Graph& graph) {
+  return {[&graph](int j) { return graph.Input(InputName("tau_rigid", j)); },
+          [&graph](int j) { return graph.Input(InputName("tau_gravity", j)); },
+          [&graph](int row, int body, int p) {
+            return graph.Input("Y" + std::to_string(row) + "_" + std::to_string(body) + "_" + std::to_string(p));
+          }};
+}
+
+std::vector<std::vector<int>> JointSets(const EffectRecord& record, int n) {
+  std::vector<std::vector<int>> sets;
+  if (record.scope == "joint")
+    for (int j = 0; j < n; ++j) sets.push_back({j});
+  else if (record.scope == "pair")
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < n; ++k)
+        if (j != k) sets.push_back({j, k});
+  if (record.scope == "arm" || record.scope == "body") sets.push_back({});
+  return sets;
+}
+
+EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
+                           const ModelQuantities& quantities) {
+  const std::size_t expected = record.scope == "joint" ? 1 : (record.scope == "pair" ? 2 : 0);
+  if (joints.size() != expected)
+    throw io::InputError(record.path + ": scope: \"" + record.scope + "\" takes " + std::to_string(expected) +
+                         " joint(s), not " + std::to_string(joints.size()));
+  EffectInstance out;
+  out.record = &record;
+  out.joints = joints;
+  const std::string prefix = record.friction_law ? "" : record.name + ".", suffix = Suffix(joints);
+  Names names(g, record, robot, joints, quantities);
+  for (const NonlinearParameter& p : record.nonlinear) {
+    const std::string where = record.path + ": nonlinear " + p.name;
+    EffectUnknown u{prefix + p.name + suffix,
+                    p.unit,
+                    ConstantValue(g, p.lower, robot, joints, where),
+                    ConstantValue(g, p.upper, robot, joints, where),
+                    ConstantValue(g, p.initial, robot, joints, where),
+                    p.logarithmic};
+    if (!(u.lower <= u.initial && u.initial <= u.upper))
+      throw io::InputError(where + ": expected lower <= initial <= upper");
+    names.unknowns[p.name] = g.Input(u.name);
+    out.unknowns.push_back(u);
+  }
+  for (const LinearParameter& p : record.linear) {
+    const std::vector<std::string> one{""};
+    for (const std::string& index : p.index.empty() ? one : p.index) {
+      EffectColumn c;
+      c.name = prefix + p.name + (index.empty() ? "" : index) + (index.empty() || suffix.empty() ? "" : "_") + suffix;
+      c.unit = p.unit;
+      c.sd = ConstantValue(g, p.sd, robot, joints, record.path + ": sd of " + p.name);
+      c.lower = p.lower;
+      c.upper = p.upper;
+      c.process_noise = p.process_noise;
+      c.fixed_amplitude = p.fixed_amplitude;
+      c.amplitude = p.amplitude;
+      names.index = index;
+      for (const auto& [row, text] : p.rows) {
+        const std::string where = record.path + ": rows." + row + " of " + p.name;
+        std::vector<int> targets;
+        if (row == "j" && !joints.empty()) targets = {joints[0]};
+        else if (row == "k" && joints.size() > 1) targets = {joints[1]};
+        else if (row == "all")
+          for (int i = 0; i < robot.joints(); ++i) targets.push_back(i);
+        else throw io::InputError(where + ": expected a row of scope \"" + record.scope + "\": j, k or all");
+        for (const int i : targets) {
+          names.row = i;
+          const Expr e = ParseExpression(g, text, names.scope(), where);
+          if (!e.IsZero()) c.rows[i] = e;
+        }
+      }
+      out.columns.push_back(std::move(c));
+    }
+  }
+  return out;
+}
+
+}  // namespace armcal::codegen

@@ -1,0 +1,54 @@
+// generator - an effect record applied to given joints of a robot: columns as graph expressions; knows no output
+// format.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "codegen/src/generator/effect.hpp"
+#include "codegen/src/generator/graph.hpp"
+#include "codegen/src/robot/robot.hpp"
+
+namespace armcal::codegen {
+
+struct EffectColumn {
+  std::string name, unit;    // "torque_offset.To3"
+  std::map<int, Expr> rows;  // joint (0-based) -> column value in that joint's row
+  double sd = 0, lower = 0, upper = 0, process_noise = 0;
+  bool fixed_amplitude = false;
+  double amplitude = 0;
+};
+
+struct EffectUnknown {     // a nonlinear parameter
+  std::string name, unit;  // "stribeck.vs3"; also the name of its graph input
+  double lower = 0, upper = 0, initial = 0;
+  bool logarithmic = false;
+};
+
+struct EffectInstance {
+  const EffectRecord* record = nullptr;
+  std::vector<int> joints;
+  std::vector<EffectColumn> columns;
+  std::vector<EffectUnknown> unknowns;
+};
+
+// Quantities that are not plain inputs: model torque and body columns. Either graph inputs (host, whole logs) or
+// expressions.
+struct ModelQuantities {
+  std::function<Expr(int joint)> tau_rigid, tau_gravity;
+  std::function<Expr(int row, int body, int parameter)> body;
+};
+
+// Plain graph inputs named tau_rigid1.., tau_gravity1.., Y<row>_<body>_<parameter>.
+ModelQuantities QuantitiesAsInputs(Graph& graph);
+
+// Throws io::InputError naming the record where an expression does not parse or does not fit the scope.
+EffectInstance Instantiate(Graph& graph, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
+                           const ModelQuantities& quantities);
+
+// The joint sets on which a record may be tried: each joint, each ordered pair, or the whole arm once.
+std::vector<std::vector<int>> JointSets(const EffectRecord& record, int joints);
+
+}  // namespace armcal::codegen

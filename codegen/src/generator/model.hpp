@@ -1,0 +1,111 @@
+// generator - a robot and its effects as one graph with the table's parameters; the host's model and the emitter's
+// input.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "codegen/src/generator/base_parameters.hpp"
+#include "codegen/src/generator/effect.hpp"
+#include "codegen/src/generator/instance.hpp"
+#include "codegen/src/generator/tape.hpp"
+#include "codegen/src/robot/robot.hpp"
+
+namespace armcal::codegen {
+
+using Catalogue = std::map<std::string, EffectRecord>;
+
+// One entry of the parameter table, in its order: bodies (11 a link), front columns, dense effect columns, eta.
+struct TableParameter {
+  std::string name, unit;
+  double mean = 0, sd = 0, lower = 0, upper = 0, process_noise = 0;
+  std::string state = "estimated";
+  int group = 0;       // 0 bodies, 1 friction, 2 effects
+  int joint = -1;      // 0-based; -1: several
+  std::string effect;  // record; empty for bodies
+};
+
+// Measured or derived motion, one row a sample. N samples, n joints; joint units and SI.
+struct Signals {
+  Eigen::VectorXd t;
+  Eigen::MatrixXd q, qd, qdd, temp;  // temp may be empty: then it reads as zero
+  int samples() const { return static_cast<int>(q.rows()); }
+};
+
+// Immutable after construction.
+class Model {
+ public:
+  // Throws io::InputError where the robot file and the records do not fit together.
+  Model(const Robot& robot, const Catalogue& catalogue);
+
+  const Robot& robot() const { return robot_; }
+  int joints() const { return robot_.joints(); }
+  int front() const { return front_; }
+  int rigid() const { return rigid_; }
+  int dense() const { return dense_; }
+  int columns() const { return front_ + dense_; }  // filter coordinates: [front, dense]
+  int nonlinear() const { return static_cast<int>(unknown_.size()); }
+  int body_parameters() const { return kBodyBlock * joints(); }
+  int parameters() const { return static_cast<int>(table_.size()); }
+  int front_begin(int joint) const { return front_begin_[joint]; }  // joint = joints(): front()
+  int row_begin(int joint) const { return row_begin_[joint]; }
+  int table_index(int column) const {
+    return column < front_ ? body_parameters() + column : body_parameters() + column - rigid_;
+  }
+  bool is_rigid(int column) const { return column >= front_ && column < front_ + rigid_; }
+  int column_joint(int column) const { return column_joint_[column]; }  // the one joint it touches, or -1
+  const std::vector<TableParameter>& table() const { return table_; }
+  std::string column_name(int column) const;
+  std::string column_unit(int column) const;
+  const Eigen::MatrixXd& base_map() const { return base_.map; }  // rigid x 11n
+  const std::vector<EffectInstance>& effects() const { return effect_; }
+  const std::vector<EffectUnknown>& unknowns() const { return unknown_; }
+  bool depends_on_estimate() const { return depends_on_estimate_; }
+
+  // row[i]: N x columns(), torque of joint i per unit of each filter coordinate.
+  // committed: columns() values (used by columns that depend on the estimate), eta: nonlinear() values.
+  void Regressor(const Signals& s, std::span<const double> committed, std::span<const double> eta,
+                 std::vector<Eigen::MatrixXd>& row) const;
+
+  // Columns of one body about its file frame: out[i] is N x 10, row i.
+  void BodyColumns(const Signals& s, int body, std::vector<Eigen::MatrixXd>& out) const;
+  // Rigid base columns without motion (gravity only): row[i] is N x rigid().
+  void GravityRegressor(const Signals& s, std::vector<Eigen::MatrixXd>& row) const;
+
+  const Graph& graph() const { return *graph_; }
+  const std::vector<std::vector<Expr>>& rows() const { return rows_; }  // [joint][column]
+
+ private:
+  void AddEffects(const Catalogue& catalogue, const ModelQuantities& quantities);
+  void PlaceColumns();
+  void MakeTable();
+  const EffectColumn& effect_column(int k) const {
+    return effect_[effect_column_[k].effect].columns[effect_column_[k].column];
+  }
+  std::vector<Binding> Bind(const Signals& s, std::span<const double> committed, std::span<const double> eta) const;
+
+  Robot robot_;
+  std::unique_ptr<Graph> graph_ = std::make_unique<Graph>();
+  BaseParameters base_;
+  int front_ = 0, rigid_ = 0, dense_ = 0;
+  std::vector<int> front_begin_, row_begin_, column_joint_;
+  Catalogue record_;  // those in use; effect_ points into it
+  std::vector<EffectInstance> effect_;
+  std::vector<EffectUse> use_;  // one per effect_
+  std::vector<EffectUnknown> unknown_;
+  std::vector<TableParameter> table_;
+  struct ColumnOf {
+    int effect, column;
+  };
+  std::vector<ColumnOf> effect_column_;  // filter columns that are no rigid ones: [front, dense effects]
+  std::vector<std::vector<Expr>> rows_, body_rows_, gravity_rows_;
+  std::unique_ptr<Tape> regressor_tape_;
+  bool depends_on_estimate_ = false;
+};
+
+}  // namespace armcal::codegen

@@ -1,0 +1,85 @@
+// robot - what a robot file says, as numbers; no dynamics, no expressions.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace armcal::codegen {
+
+enum class JointType { kRevolute, kPrismatic };
+
+// Modified DH (Craig): frame i = frame i-1 * Rx(alpha) Tx(a) Rz(theta) Tz(d); q adds to theta or, prismatic, to d.
+struct JointKinematics {
+  JointType type = JointType::kRevolute;
+  double alpha_rad = 0, a_m = 0, d_m = 0, theta_rad = 0;
+};
+
+struct Link {
+  double mass_kg = 0;
+  std::array<double, 3> center_m{};      // link frame
+  std::array<double, 6> inertia_kgm2{};  // xx xy xz yy yz zz about the centre, link axes
+};
+
+struct Motor {
+  double counts_per_turn = 0;
+  int zero_counts = 0;
+  double gear_ratio = 1;  // motor turn per joint unit (rad/rad or rad/m), signed
+  double current_A_per_lsb = 0;
+  double torque_constant_NmpA = 0;
+  double torque_constant_tolerance = 0;  // relative, half width; 0: taken as exact
+  double rotor_inertia_kgm2 = 0;         // motor shaft
+};
+
+// For prismatic joints read m, m/s, N for rad, rad/s, N m.
+struct Joint {
+  std::string name;
+  JointKinematics kinematics;
+  std::array<double, 2> position_limit_rad{};
+  double speed_limit_radps = 0, acceleration_limit_radps2 = 0, torque_limit_Nm = 0;
+  double torque_noise_Nm = 0;  // standard deviation of one tick's reading
+  double v_min_radps = 0;
+  std::map<std::string, double> nominal;  // parameter name -> value: "Fc", "Fv", ...
+  Motor motor;
+  Link link;
+  bool has_motor = false;
+};
+
+struct EffectUse {
+  std::string effect;
+  std::vector<int> joints;                  // 0-based; empty: the record's own scope decides (arm, body)
+  std::string state = "estimated";          // estimated | considered | fixed | standby
+  std::map<std::string, double> mean;       // linear parameter -> mean
+  std::map<std::string, double> nonlinear;  // nonlinear parameter -> value
+};
+
+struct Control {
+  std::string structure;  // "pd_feedforward"; empty: unknown
+  double rate_Hz = 0;
+  std::vector<double> kp_Nmprad, kd_Nmsprad;
+};
+
+struct Robot {
+  std::string name, title, source, path;
+  std::array<double, 3> gravity_mps2{};  // base frame
+  std::string sign_law = "sgn";          // "sgn" | "tanh"
+  double sign_width_radps = 0;
+  double tick_rate_Hz = 1000;
+  int sample_ticks = 8;
+  bool has_prior = true;  // false: prior = "none"
+  double link_relative_sd = 0.2, center_floor_m = 0.005, inertia_floor_ratio = 0.02, friction_relative_sd = 0.5;
+  std::vector<Joint> joint;
+  std::vector<double> coupling;  // row-major C of q_motor = C q; empty: unit
+  std::vector<EffectUse> effect;
+  Control control;
+  std::array<double, 9> base_rotation{1, 0, 0, 0, 1, 0, 0, 0, 1};  // base frame -> frame 0, applied to gravity
+
+  int joints() const { return static_cast<int>(joint.size()); }
+};
+
+// Throws io::InputError: file, key, what was expected.
+Robot ReadRobot(const std::filesystem::path& path);
+
+}  // namespace armcal::codegen

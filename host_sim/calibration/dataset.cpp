@@ -1,0 +1,106 @@
+// calibration - derives speeds and accelerations and decides which rows count.
+#include "host_sim/calibration/dataset.hpp"
+
+#include <cmath>
+
+#include "host_sim/calibration/weighted_fit.hpp"
+#include "host_sim/io/input_error.hpp"
+#include "host_sim/io/signals.hpp"
+
+namespace armcal::calibration {
+namespace {
+constexpr double kUnscored_s = 0.5;  // design: the first and last half second of a log are not scored
+constexpr int kFlagSaturated = 2, kFlagStale = 4;
+// A joint that has just stopped or is about to turn may stick while its smoothed speed is already above v_min: rows
+// this close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
+constexpr int kTurn = 2;
+// Signals and masks for given inertias.
+Dataset Derive(const codegen::Model& model, const io::Log& log, const Eigen::VectorXd& inertia, double cutoff_scale) {
+  const int n = model.joints(), samples = static_cast<int>(log.samples());
+  const io::Derivatives derived = io::DeriveSignals(log, inertia, cutoff_scale);
+  Dataset d;
+  d.source = log.source;
+  d.s.t = log.t;
+  d.s.q = derived.q, d.s.qd = derived.qd, d.s.qdd = derived.qdd;
+  d.s.temp = log.temp;
+  d.cutoff_Hz = derived.cutoff_Hz;
+  d.tau = log.tau;
+  if (log.ext.cols() == n) d.tau += log.ext;  // an external force along +q does part of the motor's work
+  d.moving.setZero(samples, n), d.used.setZero(samples, n), d.scored.setZero(samples);
+  const auto turning = [&](int k, int j) {
+    for (int m = std::max(0, k - kTurn); m <= std::min(samples - 1, k + kTurn); ++m)
+      if (d.s.qd(m, j) * d.s.qd(k, j) <= 0 || std::abs(d.s.qd(m, j)) <= model.robot().joint[j].v_min_radps) return true;
+    return false;
+  };
+  const double begin = log.t[0] + kUnscored_s, end = log.t[samples - 1] - kUnscored_s;
+  for (int k = 0; k < samples; ++k) {
+    d.scored[k] = log.t[k] >= begin && log.t[k] <= end;
+    for (int j = 0; j < n; ++j) {
+      d.moving(k, j) = std::abs(d.s.qd(k, j)) > model.robot().joint[j].v_min_radps;
+      const bool flagged = log.flags.cols() == n && (log.flags(k, j) & (kFlagSaturated | kFlagStale));
+      d.used(k, j) = d.moving(k, j) && derived.settled[k] && !flagged && !turning(k, j);
+    }
+  }
+  return d;
+}
+
+}  // namespace
+
+Eigen::VectorXd TypicalInertia(const codegen::Model& model, const Eigen::VectorXd& base) {
+  const int n = model.joints();
+  codegen::Signals s;  // unit accelerations, one joint a sample, at mid-range; the last sample, at rest, is gravity
+  s.q.setZero(n + 1, n), s.qd.setZero(n + 1, n), s.qdd.setZero(n + 1, n);
+  for (int j = 0; j < n; ++j) {
+    const auto& limits = model.robot().joint[j].position_limit_rad;
+    s.q.col(j).setConstant(0.5 * (limits[0] + limits[1]));
+    s.qdd(j, j) = 1;
+  }
+  std::vector<Eigen::MatrixXd> row;
+  model.Regressor(s, {}, {}, row);
+  Eigen::VectorXd inertia(n);
+  for (int j = 0; j < n; ++j) {
+    const auto rigid = row[j].middleCols(model.front(), model.rigid());
+    inertia[j] = (rigid.row(j) - rigid.row(n)).dot(base);
+  }
+  return inertia;
+}
+
+Dataset Prepare(const codegen::Model& model, const io::Log& log, double cutoff_scale) {
+  const int n = model.joints();
+  if (log.joints != n)
+    throw io::InputError(log.source + ": " + std::to_string(log.joints) + " joints, expected " + std::to_string(n) +
+                         " (robot " + model.robot().name + ")");
+  Eigen::VectorXd inertia(n);
+  if (model.robot().has_prior) {
+    Eigen::VectorXd bodies(model.body_parameters());
+    for (int k = 0; k < bodies.size(); ++k) bodies[k] = model.table()[k].mean;
+    inertia = TypicalInertia(model, model.base_map() * bodies);
+  } else {
+    // A joint's torque limit over its acceleration limit is a heavy guess: a low cut-off, good enough for a first fit.
+    for (int j = 0; j < n; ++j)
+      inertia[j] = model.robot().joint[j].torque_limit_Nm / model.robot().joint[j].acceleration_limit_radps2;
+    const Dataset rough = Derive(model, log, inertia, 1);
+    const Fit fit = WeightedFit(model, {&rough});
+    const Eigen::VectorXd fitted = TypicalInertia(model, fit.x.segment(model.front(), model.rigid()));
+    for (int j = 0; j < n; ++j)
+      if (fitted[j] > 0) inertia[j] = std::min(inertia[j], fitted[j]);
+  }
+  return Derive(model, log, inertia, cutoff_scale);
+}
+
+Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only) {
+  Eigen::VectorXd rms = Eigen::VectorXd::Zero(d.joints());
+  for (int j = 0; j < d.joints(); ++j) {
+    double sum = 0;
+    int count = 0;
+    for (int k = 0; k < d.samples(); ++k) {
+      if (!d.scored[k] || (moving_only && !d.moving(k, j))) continue;
+      sum += residual(k, j) * residual(k, j);
+      ++count;
+    }
+    rms[j] = count ? std::sqrt(sum / count) : 0;
+  }
+  return rms;
+}
+
+}  // namespace armcal::calibration

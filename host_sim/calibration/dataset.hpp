@@ -1,0 +1,35 @@
+// calibration - a log made ready for estimation: signals of one instant, and which rows may be used; knows no method.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "codegen/src/generator/model.hpp"
+#include "host_sim/io/log.hpp"
+
+namespace armcal::calibration {
+
+// N samples, n joints.
+struct Dataset {
+  codegen::Signals s;         // q, qd, qdd (derived from q where the log has no better), temp
+  Eigen::MatrixXd tau;        // [N x n] measured torque minus known external torque
+  Eigen::MatrixXi moving;     // [N x n] 1: |qd| > v_min of that joint
+  Eigen::MatrixXi used;       // [N x n] 1: row may be fitted (moving, signals settled, drive did not flag it)
+  Eigen::VectorXi scored;     // [N] 1: not within 0.5 s of an end of the log
+  Eigen::VectorXd cutoff_Hz;  // [n]
+  std::string source;
+
+  int samples() const { return s.samples(); }
+  int joints() const { return static_cast<int>(tau.cols()); }
+};
+
+// cutoff_scale: multiplies the chosen cut-off frequencies (a second bandwidth shows what depends on the derivation).
+// The cut-off depends on the arm's inertia: from the prior, or, without one, from a first fit of this very log.
+Dataset Prepare(const codegen::Model& model, const io::Log& log, double cutoff_scale = 1);
+
+// Diagonal of the mass matrix in the middle of the joints' ranges, for given base parameters.
+Eigen::VectorXd TypicalInertia(const codegen::Model& model, const Eigen::VectorXd& base);
+
+// Root mean square of residual[:, j] over scored samples of each joint; moving_only: where that joint moves.
+Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only);
+
+}  // namespace armcal::calibration

@@ -1,0 +1,39 @@
+// calibration - what is known before any log: bodies, friction, effects, torque gains as Gaussians; knows no data.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "codegen/src/generator/model.hpp"
+
+namespace armcal::calibration {
+
+// Coordinates of a fit: x = [filter columns, torque gain deviations kappa (one a joint)].
+// measured torque_j = (1 + kappa_j) * (Y_j p): a torque constant that is off by its tolerance is ordinary parameter
+// error.
+struct Prior {
+  Eigen::VectorXd mean;        // [columns + n]
+  Eigen::MatrixXd covariance;  // the bodies' part is B J diag(sd^2) J' B', full
+  std::vector<int> active;     // coordinates that a fit may move
+  bool informative = true;     // false: prior = "none", covariance is not used
+  int columns = 0;
+};
+
+// Bodies about their link origins (10 values) <-> (m, c, I about the centre), and the Jacobian d(origin)/d(table).
+Eigen::VectorXd ToCentre(const Eigen::VectorXd& origin);
+Eigen::VectorXd ToOrigin(const Eigen::VectorXd& centre);
+Eigen::MatrixXd OriginJacobian(const Eigen::VectorXd& centre);
+
+// From the model's table: means, deviations and states.
+Prior MakePrior(const codegen::Model& model);
+
+// Covariance of the body parameters (about origins), 11n x 11n, at the table's means.
+Eigen::MatrixXd BodyCovariance(const codegen::Model& model);
+Eigen::VectorXd BodyMean(const codegen::Model& model);
+
+// Standard parameters from base ones: phi = phi0 + G (b - B phi0), G = P0 B' (B P0 B')^-1.
+Eigen::VectorXd ReadOutBodies(const codegen::Model& model, const Eigen::VectorXd& base);
+
+// Every link's pseudo-inertia is positive definite.
+bool IsPhysical(const Eigen::VectorXd& bodies);
+
+}  // namespace armcal::calibration

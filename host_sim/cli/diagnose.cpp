@@ -1,0 +1,107 @@
+// cli - armcal diagnose: logs -> what the model lacks, decided on train, judged on test.
+#include <fmt/core.h>
+#include <chrono>
+
+#include "codegen/src/generator/emit.hpp"
+#include "host_sim/cli/diagnosis_report.hpp"
+#include "host_sim/cli/logs.hpp"
+#include "host_sim/cli/verb.hpp"
+#include "host_sim/io/files.hpp"
+#include "host_sim/report/table.hpp"
+
+namespace armcal::cli {
+std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
+  auto run = std::make_unique<DiagnosisRun>();
+  run->catalogue = LoadCatalogue();
+  run->model = std::make_unique<codegen::Model>(codegen::ReadRobot(RobotPath(o.robot)), run->catalogue);
+  const codegen::Model& model = *run->model;
+  const LogReader read(model, o.channels);
+  run->train = read.All(o.train);
+  const auto start = std::chrono::steady_clock::now();
+  run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, Pointers(run->train));
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const diagnosis::Finding& finding = run->diagnosis->finding();
+
+  // The model is written, and its hash taken, before the held-out log is opened.
+  std::string provenance = "Train:", model_hash;
+  for (const std::string& p : o.train)
+    provenance +=
+        " " + std::filesystem::path(p).filename().string() + " (sha256 " + io::FileHash(p).substr(0, 16) + ")";
+  const std::string before_test = RobotFileWithTerms(model, finding, provenance);
+  if (!o.model_out.empty()) {
+    io::AtomicWrite(o.model_out, before_test);
+    model_hash = io::FileHash(o.model_out);
+  }
+  run->test = read.One(o.test);
+  run->held_out = run->diagnosis->Judge(run->test);
+  const std::string after_test = RobotFileWithTerms(model, finding, provenance);
+  if (!o.model_out.empty() && after_test != before_test)
+    io::AtomicWrite(o.model_out, after_test);  // what was not confirmed is taken out
+
+  run->view = {&model, &finding, &run->test, &run->held_out, run->diagnosis->TermTorque(run->test), seconds};
+  nlohmann::ordered_json& json = run->json;
+  json = DiagnosisJson(run->view);
+  json["provenance"] = provenance;
+  if (!o.model_out.empty()) {
+    // The same schema: a table can switch the terms on. Another one: the model must be generated and the drive built.
+    const codegen::Model next(codegen::ReadRobot(o.model_out), run->catalogue);
+    json["model"] = {{"file", o.model_out},
+                     {"sha256_before_test", model_hash},
+                     {"schema", codegen::Schema(next)},
+                     {"by_table", codegen::Schema(next) == codegen::Schema(model)}};
+  }
+  fmt::print("{}", DiagnosisText(run->view));
+  report::Table table{{"joint", "before", "after", "before, moving", "after, moving", "noise floor"}, {}};
+  for (int j = 0; j < model.joints(); ++j) {
+    std::vector<std::string> row{std::to_string(j + 1)};
+    for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor"})
+      row.push_back(fmt::format("{:.4g}", json[key][j].get<double>()));
+    table.rows.push_back(row);
+  }
+  fmt::print("held out: {}, RMS of measured minus predicted torque\n{}", o.test, report::Text(table));
+  if (!o.model_out.empty() && !finding.terms.empty())
+    fmt::print(
+        "new model: {} ({})\n", o.model_out,
+        json["model"]["by_table"].get<bool>() ? "a table switches it on" : "generate it and build the drive anew");
+  WriteJson(o.json, json);
+  return run;
+}
+
+namespace {
+
+int Run(const DiagnoseOptions& o) {
+  const auto run = RunDiagnosis(o);
+  if (!o.report.empty()) {
+    report::Page page("What the model of " + run->model->robot().name + " lacks",
+                      "Declared model fitted to the training logs, terms chosen there, error on a held-out log.");
+    AddDiagnosis(page, run->view);
+    page.Section("Provenance");
+    page.Facts({{"robot", run->model->robot().title},
+                {"training", run->json["provenance"]},
+                {"held out", o.test},
+                {"search", fmt::format("{:.1f} s", run->view.seconds)}});
+    page.Write(o.report);
+    fmt::print("report: {}\n", o.report);
+  }
+  return kOk;
+}
+
+}  // namespace
+
+void AddDiagnose(CLI::App& app, Action& action) {
+  auto* verb = app.add_subcommand(
+      "diagnose",
+      "find what the model lacks: residual, cause, new model, error before and after\nexample: armcal diagnose --robot "
+      "er20_like --train train.csv.gz --test test.csv.gz --json out.json --report out.html --model-out new.toml");
+  auto o = std::make_shared<DiagnoseOptions>();
+  verb->add_option("--robot", o->robot, "robot file or name")->required();
+  verb->add_option("--train", o->train, "log(s) on which everything is decided")->required();
+  verb->add_option("--test", o->test, "held-out log: read once, after the model is written")->required();
+  verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  verb->add_option("--json", o->json, "write the verdict here");
+  verb->add_option("--report", o->report, "write a self-contained page here");
+  verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");
+  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+}
+
+}  // namespace armcal::cli

@@ -1,0 +1,233 @@
+// cli - what a diagnosis shows: numbers, plots, a robot file.
+#include "host_sim/cli/diagnosis_report.hpp"
+
+#include <fmt/core.h>
+#include <cmath>
+#include <fstream>
+
+#include "host_sim/cli/logs.hpp"
+#include "host_sim/report/axis.hpp"
+
+namespace armcal::cli {
+
+using diagnosis::Term;
+using Eigen::VectorXd;
+
+namespace {
+
+std::string Amplitudes(const Term& t) {
+  std::string out;
+  for (std::size_t k = 0; k < t.eta.size(); ++k)
+    out += fmt::format("{}{} = {:.4g} {}", out.empty() ? "" : ", ", t.unknowns[k].name, t.eta[k], t.unknowns[k].unit);
+  for (std::size_t c = 0; c < t.columns.size() && c < 4; ++c)
+    out += fmt::format("{}{} = {:.4g} +- {:.2g} {}", out.empty() ? "" : ", ", t.columns[c].name, t.amplitude[c],
+                       t.sd[c], t.columns[c].unit);
+  if (t.columns.size() > 4) out += ", ...";
+  return out;
+}
+
+std::vector<std::string> Signals(const Term& t) {
+  std::vector<std::string> out;
+  const std::string joint = t.joints.empty() ? "" : std::to_string(t.joints[0] + 1);
+  for (std::string s : t.record->signals) {
+    if (s == "t") out.push_back("time");
+    else if (s.back() == ')') out.push_back(s.insert(s.size() - 1, joint));
+    else out.push_back(s == "tau_rigid" ? "load" + joint : s + joint);
+  }
+  return out;
+}
+
+// The signal over which the term's dependence is drawn, over the test log.
+std::pair<std::string, VectorXd> Abscissa(const DiagnosisView& v, const Term& t) {
+  const auto& s = v.test->s;
+  const int j = t.joints.empty() ? v.model->joints() - 1 : t.joints[0];
+  const std::string& signal = t.record->signals.empty() ? "qd" : t.record->signals[0];
+  const std::string number = std::to_string(j + 1);
+  if (signal == "q") return {"q" + number + " / rad", s.q.col(j)};
+  if (signal == "temp" && s.temp.cols() > j) return {"temperature " + number + " / deg C", s.temp.col(j)};
+  if (signal == "t") return {"time / s", s.t};
+  if (signal == "tau_rigid") return {"torque of joint " + number + " / N m", v.test->tau.col(j)};
+  return {"speed of joint " + number + " / rad/s", s.qd.col(j)};
+}
+
+// Mean of y in equal bins of x, where `use` holds.
+report::Series Binned(const std::string& name, const VectorXd& x, const VectorXd& y, const Eigen::VectorXi& use) {
+  constexpr int kBins = 60;
+  const double lo = x.minCoeff(), hi = x.maxCoeff();
+  std::vector<double> sum(kBins, 0), count(kBins, 0);
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    if (!use[k] || hi <= lo) continue;
+    const int b = std::min(kBins - 1, static_cast<int>((x[k] - lo) / (hi - lo) * kBins));
+    sum[b] += y[k];
+    ++count[b];
+  }
+  report::Series s{name, {}, {}, report::Style::kLine};
+  for (int b = 0; b < kBins; ++b)
+    if (count[b] >= 3) s.x.push_back(lo + (b + 0.5) * (hi - lo) / kBins), s.y.push_back(sum[b] / count[b]);
+  return s;
+}
+
+std::vector<double> Values(const VectorXd& v) { return {v.data(), v.data() + v.size()}; }
+
+}  // namespace
+
+std::string JointName(const Term& t) {
+  if (t.joints.size() == 1) return std::to_string(t.joints[0] + 1);
+  if (t.joints.size() == 2) return fmt::format("{}-{}", t.joints[0] + 1, t.joints[1] + 1);
+  return t.record->scope == "body" ? "flange" : "all";
+}
+
+nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
+  const auto& f = *v.finding;
+  nlohmann::ordered_json j;
+  j["verdict"] = f.terms.empty() ? "none" : "effect";
+  j["joint_base"] = 1;
+  j["terms"] = nlohmann::ordered_json::array();
+  for (const Term& t : f.terms) {
+    nlohmann::ordered_json term{{"kind", t.record->name}};
+    if (t.joints.size() == 1) term["joint"] = t.joints[0] + 1;
+    else term["joint"] = JointName(t);
+    term["signals"] = Signals(t);
+    nlohmann::ordered_json parameters, deviations;
+    for (std::size_t k = 0; k < t.eta.size(); ++k) parameters[t.unknowns[k].name] = t.eta[k];
+    for (std::size_t c = 0; c < t.columns.size(); ++c)
+      parameters[t.columns[c].name] = t.amplitude[c], deviations[t.columns[c].name] = t.sd[c];
+    term["parameters"] = parameters;
+    term["parameter_sd"] = deviations;
+    term["also_fits"] = t.also_fits;
+    term["confirmed"] = t.confirmed;
+    term["score"] = t.score;
+    term["folds"] = ToList(t.folds);
+    term["runner_up"] = t.runner_up;
+    term["runner_up_score"] = t.runner_up_score;
+    j["terms"].push_back(term);
+  }
+  const auto& test = *v.test;
+  j["before"] = ToList(calibration::Rms(test, v.held_out->before, false));
+  j["after"] = ToList(calibration::Rms(test, v.held_out->after, false));
+  j["before_moving"] = ToList(calibration::Rms(test, v.held_out->before, true));
+  j["after_moving"] = ToList(calibration::Rms(test, v.held_out->after, true));
+  std::vector<double> share;
+  for (int k = 0; k < test.joints(); ++k) share.push_back(test.moving.col(k).cast<double>().mean());
+  j["moving_share"] = share;
+  j["noise_floor"] = ToList(f.sigma);
+  j["noise_innovation"] = ToList(f.innovation);
+  j["smallest_detectable"] = ToList(f.smallest);
+  if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
+  j["seconds"] = v.seconds;
+  return j;
+}
+
+std::string DiagnosisText(const DiagnosisView& v) {
+  std::string out;
+  if (v.finding->terms.empty()) {
+    out =
+        "verdict: none. Nothing is missing that these logs could show; the smallest effect they would have shown, RMS "
+        "per joint:";
+    for (int j = 0; j < v.model->joints(); ++j) out += fmt::format(" {:.2g}", v.finding->smallest[j]);
+    return out + "\n";
+  }
+  out = "verdict: effect\n";
+  for (const Term& t : v.finding->terms) {
+    out += fmt::format("  {}, joint {}{}: {}\n", t.record->name, JointName(t),
+                       t.confirmed ? "" : " (NOT CONFIRMED on the held-out log)", t.record->title);
+    if (t.confirmed) out += fmt::format("    {}\n", Amplitudes(t));
+    for (const std::string& other : t.also_fits) out += fmt::format("    fits equally: {}\n", other);
+    out +=
+        fmt::format("    score {:.0f}{}\n", t.score,
+                    t.runner_up.empty() ? "" : fmt::format(", runner-up {} ({:.0f})", t.runner_up, t.runner_up_score));
+  }
+  return out;
+}
+
+void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
+  const auto& f = *v.finding;
+  const auto& test = *v.test;
+  if (f.terms.empty()) {
+    page.Box(report::Tone::kGood, "Nothing is missing",
+             "No effect of the catalogue improves the declared model by more than chance would.");
+  } else {
+    std::string list;
+    for (const Term& t : f.terms)
+      list += (list.empty() ? "" : "; ") +
+              fmt::format("{} on joint {}{}", t.record->name, JointName(t), t.confirmed ? "" : " (not confirmed)");
+    page.Box(report::Tone::kWarning, "The model lacks: " + list, f.terms[0].record->title);
+  }
+  page.Section("Error on the held-out log");
+  report::Table table{{"joint", "before", "after", "before, moving", "after, moving", "noise floor (estimate)",
+                       "smallest effect visible"},
+                      {},
+                      "RMS of measured minus predicted torque, N m. Before: the declared model fitted on the training "
+                      "logs; after: the same with the terms."};
+  const VectorXd b = calibration::Rms(test, v.held_out->before, false),
+                 a = calibration::Rms(test, v.held_out->after, false),
+                 bm = calibration::Rms(test, v.held_out->before, true),
+                 am = calibration::Rms(test, v.held_out->after, true);
+  for (int j = 0; j < test.joints(); ++j)
+    table.rows.push_back({std::to_string(j + 1), report::Number(b[j]), report::Number(a[j]), report::Number(bm[j]),
+                          report::Number(am[j]), report::Number(f.sigma[j]), report::Number(f.smallest[j])});
+  page.Add(table);
+  if (!v.held_out->tracking.empty()) page.Text(v.held_out->tracking + ".");
+  for (std::size_t k = 0; k < f.terms.size(); ++k) {
+    const Term& t = f.terms[k];
+    page.Section(fmt::format("{}, joint {}", t.record->name, JointName(t)));
+    page.Text(t.record->title + ". " + t.record->source + ".");
+    page.Facts(
+        {{"parameters", Amplitudes(t)},
+         {"score", fmt::format("{:.0f} (accepted above 15)", t.score)},
+         {"folds", fmt::format("improves {} of {} blocks of the training log that it was not fitted to",
+                               (t.folds.array() > 0).count(), t.folds.size())},
+         {"runner-up", t.runner_up.empty() ? "none" : fmt::format("{} (score {:.0f})", t.runner_up, t.runner_up_score)},
+         {"fits equally", t.also_fits.empty() ? "nothing else in the catalogue"
+                                              : fmt::format("{}{}", t.also_fits[0],
+                                                            t.also_fits.size() > 1 ? ", " + t.also_fits[1] : "")}});
+    const int j = t.joints.empty() ? 1 % test.joints() : t.joints[0];
+    const auto [label, x] = Abscissa(v, t);
+    const VectorXd without =
+        v.held_out->after.col(j) + v.term_torque[k].col(j);  // what this term alone explains is put back
+    report::Plot dependence{
+        {fmt::format("what gave it away: residual of joint {}, mean over bins", j + 1), label, "torque / N m"},
+        {Binned("without the term", x, without, test.moving.col(j)),
+         Binned("the term", x, v.term_torque[k].col(j), test.moving.col(j)),
+         Binned("what remains", x, v.held_out->after.col(j), test.moving.col(j))}};
+    page.Add(dependence, "Held-out log, moving samples.");
+    report::Plot time{{fmt::format("residual of joint {} over time", j + 1), "time / s", "torque / N m"},
+                      {{"before", Values(test.s.t), Values(v.held_out->before.col(j)), report::Style::kLine},
+                       {"after", Values(test.s.t), Values(v.held_out->after.col(j)), report::Style::kLine}}};
+    page.Add(time, "Held-out log, all samples; at standstill friction holds any torque up to its breakaway level.");
+  }
+}
+
+std::string RobotFileWithTerms(const codegen::Model& model, const diagnosis::Finding& finding,
+                               const std::string& provenance) {
+  std::ifstream in(model.robot().path);
+  std::string text(std::istreambuf_iterator<char>(in), {});
+  if (!text.empty() && text.back() != '\n') text += '\n';
+  for (const Term& t : finding.terms) {
+    if (!t.confirmed) continue;
+    text += fmt::format("\n# Found by armcal diagnose: {}. Record: codegen/effects/{}.toml. {}\n", t.record->title,
+                        t.record->name, provenance);
+    if (!t.record->on_target) {
+      text += fmt::format("# {} describes one run only; it is not compiled into the model.\n", t.record->name);
+      continue;
+    }
+    text += fmt::format("[[effect]]\nname = \"{}\"\nstate = \"estimated\"\n", t.record->name);
+    std::string joints;
+    for (const int j : t.joints) joints += fmt::format("{}{}", joints.empty() ? "" : ", ", j + 1);
+    if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
+    std::string mean, nonlinear;
+    const auto key = [&](const std::string& name) { return "\"" + name + "\""; };
+    for (std::size_t c = 0; c < t.columns.size(); ++c) {
+      mean += fmt::format("{}{} = {:.9e}", mean.empty() ? "" : ", ", key(t.columns[c].name), t.amplitude[c]);
+      text +=
+          fmt::format("# {} = {:.5g} +- {:.2g} {}\n", t.columns[c].name, t.amplitude[c], t.sd[c], t.columns[c].unit);
+    }
+    for (std::size_t k = 0; k < t.eta.size(); ++k)
+      nonlinear += fmt::format("{}{} = {:.9e}", nonlinear.empty() ? "" : ", ", key(t.unknowns[k].name), t.eta[k]);
+    text += "mean = { " + mean + " }\n";
+    if (!nonlinear.empty()) text += "nonlinear = { " + nonlinear + " }\n";
+  }
+  return text;
+}
+
+}  // namespace armcal::cli

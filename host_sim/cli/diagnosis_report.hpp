@@ -1,0 +1,61 @@
+// cli - a diagnosis as JSON, as a page, and as a new robot file; knows no search.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "host_sim/diagnosis/diagnose.hpp"
+#include "host_sim/report/page.hpp"
+
+namespace armcal::cli {
+
+// Everything that one diagnosis has to show.
+struct DiagnosisView {
+  const codegen::Model* model = nullptr;
+  const diagnosis::Finding* finding = nullptr;
+  const calibration::Dataset* test = nullptr;
+  const diagnosis::HeldOut* held_out = nullptr;
+  std::vector<Eigen::MatrixXd> term_torque;  // on the test log
+  double seconds = 0;
+};
+
+struct DiagnoseOptions {
+  std::string robot, channels, test, json, report, model_out;
+  std::vector<std::string> train;
+};
+
+// One diagnosis from files to files, with everything its view refers to.
+struct DiagnosisRun {
+  codegen::Catalogue catalogue;
+  std::unique_ptr<codegen::Model> model;
+  std::vector<calibration::Dataset> train;
+  calibration::Dataset test;
+  std::unique_ptr<diagnosis::Diagnosis> diagnosis;
+  diagnosis::HeldOut held_out;
+  DiagnosisView view;
+  nlohmann::ordered_json json;
+};
+
+// Train, decide, write the model file and take its hash; only then open the held-out log. Prints the verdict.
+// (diagnose.cpp)
+std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options);
+
+// "3", "5-6", "all", "flange": how a report names the joints of a term.
+std::string JointName(const diagnosis::Term& term);
+
+// The JSON of design.md section 7.
+nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);
+
+// Verdict, table before / after, and for each term the residual over time and over the signal that gave it away.
+void AddDiagnosis(report::Page& page, const DiagnosisView& v);
+
+// Short lines for the terminal.
+std::string DiagnosisText(const DiagnosisView& v);
+
+// The robot file with the terms added (those not confirmed left out), with provenance as comments.
+std::string RobotFileWithTerms(const codegen::Model& model, const diagnosis::Finding& finding,
+                               const std::string& provenance);
+
+}  // namespace armcal::cli

@@ -1,0 +1,206 @@
+// cli - armcal excite: searches an excitation trajectory, checks it against the limits, writes it; plays nothing.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+
+#include <unistd.h>
+
+#include "host_sim/cli/verb.hpp"
+#include "host_sim/excitation/compose.hpp"
+#include "host_sim/excitation/optimise.hpp"
+
+namespace armcal::cli {
+namespace {
+
+struct Options {
+  std::string robot, out, json, purpose = "train";
+  std::uint64_t seed = 1;
+  int periods = 0, harmonics = 5, starts = 0;
+  double seconds = 20, period_s = 10, step_s = 0.004, margin = 0.05;
+  bool no_slow = false;
+};
+
+constexpr int kTrainPeriods = 4, kTestPeriods = 2, kTrainSpeeds = 6, kTestSpeeds = 2;
+
+std::atomic<bool> interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may set it
+
+// While it lives, Ctrl-C ends the search and not the program.
+class InterruptGuard {
+ public:
+  InterruptGuard() : before_(std::signal(SIGINT, [](int) { interrupted = true; })) {}
+  ~InterruptGuard() { std::signal(SIGINT, before_); }
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+ private:
+  void (*before_)(int);
+};
+
+excitation::Optimum Search(const excitation::Observation& observation, const Options& o) {
+  excitation::OptimiseSettings s;
+  s.shape.frequency_radps = 2 * 3.14159265358979323846 / o.period_s;
+  s.shape.harmonics = o.harmonics;
+  if (observation.model().nonlinear() > 0) s.shape.samples = 250;
+  s.shape.samples = std::max(s.shape.samples, 16 * o.harmonics);
+  s.margin = o.margin;
+  s.seconds = o.seconds;
+  if (o.starts > 0) s.starts = o.starts;
+  s.seed = 2 * o.seed + (o.purpose == "test" ? 1 : 0);  // one seed, two different trajectories
+  s.stop = &interrupted;
+  if (isatty(STDERR_FILENO))
+    s.progress = [](int starts, double condition) {
+      fmt::print(stderr, "\r{} searches, cond(K) {:.2f}  ", starts, condition);
+    };
+  const InterruptGuard guard;
+  const excitation::Optimum best = Optimise(observation, s);
+  if (s.progress) fmt::print(stderr, "\n");
+  return best;
+}
+
+void PrintPeaks(const codegen::Robot& robot, const std::vector<excitation::JointPeaks>& peaks) {
+  fmt::print("peaks on a {:g} ms grid (share of the limit); rad, rad/s, rad/s^2, N m (m, m/s, m/s^2, N)\n",
+             1e3 * excitation::kCheckStep_s);
+  fmt::print("  {:<10} {:>17} {:>5} {:>8} {:>5} {:>8} {:>5} {:>8} {:>5}\n", "joint", "position", "", "speed", "",
+             "accel.", "", "torque", "");
+  for (std::size_t j = 0; j < peaks.size(); ++j) {
+    const auto& p = peaks[j];
+    fmt::print("  {:<10} {:>8.3f} {:>8.3f} {:>4.0f}% {:>8.3f} {:>4.0f}% {:>8.2f} {:>4.0f}%", robot.joint[j].name,
+               p.lowest_rad, p.highest_rad, 100 * p.position_share, p.speed_radps, 100 * p.speed_share,
+               p.acceleration_radps2, 100 * p.acceleration_share);
+    if (robot.has_prior) fmt::print(" {:>8.1f} {:>4.0f}%\n", p.torque_Nm, 100 * p.torque_share);
+    else fmt::print(" {:>8} {:>5}\n", "unknown", "");
+  }
+}
+
+nlohmann::ordered_json PeaksJson(const std::vector<excitation::JointPeaks>& peaks) {
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& p : peaks)
+    list.push_back({{"position_rad", {p.lowest_rad, p.highest_rad}},
+                    {"position_share", p.position_share},
+                    {"speed_radps", p.speed_radps},
+                    {"speed_share", p.speed_share},
+                    {"acceleration_radps2", p.acceleration_radps2},
+                    {"acceleration_share", p.acceleration_share},
+                    {"torque_Nm", p.torque_Nm},
+                    {"torque_share", p.torque_share}});
+  return list;
+}
+
+nlohmann::ordered_json Rows(const Eigen::MatrixXd& m) {
+  auto list = nlohmann::ordered_json::array();
+  for (Eigen::Index r = 0; r < m.rows(); ++r) list.push_back(std::vector<double>(m.row(r).begin(), m.row(r).end()));
+  return list;
+}
+
+int Run(const Options& o) {
+  const codegen::Model model = LoadModel(o.robot);
+  const codegen::Robot& robot = model.robot();
+  const excitation::Observation observation(model);
+  const excitation::Observation without_rotors(model, excitation::Observation::Rotors::kLeftOut);
+  const excitation::Optimum best = Search(observation, o);
+
+  excitation::ComposeSettings compose;
+  const bool test = o.purpose == "test";
+  compose.periods = o.periods > 0 ? o.periods : test ? kTestPeriods : kTrainPeriods;
+  compose.slow_speeds = o.no_slow ? 0 : test ? kTestSpeeds : kTrainSpeeds;
+  compose.step_s = o.step_s, compose.margin = o.margin;
+  const excitation::Composed composed = Compose(observation, best.series, compose);
+  const double sample_s = robot.sample_ticks / robot.tick_rate_Hz;
+  const double whole =
+      observation.ConditionNumber(Sampled(excitation::TrajectorySpline(composed.trajectory), sample_s));
+  const double rigid_only = PeriodCondition(without_rotors, best.series);
+  excitation::WriteTrajectory(o.out, composed.trajectory);
+
+  const auto columns = observation.columns().size();
+  fmt::print("{}: cond(K) {:.3f} over one Fourier period, {:.3f} over the whole trajectory ({} searches, seed {}{})\n",
+             robot.name, best.condition, whole, best.starts, o.seed, interrupted ? ", interrupted" : "");
+  fmt::print(
+      "  columns: the {} filter coordinates that are estimated (rigid base, friction, effects); rows divided by the "
+      "joint's torque "
+      "noise; columns scaled to unit norm\n",
+      columns);
+  if (without_rotors.columns().size() != columns)
+    fmt::print("  without the rotor inertias ({} columns): {:.3f}\n", without_rotors.columns().size(), rigid_only);
+  if (!observation.left_out().empty())
+    fmt::print("  not asked for, motion alone does not excite them: {}\n", fmt::join(observation.left_out(), ", "));
+  PrintPeaks(robot, composed.peaks);
+  if (!robot.has_prior)
+    fmt::print("  the robot file has prior = \"none\": torque is unknown, its limits are ignored\n");
+  fmt::print("sections:");
+  for (const auto& s : composed.sections)
+    fmt::print(" {} {:.1f}-{:.1f} s{}", s.name, s.begin_s, s.end_s, &s == &composed.sections.back() ? "\n" : ",");
+  fmt::print("collisions are not checked: look at the motion, and run it slowly first\n");
+  fmt::print("written: {} ({:.1f} s, {} points, {:g} ms)\n", o.out, composed.trajectory.duration_s(),
+             composed.trajectory.q.rows(), 1e3 * composed.trajectory.step_s);
+
+  auto sections = nlohmann::ordered_json::array();
+  for (const auto& s : composed.sections)
+    sections.push_back({{"name", s.name}, {"begin_s", s.begin_s}, {"end_s", s.end_s}});
+  WriteJson(o.json, {{"robot", robot.name},
+                     {"file", o.out},
+                     {"purpose", o.purpose},
+                     {"seed", o.seed},
+                     {"searches", best.starts},
+                     {"interrupted", interrupted.load()},
+                     {"cond_period", best.condition},
+                     {"cond_whole", whole},
+                     {"cond_period_without_rotors", rigid_only},
+                     {"columns", columns},
+                     {"left_out", observation.left_out()},
+                     {"row_weight", "1/torque_noise"},
+                     {"column_scaling", "unit norm"},
+                     {"duration_s", composed.trajectory.duration_s()},
+                     {"step_s", composed.trajectory.step_s},
+                     {"torque_limits_checked", robot.has_prior},
+                     {"collisions_checked", false},
+                     {"sections", sections},
+                     {"peaks", PeaksJson(composed.peaks)},
+                     {"fourier",
+                      {{"frequency_radps", best.series.frequency_radps},
+                       {"rows", "a1..aL, b1..bL, q0"},
+                       {"coefficient", Rows(best.series.coefficient)}}}});
+  return kOk;
+}
+
+}  // namespace
+
+void AddExcite(CLI::App& app, Action& action) {
+  auto* verb = app.add_subcommand("excite",
+                                  "make a trajectory that shows the parameters (collisions are not checked)\n"
+                                  "example: armcal excite --robot er20_like --out train.csv\n"
+                                  "         armcal excite --robot er20_like --out test.csv --purpose test");
+  auto o = std::make_shared<Options>();
+  verb->add_option("--robot", o->robot, "robot file, or a name in codegen/robots")->required();
+  verb->add_option("--out", o->out, "trajectory file to write: t,q1..qn")->required();
+  verb->add_option("--purpose", o->purpose,
+                   "train: 4 periods and slow moves; test: another series, 2 periods, few slow moves")
+      ->check(CLI::IsMember({"train", "test"}))
+      ->capture_default_str();
+  verb->add_option("--seed", o->seed, "of the random starts")->capture_default_str();
+  verb->add_option("--periods", o->periods, "Fourier periods to play (default: by purpose)")->check(CLI::Range(1, 100));
+  verb->add_option("--period", o->period_s, "length of a period in seconds")
+      ->check(CLI::Range(1.0, 1000.0))
+      ->capture_default_str();
+  verb->add_option("--harmonics", o->harmonics, "terms of the Fourier series")
+      ->check(CLI::Range(1, 20))
+      ->capture_default_str();
+  verb->add_option("--seconds", o->seconds, "time for the search; Ctrl-C ends it early")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  verb->add_option("--starts", o->starts, "searches at most; with time enough the result follows from the seed")
+      ->check(CLI::Range(1, 1000000));
+  verb->add_option("--step", o->step_s, "grid of the file in seconds")
+      ->check(CLI::Range(0.0005, 0.05))
+      ->capture_default_str();
+  verb->add_option("--margin", o->margin, "share of every limit that is kept free")
+      ->check(CLI::Range(0.01, 0.9))
+      ->capture_default_str();
+  verb->add_flag("--no-slow", o->no_slow, "leave the slow moves out");
+  verb->add_option("--json", o->json, "write the figures here");
+  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+}
+
+}  // namespace armcal::cli

@@ -1,0 +1,76 @@
+// cli - reads logs by name or channel map and compares predictions with a held-out log.
+#include "host_sim/cli/logs.hpp"
+
+#include <fmt/core.h>
+
+#include "host_sim/io/butterworth.hpp"
+#include "host_sim/io/channels.hpp"
+#include "host_sim/io/log.hpp"
+#include "host_sim/report/table.hpp"
+
+namespace armcal::cli {
+
+calibration::Dataset LogReader::One(const std::string& path) const {
+  return calibration::Prepare(model_,
+                              channels_.empty() ? io::ReadLog(path) : io::ReadLog(path, io::ReadChannelMap(channels_)));
+}
+
+std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>& paths) const {
+  std::vector<calibration::Dataset> out;
+  for (const std::string& p : paths) out.push_back(One(p));
+  return out;
+}
+
+std::vector<const calibration::Dataset*> Pointers(const std::vector<calibration::Dataset>& data) {
+  std::vector<const calibration::Dataset*> out;
+  for (const auto& d : data) out.push_back(&d);
+  return out;
+}
+
+HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::MatrixXd& predicted, double band_Hz) {
+  const int n = test.joints();
+  HeldOutError e;
+  Eigen::MatrixXd residual = test.tau - predicted;
+  e.rms = calibration::Rms(test, residual, false);
+  e.rms_moving = calibration::Rms(test, residual, true);
+  const Eigen::VectorXd torque = calibration::Rms(test, test.tau, true);
+  e.relative = e.rms_moving.cwiseQuotient(torque.cwiseMax(1e-300));
+  e.moving_share.resize(n);
+  for (int j = 0; j < n; ++j) e.moving_share[j] = test.moving.col(j).cast<double>().mean();
+  if (band_Hz > 0) {
+    const double rate = (test.samples() - 1) / (test.s.t[test.samples() - 1] - test.s.t[0]);
+    Eigen::MatrixXd filtered = test.tau;
+    for (int j = 0; j < n; ++j) {
+      residual.col(j) = io::ZeroPhaseLowPass(residual.col(j), band_Hz, rate);
+      filtered.col(j) = io::ZeroPhaseLowPass(test.tau.col(j), band_Hz, rate);
+    }
+    e.band_Hz = band_Hz;
+    e.relative_band =
+        calibration::Rms(test, residual, true).cwiseQuotient(calibration::Rms(test, filtered, true).cwiseMax(1e-300));
+  }
+  return e;
+}
+
+void PrintHeldOut(const HeldOutError& e, const std::string& name) {
+  report::Table t{{"joint", "error rms", "moving", "moving / torque %"}, {}, "held out: " + name};
+  if (e.band_Hz > 0) t.header.push_back(fmt::format("below {:g} Hz %", e.band_Hz));
+  for (int j = 0; j < e.rms.size(); ++j) {
+    t.rows.push_back({std::to_string(j + 1), fmt::format("{:.4g}", e.rms[j]), fmt::format("{:.4g}", e.rms_moving[j]),
+                      fmt::format("{:.2f}", 100 * e.relative[j])});
+    if (e.band_Hz > 0) t.rows.back().push_back(fmt::format("{:.2f}", 100 * e.relative_band[j]));
+  }
+  fmt::print("held out: {}\n{}", name, report::Text(t));
+}
+
+std::vector<double> ToList(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
+
+nlohmann::ordered_json ToJson(const HeldOutError& e) {
+  nlohmann::ordered_json j{{"rms", ToList(e.rms)},
+                           {"rms_moving", ToList(e.rms_moving)},
+                           {"relative_moving", ToList(e.relative)},
+                           {"moving_share", ToList(e.moving_share)}};
+  if (e.band_Hz > 0) j["band_Hz"] = e.band_Hz, j["relative_moving_in_band"] = ToList(e.relative_band);
+  return j;
+}
+
+}  // namespace armcal::cli

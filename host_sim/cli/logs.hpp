@@ -1,0 +1,39 @@
+// cli - logs made ready for a model, and the error on a held-out one; knows no method.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "host_sim/calibration/dataset.hpp"
+
+namespace armcal::cli {
+
+class LogReader {
+ public:
+  // channels: path of a channel map, empty for our own column names.
+  LogReader(const codegen::Model& model, std::string channels) : model_(model), channels_(std::move(channels)) {}
+  calibration::Dataset One(const std::string& path) const;
+  std::vector<calibration::Dataset> All(const std::vector<std::string>& paths) const;
+
+ private:
+  const codegen::Model& model_;
+  std::string channels_;
+};
+
+std::vector<const calibration::Dataset*> Pointers(const std::vector<calibration::Dataset>& data);
+
+// Per joint, over scored samples: all, and where the joint moves. relative: error / torque, moving samples. band: the
+// same in a band.
+struct HeldOutError {
+  Eigen::VectorXd rms, rms_moving, relative, relative_band, moving_share;
+  double band_Hz = 0;
+};
+
+HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::MatrixXd& predicted, double band_Hz);
+void PrintHeldOut(const HeldOutError& e, const std::string& name);
+nlohmann::ordered_json ToJson(const HeldOutError& e);
+std::vector<double> ToList(const Eigen::VectorXd& v);
+
+}  // namespace armcal::cli

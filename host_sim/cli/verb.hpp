@@ -1,0 +1,44 @@
+// cli - what every verb shares: exit codes, where robots and records live, JSON output; one file a verb implements the
+// rest.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "codegen/src/generator/model.hpp"
+
+namespace armcal::cli {
+
+// 0 ok, 2 usage or bad input, 3 link, 4 refused by the drive, 5 verify mismatch, 6 partial.
+enum ExitCode : int { kOk = 0, kBadInput = 2, kLink = 3, kRefused = 4, kMismatch = 5, kPartial = 6 };
+
+// The verb's work; its return value is the exit code. Set by the parsed subcommand, run by main.
+using Action = std::function<int()>;
+
+void AddGenerate(CLI::App& app, Action& action);
+void AddSimulate(CLI::App& app, Action& action);
+void AddExcite(CLI::App& app, Action& action);
+void AddRecord(CLI::App& app, Action& action);
+void AddEstimate(CLI::App& app, Action& action);
+void AddIdentify(CLI::App& app, Action& action);
+void AddDiagnose(CLI::App& app, Action& action);
+void AddFlash(CLI::App& app, Action& action);
+void AddVerify(CLI::App& app, Action& action);
+void AddDemo(CLI::App& app, Action& action);
+
+// The folder that holds codegen/ (the checkout), found from ARMCAL_HOME, the current folder or the executable's place.
+std::filesystem::path Home();
+
+// A robot file's path, or a name in codegen/robots. Throws io::InputError naming the robots there are.
+std::filesystem::path RobotPath(const std::string& name_or_path);
+
+codegen::Model LoadModel(const std::string& robot);
+codegen::Catalogue LoadCatalogue();
+
+// Writes j to `path` if it is not empty; whole or not at all.
+void WriteJson(const std::string& path, const nlohmann::ordered_json& j);
+
+}  // namespace armcal::cli

@@ -1,0 +1,82 @@
+// client - registers of a drive over Modbus TCP, and what its identity and status say; knows no table and no model.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "armcal/core/status.hpp"
+#include "host_sim/client/errors.hpp"
+
+struct _modbus;  // libmodbus' connection
+
+namespace armcal::client {
+
+struct Identity {
+  std::uint16_t map_major, map_minor;
+  std::uint32_t layout_crc, schema, firmware_version, serial_number;
+  std::uint16_t axes, parameters, columns, table_words;
+  std::uint32_t capabilities, tick_rate_Hz;
+  std::uint16_t sample_ticks;
+};
+
+// One consistent reading of the status block (SPEC.md).
+struct DriveStatus {
+  std::uint16_t transaction_state;
+  core::Status transaction_status, table_status;
+  std::uint16_t feedforward_state;
+  std::uint32_t generation, tick, active_crc, command_sequence, store_sequence;
+  std::uint16_t slot_state[2];
+  std::uint32_t enabled_axes, clamp_count, sample_gaps, request_count;
+  std::uint16_t error_exception, error_function, error_address;
+  core::Status error_status;
+  std::uint32_t error_request;
+  bool unlocked;
+  std::uint16_t health;
+  std::uint32_t rows_used[2], rows_gated[2];
+};
+
+// Every call throws LinkError after three attempts without a sensible answer (two seconds each; the connection is made
+// anew between them, so that a late answer is never taken for the next one) and RefusedError, with the drive's own
+// reason, when it answers with an exception. Repeating is safe because every armcal write is idempotent.
+class DriveClient {
+ public:
+  DriveClient(const std::string& host, int port, int unit = 1);
+  ~DriveClient();
+  DriveClient(DriveClient&&) noexcept;
+  DriveClient& operator=(DriveClient&&) noexcept;
+
+  // Any number of registers; split into requests of at most 120.
+  std::vector<std::uint16_t> ReadInput(int first, int count);
+  std::vector<std::uint16_t> ReadHolding(int first, int count);
+  // The same for writing; a block that must be written whole is at most 120 registers.
+  void Write(int first, std::span<const std::uint16_t> words);
+  void WriteSingle(int address, std::uint16_t word);  // function 6
+
+  std::uint32_t ReadInputU32(int first);
+  std::vector<float> ReadInputFloats(int first, int count);
+  void WriteU32(int first, std::uint32_t value);
+
+  // Throws LinkError if it is not an armcal drive, of another major map version, or its word order is not ours.
+  Identity ReadIdentity();
+  DriveStatus ReadStatus();
+
+  const std::string& name() const { return name_; }  // "host:port", for messages
+
+ private:
+  using Connection = std::unique_ptr<_modbus, void (*)(_modbus*)>;
+
+  void Connect();
+  void Request(const std::string& what, const std::function<int(_modbus*)>& call);
+  [[noreturn]] void Refused(const std::string& what, int exception);
+  std::vector<std::uint16_t> Read(bool input, int first, int count);
+
+  std::string host_, name_;
+  int port_, unit_;
+  Connection connection_;
+};
+
+}  // namespace armcal::client

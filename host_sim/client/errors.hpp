@@ -1,0 +1,29 @@
+// client - the ways in which talking to a drive fails; knows no register.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+#include "armcal/core/status.hpp"
+
+namespace armcal::client {
+
+// No answer, or one that makes no sense; the tool exits with 3.
+struct LinkError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// The drive answered no; `status` is its reason, kOk if it gave none. The tool exits with 4.
+struct RefusedError : std::runtime_error {
+  RefusedError(const std::string& what, int exception_code, core::Status reason)
+      : std::runtime_error(what), exception(exception_code), status(reason) {}
+  int exception;  // Modbus exception code, 0 if the refusal came later
+  core::Status status;
+};
+
+// What was read back is not what was written; the tool exits with 5.
+struct VerifyError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace armcal::client

@@ -1,0 +1,158 @@
+// client - prints registers.hpp and status.hpp; knows no connection.
+#include "host_sim/client/register_text.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "armcal/link/registers.hpp"
+
+namespace armcal::client {
+
+using core::Status;
+using link::Item;
+using link::RegisterKind;
+using link::RegisterType;
+
+namespace {
+
+struct StatusText {
+  const char* name;
+  const char* meaning;
+};
+
+// A switch without default: the compiler names the enumerator that is missing here.
+StatusText TextOf(Status status) {
+  switch (status) {
+    case Status::kOk:
+      return {"Ok", "done"};
+    case Status::kNotFinite:
+      return {"NotFinite", "a number is NaN or infinite"};
+    case Status::kOutOfRange:
+      return {"OutOfRange", "a number lies outside its documented range"};
+    case Status::kWrongSize:
+      return {"WrongSize", "a count or length does not fit"};
+    case Status::kWrongOrder:
+      return {"WrongOrder", "not allowed in the present state of a transaction"};
+    case Status::kWrongSchema:
+      return {"WrongSchema", "made for another model"};
+    case Status::kUnphysical:
+      return {"Unphysical", "a body that no mass distribution can have"};
+    case Status::kAxisEnabled:
+      return {"AxisEnabled", "an axis is enabled"};
+    case Status::kLocked:
+      return {"Locked", "the session is not unlocked"};
+    case Status::kFull:
+      return {"Full", "no room; the new item was refused whole"};
+    case Status::kEmpty:
+      return {"Empty", "nothing there to take"};
+    case Status::kBadCrc:
+      return {"BadCrc", "content and checksum differ"};
+    case Status::kBadAddress:
+      return {"BadAddress", "no such register"};
+    case Status::kBadFunction:
+      return {"BadFunction", "no such function code"};
+    case Status::kReadOnly:
+      return {"ReadOnly", "this register cannot be written"};
+    case Status::kBusy:
+      return {"Busy", "an earlier command is still running"};
+    case Status::kStorageFault:
+      return {"StorageFault", "the storage refused, or returned what was not written"};
+    case Status::kBlank:
+      return {"Blank", "storage holds no record at all"};
+    case Status::kCorrupt:
+      return {"Corrupt", "storage holds a record that fails its checks"};
+    case Status::kTimeout:
+      return {"Timeout", "a partner did not answer in time"};
+    case Status::kGated:
+      return {"Gated", "accepted, but no row of the sample may update an estimate"};
+    case Status::kClamped:
+      return {"Clamped", "a value was cut to its limit"};
+    case Status::kHeld:
+      return {"Held", "the last good value is kept"};
+  }
+  return {nullptr, nullptr};
+}
+
+const char* TypeName(RegisterType type) {
+  return type == RegisterType::kU16 ? "u16" : type == RegisterType::kU32 ? "u32" : "f32";
+}
+
+const char* AccessName(link::Access access) {
+  return access == link::Access::kRead ? "r" : access == link::Access::kWrite ? "rw" : "rw block";
+}
+
+std::vector<Item> Sorted(RegisterKind kind) {
+  std::vector<Item> items;
+  for (const Item& item : link::kItems)
+    if (item.kind == kind) items.push_back(item);
+  std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.address < b.address; });
+  return items;
+}
+
+const char* KindName(RegisterKind kind) { return kind == RegisterKind::kInput ? "input" : "holding"; }
+
+std::string KindMarkdown(RegisterKind kind, int function, int base) {
+  std::string text = fmt::format(
+      "### {} registers (function {})\n\n| dec | hex | number | count | type | access | name | unit | meaning |\n"
+      "|---|---|---|---|---|---|---|---|---|\n",
+      kind == RegisterKind::kInput ? "Input" : "Holding", function, base);
+  for (const Item& i : Sorted(kind))
+    text +=
+        fmt::format("| {} | 0x{:04X} | {} | {} | {} | {} | {} | {} | {} |\n", i.address, i.address,
+                    base + 1 + i.address, i.count, TypeName(i.type), AccessName(i.access), i.name, i.unit, i.meaning);
+  return text;
+}
+
+}  // namespace
+
+std::string StatusName(Status status) {
+  const StatusText text = TextOf(status);
+  if (text.name == nullptr) return fmt::format("status {}", static_cast<int>(status));
+  return fmt::format("{}: {}", text.name, text.meaning);
+}
+
+std::string RegisterMarkdown() {
+  return KindMarkdown(RegisterKind::kInput, 4, 300000) + "\n" + KindMarkdown(RegisterKind::kHolding, 3, 400000);
+}
+
+std::string StatusMarkdown() {
+  std::string text = "| number | name | meaning |\n|---|---|---|\n";
+  for (int number = 0; number < 256; ++number) {
+    const StatusText t = TextOf(static_cast<Status>(number));
+    if (t.name != nullptr) text += fmt::format("| {} | {} | {} |\n", number, t.name, t.meaning);
+  }
+  return text;
+}
+
+std::string RegisterCsv() {
+  std::string text = "kind,address,count,type,access,name,unit\n";
+  for (const RegisterKind kind : {RegisterKind::kInput, RegisterKind::kHolding})
+    for (const Item& i : Sorted(kind))
+      text += fmt::format("{},{},{},{},{},{},{}\n", KindName(kind), i.address, i.count, TypeName(i.type),
+                          AccessName(i.access), i.name, i.unit);
+  return text;
+}
+
+std::string RegisterJson() {
+  nlohmann::ordered_json json;
+  json["map_major"] = link::reg::kMapMajor;
+  json["map_minor"] = link::reg::kMapMinor;
+  json["layout_crc"] = link::kLayoutCrc;
+  json["word_order"] = "big";
+  for (const RegisterKind kind : {RegisterKind::kInput, RegisterKind::kHolding})
+    for (const Item& i : Sorted(kind))
+      json["items"].push_back({{"name", i.name},
+                               {"kind", KindName(kind)},
+                               {"address", i.address},
+                               {"count", i.count},
+                               {"type", TypeName(i.type)},
+                               {"access", AccessName(i.access)},
+                               {"unit", i.unit},
+                               {"meaning", i.meaning}});
+  return json.dump(2) + "\n";
+}
+
+}  // namespace armcal::client

@@ -1,0 +1,30 @@
+// client - brings a parameter table into a drive and proves it is there; knows no meaning of its words.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "host_sim/client/drive_client.hpp"
+
+namespace armcal::client {
+
+struct FlashReport {
+  std::uint32_t crc = 0;             // of the table, as the drive reads it back
+  std::uint32_t generation = 0;      // of the adoption
+  std::uint32_t store_sequence = 0;  // of the stored record
+};
+
+// Called with 0 to 1 while the table is on its way.
+using FlashProgress = std::function<void(double share)>;
+
+// unlock, open, staged words, check, save, wait, read back. `words`: the byte layout of model/parameters.hpp, whose
+// first two words are the schema. Throws RefusedError (the table before it stays in force and stored), VerifyError (the
+// drive says it is active but reads back otherwise), LinkError.
+FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress = {});
+
+// The table in force.
+std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive);
+
+}  // namespace armcal::client

@@ -1,0 +1,61 @@
+// client - arms a drive's trace and takes its pages; knows records and ticks, not channels.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "host_sim/client/drive_client.hpp"
+
+namespace armcal::client {
+
+enum class TraceMode : std::uint16_t { kOff = 0, kOneShot = 1, kStreaming = 2 };
+enum class TraceState : std::uint16_t { kOff = 0, kWaiting = 1, kRecording = 2, kDone = 3 };
+enum class Gaps { kAllow, kRefuse };
+
+struct TraceRequest {
+  TraceMode mode = TraceMode::kStreaming;
+  std::uint16_t decimation = 1;  // samples averaged into one record
+  std::uint32_t start_tick = 0;  // one that has passed starts at once
+  std::uint32_t limit = 0;       // records, 0: until full (one-shot) or switched off (streaming)
+  std::uint32_t channels = 0;    // what the drive's documentation says
+};
+
+// Records one after the other; record i is words[i * record_words ...], its window began at ticks[i].
+struct TraceRecords {
+  std::uint16_t record_words = 0;
+  std::uint32_t tick_step = 0;
+  std::uint32_t channels = 0;
+  std::vector<std::uint32_t> ticks;
+  std::vector<std::uint16_t> generations;  // low word of the table generation, per record
+  std::vector<std::uint16_t> words;
+  std::uint32_t lost = 0;  // refused by the drive since the arm
+  TraceState state = TraceState::kOff;
+
+  std::size_t count() const { return ticks.size(); }
+};
+
+// Trace 0: raw samples, 1: processed samples. Drops what the drive had recorded before.
+void ArmTrace(DriveClient& drive, int trace, const TraceRequest& request);
+
+// Reads the pages of one arm in order.
+class TraceReader {
+ public:
+  TraceReader(DriveClient& drive, int trace, Gaps gaps = Gaps::kAllow);
+
+  // Takes one page, appends it to `records` and releases it on the drive; returns the number of records, 0 if there is
+  // none now. Also refreshes `records.lost` and `.state`. Throws LinkError if the trace was armed anew meanwhile, and,
+  // with Gaps::kRefuse, if ticks are missing between two records.
+  std::size_t TakePage(TraceRecords& records);
+
+  // Takes pages until the recording is done and empty; for one-shot traces and streams with a limit.
+  TraceRecords TakeAll();
+
+ private:
+  DriveClient& drive_;
+  int trace_;
+  Gaps gaps_;
+  std::uint32_t next_ = 0;
+  std::uint16_t arm_ = 0;
+};
+
+}  // namespace armcal::client

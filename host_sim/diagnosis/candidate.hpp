@@ -1,0 +1,56 @@
+// diagnosis - a record tried on given joints: its columns over the logs; knows no score. No kind is known here by name.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "codegen/src/generator/instance.hpp"
+#include "codegen/src/generator/tape.hpp"
+#include "host_sim/calibration/dataset.hpp"
+
+namespace armcal::diagnosis {
+
+// What the columns of a record may read, over one dataset. Model torque is the current estimate's, never the measured
+// one.
+struct Quantities {
+  const calibration::Dataset* data = nullptr;
+  Eigen::MatrixXd tau_rigid, tau_gravity;  // [N x n]
+  std::vector<Eigen::MatrixXd> flange;     // [n] N x 10: rows of the last body's columns
+};
+
+// One candidate: a record on a set of joints. Columns are evaluated for given nonlinear parameters.
+class Candidate {
+ public:
+  Candidate(const codegen::EffectRecord& record, const codegen::Robot& robot, const std::vector<int>& joints);
+
+  const codegen::EffectRecord& record() const { return *instance_.record; }
+  const std::vector<int>& joints() const { return instance_.joints; }
+  const codegen::EffectInstance& instance() const { return instance_; }
+  const std::vector<codegen::EffectUnknown>& unknowns() const { return instance_.unknowns; }
+  std::vector<codegen::EffectUnknown>& unknowns() { return instance_.unknowns; }
+  int columns() const { return static_cast<int>(instance_.columns.size()); }
+  const std::vector<int>& rows() const { return rows_; }  // joints whose torque it touches
+  bool reads(const std::string& input) const;
+  std::string name() const;  // "stribeck, joint 3"
+
+  // value[c][r]: column c in row rows()[r], N values (empty where the column does not touch that row).
+  void Evaluate(const Quantities& quantities, const std::vector<double>& eta,
+                std::vector<std::vector<Eigen::VectorXd>>& value) const;
+
+  std::vector<double> Initial() const;
+
+ private:
+  std::unique_ptr<codegen::Graph> graph_ = std::make_unique<codegen::Graph>();
+  codegen::EffectInstance instance_;
+  std::vector<int> rows_;
+  std::vector<std::pair<int, int>> root_;  // (column, index into rows_)
+  std::unique_ptr<codegen::Tape> tape_;
+};
+
+// Every record of the catalogue on every joint set it may be tried on, except the friction law and what the model
+// already estimates.
+std::vector<std::unique_ptr<Candidate>> MakeCandidates(const codegen::Catalogue& catalogue,
+                                                       const codegen::Model& model);
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,265 @@
+// diagnosis - chooses terms one at a time, re-scores them with the noise fitted anew, cross-validates, prunes, judges.
+#include "host_sim/diagnosis/diagnose.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/diagnosis/work.hpp"
+
+namespace armcal::diagnosis {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kMaxTerms = 4;
+constexpr int kRescored = 14;   // candidates whose likelihood is computed with their own noise model
+constexpr double kAccept = 15;  // score: odds of about e^7 to one after all penalties
+constexpr double kKeepsOutOfFold = 0.35;
+constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
+constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates another
+constexpr double kWorse = 1.005;           // held-out: a joint that gets worse by more than this refutes the term
+
+// Deviance of the candidate's joints without any new column.
+double DevianceWithout(const Metric& metric, const Columns& c, std::vector<NoiseModel>* noise = nullptr) {
+  Columns none;
+  none.joints = c.joints;
+  for (const MatrixXd& block : c.block) none.block.emplace_back(block.rows(), 0);
+  return metric.RefittedDeviance(none, noise);
+}
+
+bool SharesJoint(const Candidate& a, const Candidate& b) {
+  return std::any_of(a.rows().begin(), a.rows().end(),
+                     [&](int j) { return std::find(b.rows().begin(), b.rows().end(), j) != b.rows().end(); });
+}
+
+struct Ranked {
+  Candidate* candidate = nullptr;
+  Found found;
+};
+
+class Selector {
+ public:
+  explicit Selector(Diagnosis::Work& work) : w_(work) {}
+
+  // The best further term given those chosen; false if none is worth it.
+  bool Next(const std::vector<const Chosen*>& terms, Chosen& out) {
+    w_.estimate = w_.Solve(terms);
+    w_.Prepare(terms);
+    const Metric white(w_.rows, w_.WhiteNoise());
+    std::vector<Ranked> ranked;
+    for (const auto& c : w_.candidates) {
+      if (AlreadyIn(*c, terms) || !IsExcited(*c, w_.evidence)) continue;
+      Found f = SearchCandidate(*c, w_.evidence, white);
+      if (f.score > 0) ranked.push_back({c.get(), f});
+    }
+    std::sort(ranked.begin(), ranked.end(),
+              [](const Ranked& a, const Ranked& b) { return a.found.score > b.found.score; });
+    if (ranked.size() > kRescored) ranked.resize(kRescored);
+    for (Ranked& r : ranked) {
+      const Columns c = GatherColumns(*r.candidate, w_.evidence, r.found.eta);
+      r.found.score = Score(r.found, DevianceWithout(white, c) - white.RefittedDeviance(c), w_.evidence);
+    }
+    std::sort(ranked.begin(), ranked.end(), [this](const Ranked& a, const Ranked& b) {
+      // what is compiled in already wins among equals
+      return a.found.score + Preference(a) > b.found.score + Preference(b);
+    });
+    for (std::size_t k = 0; k < ranked.size() && ranked[k].found.score > kAccept; ++k)
+      if (Accept(white, ranked, k, out)) return true;
+    return false;
+  }
+
+  // Searches a chosen term again with the others in; false if it no longer earns its place.
+  bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
+    w_.estimate = w_.Solve(others);
+    w_.Prepare(others);
+    const Metric white(w_.rows, w_.WhiteNoise());
+    Found f = SearchCandidate(*term.candidate, w_.evidence, white);
+    if (f.gain.gain <= 0) return false;
+    const Columns c = GatherColumns(*term.candidate, w_.evidence, f.eta);
+    f.score = Score(f, DevianceWithout(white, c) - white.RefittedDeviance(c), w_.evidence);
+    term.eta = f.eta;
+    term.found = f;
+    return f.score > kAccept;
+  }
+
+ private:
+  double Preference(const Ranked& r) const {
+    const auto& names = w_.standby;
+    return std::find(names.begin(), names.end(), r.candidate->record().name) != names.end() ? 1e-3 : 0;
+  }
+  // A chosen term, or one that is known to look like a chosen one on the same joints: the two together would only fit
+  // noise, and apart from the training log's states they would fail.
+  bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const {
+    return std::any_of(terms.begin(), terms.end(), [&](const Chosen* t) {
+      const auto& like = t->candidate->record().confusable_with;
+      const bool confusable = std::find(like.begin(), like.end(), c.record().name) != like.end();
+      return t->candidate == &c || (confusable && t->candidate->joints() == c.joints());
+    });
+  }
+  bool Accept(const Metric& white, const std::vector<Ranked>& ranked, std::size_t k, Chosen& out) {
+    const Ranked& r = ranked[k];
+    const Columns c = GatherColumns(*r.candidate, w_.evidence, r.found.eta);
+    std::vector<NoiseModel> noise;
+    white.RefittedDeviance(c, &noise);
+    const Metric metric(w_.rows, noise);
+    const Gain gain = metric.Try(c);
+    const VectorXd folds = metric.CrossValidate(c, kBlocks, kFolds);
+    if (folds.sum() < kKeepsOutOfFold * gain.gain || (folds.array() > 0).count() < kFoldsThatImprove) return false;
+    out = Chosen{};
+    out.candidate = r.candidate;
+    out.eta = r.found.eta;
+    out.found = r.found;
+    out.folds = folds;
+    for (std::size_t other = 0; other < ranked.size(); ++other) {
+      if (other == k) continue;
+      const Candidate& o = *ranked[other].candidate;
+      if (out.runner_up.empty()) out.runner_up = o.name(), out.runner_up_score = ranked[other].found.score;
+      if (!SharesJoint(o, *r.candidate) || o.record().name == r.candidate->record().name) continue;
+      const auto [taken, own] =
+          metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].found.eta), c, gain.amplitude);
+      const double left = own - taken;
+      const bool same = left < kIndistinguishable && left < 0.1 * own;
+      const bool near = ranked[other].found.score > 0.95 * r.found.score;
+      if ((same || near) && out.also_fits.size() < 2) out.also_fits.push_back(o.record().name);
+    }
+    return true;
+  }
+
+  Diagnosis::Work& w_;
+};
+
+std::vector<const Chosen*> Pointers(const std::vector<Chosen>& chosen, const Chosen* without = nullptr) {
+  std::vector<const Chosen*> out;
+  for (const Chosen& c : chosen)
+    if (&c != without && c.confirmed) out.push_back(&c);
+  return out;
+}
+
+void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
+  finding.terms.clear();
+  std::size_t k = 0;
+  for (const Chosen& c : w.chosen) {
+    Term t;
+    t.record = &c.candidate->record();
+    t.joints = c.candidate->joints();
+    t.columns = c.candidate->instance().columns;
+    t.unknowns = c.candidate->unknowns();
+    t.eta = c.eta;
+    t.score = c.found.score, t.gain = c.found.gain.gain;
+    t.folds = c.folds, t.also_fits = c.also_fits;
+    t.runner_up = c.runner_up, t.runner_up_score = c.runner_up_score;
+    t.confirmed = c.confirmed;
+    t.amplitude = VectorXd::Zero(c.candidate->columns()), t.sd = t.amplitude;
+    if (c.confirmed) t.amplitude = w.estimate.amplitude[k], t.sd = w.estimate.sd[k], ++k;
+    finding.terms.push_back(std::move(t));
+  }
+  finding.x = w.estimate.x;
+  finding.sigma = w.estimate.sigma;
+  finding.innovation = w.estimate.innovation;
+}
+
+// One-step-ahead tracking of a run-state term's amplitudes on a log where they are not known: a Kalman filter whose
+// amplitudes wander as far in the length of the training log as the term was large there.
+MatrixXd Track(const Chosen& term, const VectorXd& amplitude, const Quantities& q, const MatrixXd& residual,
+               const VectorXd& sigma, double train_s) {
+  const auto& s = q.data->s;
+  std::vector<double> open(term.eta.size());
+  for (std::size_t k = 0; k < open.size(); ++k) open[k] = k == 0 ? s.t[0] - 1 : s.t[s.samples() - 1] + 1;
+  std::vector<std::vector<VectorXd>> value;
+  term.candidate->Evaluate(q, open, value);
+  const int k = term.candidate->columns();
+  VectorXd a = VectorXd::Zero(k);
+  MatrixXd P = amplitude.cwiseAbs2().asDiagonal();
+  MatrixXd predicted = MatrixXd::Zero(residual.rows(), residual.cols());
+  for (int i = 0; i < s.samples(); ++i) {
+    if (i > 0) P.diagonal() += amplitude.cwiseAbs2() * ((s.t[i] - s.t[i - 1]) / train_s);
+    const VectorXd before = a;
+    for (std::size_t r = 0; r < term.candidate->rows().size(); ++r) {
+      const int j = term.candidate->rows()[r];
+      VectorXd h(k);
+      for (int c = 0; c < k; ++c) h[c] = value[c][r].size() ? value[c][r][i] : 0;
+      predicted(i, j) = h.dot(before);
+      if (!q.data->used(i, j)) continue;
+      const VectorXd Ph = P * h;
+      const double variance = h.dot(Ph) + sigma[j] * sigma[j];
+      a += Ph * ((residual(i, j) - h.dot(a)) / variance);
+      P -= Ph * Ph.transpose() / variance;
+    }
+  }
+  return predicted;
+}
+
+}  // namespace
+
+Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
+                     std::vector<const calibration::Dataset*> train)
+    : model_(model), work_(std::make_unique<Work>(model, catalogue, std::move(train))) {
+  Work& w = *work_;
+  Selector select(w);
+  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Pointers(w.chosen), next);)
+    w.chosen.push_back(next);
+  for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
+    if (select.StillEarns(w.chosen[k], Pointers(w.chosen, &w.chosen[k]))) ++k;
+    else w.chosen.erase(w.chosen.begin() + static_cast<long>(k));
+  }
+  std::sort(w.chosen.begin(), w.chosen.end(),
+            [](const Chosen& a, const Chosen& b) { return a.found.score > b.found.score; });
+  w.estimate = w.Solve(Pointers(w.chosen));
+  finding_.declared = w.declared;
+  WriteTerms(w, finding_);
+  finding_.smallest.resize(model.joints());
+  for (int j = 0; j < model.joints(); ++j) {
+    const double rows = std::max(2, w.evidence.index[j].size());
+    finding_.smallest[j] = finding_.sigma[j] * std::sqrt((kAccept + 2 * std::log(rows) + 2 * std::log(10.0)) / rows);
+  }
+}
+
+Diagnosis::~Diagnosis() = default;
+
+HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
+  Work& w = *work_;
+  HeldOut out;
+  out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
+  const VectorXd before = calibration::Rms(test, out.before, true);
+  for (;;) {
+    w.estimate = w.Solve(Pointers(w.chosen));
+    const Quantities q = MakeQuantities(model_, test, w.estimate.x, w.declared.eta, w.needs_flange);
+    out.after = test.tau - calibration::Predict(model_, test, w.estimate.x, w.declared.eta);
+    std::size_t k = 0;
+    for (const Chosen& c : w.chosen) {
+      if (!c.confirmed) continue;
+      const VectorXd& amplitude = w.estimate.amplitude[k++];
+      if (c.candidate->record().kind_class == "run_state") {
+        const auto& t = w.train[0]->s.t;
+        out.after -= Track(c, amplitude, q, out.after, w.estimate.sigma, t[t.size() - 1] - t[0]);
+        out.tracking = "run states followed one step ahead; delay one sample";
+      } else {
+        out.after -= CandidateTorque(*c.candidate, q, c.eta, amplitude);
+      }
+    }
+    const VectorXd after = calibration::Rms(test, out.after, true);
+    Chosen* refuted = nullptr;
+    for (Chosen& c : w.chosen)
+      for (const int j : c.candidate->rows())
+        if (c.confirmed && after[j] > kWorse * before[j]) refuted = &c;  // the weakest one: they are sorted
+    if (!refuted) break;
+    refuted->confirmed = false;
+  }
+  WriteTerms(w, finding_);
+  return out;
+}
+
+std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
+  const Work& w = *work_;
+  const Quantities q = MakeQuantities(model_, data, w.estimate.x, w.declared.eta, w.needs_flange);
+  std::vector<MatrixXd> out;
+  std::size_t k = 0;
+  for (const Chosen& c : w.chosen)
+    out.push_back(c.confirmed ? CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[k++])
+                              : MatrixXd::Zero(data.samples(), data.joints()));
+  return out;
+}
+
+}  // namespace armcal::diagnosis

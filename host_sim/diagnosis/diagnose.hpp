@@ -1,0 +1,67 @@
+// diagnosis - residual -> named cause -> terms to add, decided on the training logs alone; and their error on a
+// held-out log.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host_sim/calibration/weighted_fit.hpp"
+#include "host_sim/diagnosis/search.hpp"
+
+namespace armcal::diagnosis {
+
+struct Term {
+  const codegen::EffectRecord* record = nullptr;
+  std::vector<int> joints;                     // 0-based; empty: the whole arm or its flange
+  std::vector<codegen::EffectColumn> columns;  // names and units
+  std::vector<codegen::EffectUnknown> unknowns;
+  Eigen::VectorXd amplitude, sd;  // of the columns
+  std::vector<double> eta;
+  double score = 0, gain = 0;
+  Eigen::VectorXd folds;               // improvement of chi^2 out of fold
+  std::vector<std::string> also_fits;  // kinds that this log cannot tell from it
+  std::string runner_up;
+  double runner_up_score = 0;
+  bool confirmed = true;  // false: the held-out log did not bear it out
+};
+
+struct Finding {
+  std::vector<Term> terms;            // strongest first; empty: nothing is missing
+  calibration::Fit declared;          // the declared model, fitted on train
+  Eigen::VectorXd x;                  // filter coordinates and gains with the terms in
+  Eigen::VectorXd sigma, innovation;  // [n] residual and innovation standard deviation with the terms in
+  Eigen::VectorXd smallest;           // [n] RMS of the smallest effect that would have been seen
+  std::vector<std::string> notes;
+};
+
+struct HeldOut {
+  Eigen::MatrixXd before, after;  // [N x n] residuals: measured minus predicted
+  std::string tracking;           // how run-state terms were followed; empty if there are none
+};
+
+// Decides on the training logs at construction; the held-out log is only judged. Throws io::InputError where logs do
+// not fit.
+class Diagnosis {
+ public:
+  struct Work;  // work.hpp; the room's own
+  Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
+            std::vector<const calibration::Dataset*> train);
+  ~Diagnosis();
+
+  const Finding& finding() const { return finding_; }
+
+  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint by more than 0.5 % as not
+  // confirmed and leaves them out of `after`; kinds and parameters do not change.
+  HeldOut Judge(const calibration::Dataset& test);
+
+  // One N x n torque a term on a log (run-state terms: as windows of that log's own time would give).
+  std::vector<Eigen::MatrixXd> TermTorque(const calibration::Dataset& data) const;
+
+ private:
+  const codegen::Model& model_;
+  Finding finding_;
+  std::unique_ptr<Work> work_;
+};
+
+}  // namespace armcal::diagnosis

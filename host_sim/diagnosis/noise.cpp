@@ -1,0 +1,75 @@
+// diagnosis - Yule-Walker estimation and whitening across broken stretches of a log.
+#include "host_sim/diagnosis/noise.hpp"
+
+#include <cmath>
+
+namespace armcal::diagnosis {
+
+using Eigen::VectorXd;
+
+namespace {
+
+// position of each row in its segment
+std::vector<int> PlaceInSegment(const RowIndex& rows) {
+  std::vector<int> place(rows.size());
+  for (int k = 0; k < rows.size(); ++k) place[k] = rows.segment_begin[k] ? 0 : place[k - 1] + 1;
+  return place;
+}
+
+bool IsWhite(const NoiseModel& noise) { return noise.a.squaredNorm() == 0; }
+
+}  // namespace
+
+NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
+  NoiseModel noise;
+  const std::vector<int> place = PlaceInSegment(rows);
+  VectorXd r = VectorXd::Zero(kArOrder + 1);
+  Eigen::VectorXi count = Eigen::VectorXi::Zero(kArOrder + 1);
+  for (int k = 0; k < rows.size(); ++k)
+    for (int lag = 0; lag <= std::min(kArOrder, place[k]); ++lag) r[lag] += e[k] * e[k - lag], ++count[lag];
+  if (count[0] == 0) return noise;
+  const double variance = r[0] / count[0];
+  noise.innovation = std::sqrt(std::max(variance, 1e-24));
+  if (count[kArOrder] < 20 * kArOrder) return noise;  // too few pairs to learn a colour from
+  for (int lag = 0; lag <= kArOrder; ++lag) r[lag] = r[lag] / count[lag];
+  VectorXd a = VectorXd::Zero(kArOrder);  // Levinson-Durbin: stays stable where a plain solve may not
+  double power = r[0];
+  for (int m = 0; m < kArOrder; ++m) {
+    double reflection = r[m + 1];
+    for (int i = 0; i < m; ++i) reflection -= a[i] * r[m - i];
+    reflection = std::clamp(reflection / power, -0.98, 0.98);
+    const VectorXd before = a;
+    a[m] = reflection;
+    for (int i = 0; i < m; ++i) a[i] = before[i] - reflection * before[m - 1 - i];
+    power *= 1 - reflection * reflection;
+  }
+  noise.a = a;
+  noise.innovation = std::sqrt(std::max(power, 1e-24));
+  return noise;
+}
+
+VectorXd Whiten(const NoiseModel& noise, const RowIndex& rows, const Eigen::Ref<const VectorXd>& v) {
+  if (IsWhite(noise)) return v / noise.innovation;
+  VectorXd out(v.size());
+  int place = 0;
+  for (int k = 0; k < rows.size(); ++k) {
+    place = rows.segment_begin[k] ? 0 : place + 1;
+    if (place < kArOrder) {
+      out[k] = 0;
+      continue;
+    }
+    double sum = v[k];
+    for (int i = 0; i < kArOrder; ++i) sum -= noise.a[i] * v[k - 1 - i];
+    out[k] = sum / noise.innovation;
+  }
+  return out;
+}
+
+int WhitenedRows(const NoiseModel& noise, const RowIndex& rows) {
+  if (IsWhite(noise)) return rows.size();
+  int count = 0;
+  for (const int place : PlaceInSegment(rows)) count += place >= kArOrder;
+  return count;
+}
+
+}  // namespace armcal::diagnosis

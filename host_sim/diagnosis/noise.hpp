@@ -1,0 +1,34 @@
+// diagnosis - the noise of one joint as an autoregressive process; knows no model.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace armcal::diagnosis {
+
+// Rows of one joint that may be used, in time order. segment_begin[k] = 1 where row k does not follow row k-1 in the
+// log.
+struct RowIndex {
+  std::vector<int> dataset, sample;
+  std::vector<char> segment_begin;
+  int size() const { return static_cast<int>(sample.size()); }
+};
+
+inline constexpr int kArOrder = 8;  // design study: eight terms cover gear and current-loop colour at 100-1000 Hz
+
+struct NoiseModel {
+  Eigen::VectorXd a = Eigen::VectorXd::Zero(kArOrder);  // e_k = sum a_i e_{k-i} + innovation
+  double innovation = 1;                                // its standard deviation
+};
+
+// Yule-Walker over segments; white if the rows are too few or too broken up.
+NoiseModel FitNoise(const RowIndex& rows, const Eigen::VectorXd& residual);
+
+// out_k = (v_k - sum a_i v_{k-i}) / innovation; zero for the first kArOrder rows of a segment unless the model is
+// white.
+Eigen::VectorXd Whiten(const NoiseModel& noise, const RowIndex& rows, const Eigen::Ref<const Eigen::VectorXd>& v);
+
+// How many rows Whiten keeps.
+int WhitenedRows(const NoiseModel& noise, const RowIndex& rows);
+
+}  // namespace armcal::diagnosis

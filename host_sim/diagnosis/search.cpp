@@ -1,0 +1,241 @@
+// diagnosis - profile, spectral, spline and onset searches; each maximises the same gain.
+#include "host_sim/diagnosis/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <functional>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
+
+namespace armcal::diagnosis {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, const std::vector<double>& eta) {
+  Columns out;
+  out.joints = candidate.rows();
+  for (const int j : out.joints) out.block.emplace_back(MatrixXd::Zero(evidence.index[j].size(), candidate.columns()));
+  std::vector<std::vector<VectorXd>> value;
+  for (std::size_t log = 0; log < evidence.logs.size(); ++log) {
+    candidate.Evaluate(evidence.logs[log], eta, value);
+    for (std::size_t r = 0; r < out.joints.size(); ++r) {
+      const RowIndex& index = evidence.index[out.joints[r]];
+      for (int c = 0; c < candidate.columns(); ++c) {
+        const VectorXd& v = value[c][r];
+        if (v.size() == 0) continue;
+        for (int k = 0; k < index.size(); ++k)
+          if (index.dataset[k] == static_cast<int>(log)) out.block[r](k, c) = v[index.sample[k]];
+      }
+    }
+  }
+  return out;
+}
+
+namespace {
+
+// A signal of the candidate's own joint over its used rows.
+VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, const std::string& name) {
+  const int j = candidate.joints().empty() ? candidate.rows()[0] : candidate.joints()[0];
+  const RowIndex& index = evidence.index[j];
+  VectorXd out(index.size());
+  for (int k = 0; k < index.size(); ++k) {
+    const Quantities& log = evidence.logs[index.dataset[k]];
+    const auto& s = log.data->s;
+    const int at = index.sample[k];
+    out[k] = name == "q"      ? s.q(at, j)
+             : name == "qd"   ? s.qd(at, j)
+             : name == "temp" ? (s.temp.cols() > j ? s.temp(at, j) : 0)
+                              : log.tau_rigid(at, j);
+  }
+  return out;
+}
+
+bool InBounds(const Candidate& candidate, const Gain& gain) {
+  for (int c = 0; c < candidate.columns(); ++c) {
+    const auto& column = candidate.instance().columns[c];
+    const double slack = 2 * gain.sd[c];  // a bound may be touched within the estimate's own uncertainty
+    if (gain.amplitude[c] < column.lower - slack || gain.amplitude[c] > column.upper + slack) return false;
+  }
+  return true;
+}
+
+class Searcher {
+ public:
+  Searcher(Candidate& candidate, const Evidence& evidence, const Metric& metric)
+      : c_(candidate), e_(evidence), m_(metric) {
+    best_.candidate = &candidate;
+    best_.eta = candidate.Initial();
+    best_.parameters = candidate.columns() + static_cast<int>(candidate.unknowns().size());
+  }
+
+  Found Run() {
+    const std::string& how = c_.record().search.how;
+    if (how == "spectral") Spectral();
+    else if (how == "spline") Spline();
+    else if (how == "onset") Onset();
+    else if (c_.unknowns().empty()) Consider(best_.eta);
+    else Profile();
+    best_.parameters = best_.gain.rank + searched_;
+    best_.score = Score(best_, best_.gain.gain, e_);
+    return best_;
+  }
+
+ private:
+  double Consider(const std::vector<double>& eta) {
+    const Gain g = m_.Try(GatherColumns(c_, e_, eta));
+    const double value = InBounds(c_, g) ? g.gain : 0;
+    if (value > best_.gain.gain) best_.gain = g, best_.eta = eta;
+    return value;
+  }
+  double FromUnit(int k, double u) const {
+    const auto& p = c_.unknowns()[k];
+    return p.logarithmic ? p.lower * std::pow(p.upper / p.lower, u) : p.lower + u * (p.upper - p.lower);
+  }
+  double ToUnit(int k, double v) const {
+    const auto& p = c_.unknowns()[k];
+    return p.logarithmic ? std::log(v / p.lower) / std::log(p.upper / p.lower) : (v - p.lower) / (p.upper - p.lower);
+  }
+  // Pattern search in unit coordinates around the best so far; halves its steps.
+  void Refine(double step, int rounds) {
+    for (int round = 0; round < rounds; ++round, step /= 2)
+      for (std::size_t k = 0; k < best_.eta.size(); ++k)
+        for (const double sign : {-1.0, 1.0}) {
+          std::vector<double> eta = best_.eta;
+          const double u = ToUnit(static_cast<int>(k), eta[k]) + sign * step;
+          if (u < 0 || u > 1) continue;
+          eta[k] = FromUnit(static_cast<int>(k), u);
+          Consider(eta);
+        }
+  }
+  void Profile() {
+    const int count = static_cast<int>(c_.unknowns().size());
+    std::vector<int> points(count, 4);
+    points[0] = c_.record().search.grid;
+    searched_ = count;
+    best_.tried = 1;
+    for (const int p : points) best_.tried *= p;
+    std::vector<double> eta(count);
+    const std::function<void(int)> visit = [&](int k) {
+      if (k == count) return void(Consider(eta));
+      for (int i = 0; i < points[k]; ++i) {
+        eta[k] = FromUnit(k, points[k] > 1 ? static_cast<double>(i) / (points[k] - 1) : 0.5);
+        visit(k + 1);
+      }
+    };
+    visit(0);
+    Refine(0.5 / (points[0] - 1), 5);
+  }
+  // The record's first column at frequency zero is what multiplies the harmonic; one FFT of residual x that over the
+  // signal scans all frequencies.
+  void Spectral() {
+    const VectorXd signal = OwnSignal(c_, e_, c_.record().search.signal);
+    const double lo = signal.minCoeff(), range = signal.maxCoeff() - lo;
+    searched_ = 1;
+    if (range <= 0) return;
+    const auto& k = c_.unknowns()[0];
+    const Columns at_zero = GatherColumns(c_, e_, {1e-9});
+    const VectorXd residual = m_.RawResidual(at_zero.joints[0]);
+    int size = 256;
+    while (size < 8 * k.upper * range / (2 * std::numbers::pi)) size *= 2;  // four cells a period at the upper end
+    constexpr int kPadding = 4;
+    std::vector<double> grid(static_cast<std::size_t>(size) * kPadding, 0.0);
+    for (int i = 0; i < signal.size(); ++i)
+      grid[std::min(size - 1, static_cast<int>((signal[i] - lo) / range * size))] +=
+          residual[i] * at_zero.block[0](i, 0);
+    Eigen::FFT<double> fft;
+    std::vector<std::complex<double>> spectrum;
+    fft.fwd(spectrum, grid);
+    const double step = 2 * std::numbers::pi / (range * kPadding);  // 1/rad per bin
+    // Below two periods over the range a harmonic is a polynomial: other records' business.
+    const double lowest = std::max(k.lower, 2 * 2 * std::numbers::pi / range);
+    std::vector<std::pair<double, int>> peaks;
+    const int bins = static_cast<int>(spectrum.size()) / 2;
+    for (int b = 1; b + 1 < bins; ++b) {
+      if (b * step < lowest || b * step > k.upper) continue;
+      const double p = std::norm(spectrum[b]);
+      if (p >= std::norm(spectrum[b - 1]) && p > std::norm(spectrum[b + 1])) peaks.emplace_back(p, b);
+    }
+    best_.tried = std::max(1, static_cast<int>((k.upper - lowest) * range / (2 * std::numbers::pi)));
+    std::sort(peaks.rbegin(), peaks.rend());
+    if (peaks.size() > static_cast<std::size_t>(c_.record().search.grid)) peaks.resize(c_.record().search.grid);
+    for (const auto& [power, b] : peaks) {
+      double centre = b * step, width = step, value = Consider({centre});
+      for (int round = 0; round < 6; ++round, width /= 2)
+        for (const double sign : {-1.0, 1.0}) {
+          const double next = Consider({centre + sign * width});
+          if (next > value) value = next, centre += sign * width;
+        }
+    }
+  }
+  // Knots over the range that was seen; clamped outside, so that the term cannot extrapolate.
+  void Spline() {
+    const VectorXd signal = OwnSignal(c_, e_, c_.record().search.signal);
+    if (signal.size() == 0 || signal.maxCoeff() - signal.minCoeff() <= 0) return;
+    Consider({signal.minCoeff(), signal.maxCoeff()});
+  }
+  // Windows [on, off] on a grid of the log's time, not shorter than the record's minimum; then refined.
+  void Onset() {
+    const auto& t = e_.logs[0].data->s.t;
+    const double begin = t[0], end = t[t.size() - 1], minimum = c_.record().search.minimum_s;
+    if (e_.logs.size() != 1 || end - begin < 2 * minimum) return;  // times of several logs have no common origin
+    for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
+    constexpr int kGrid = 12;
+    searched_ = 2;
+    best_.tried = kGrid * kGrid / 2;
+    for (int i = 0; i <= kGrid; ++i)
+      for (int k = i + 1; k <= kGrid + 1; ++k) {
+        const double on = begin - 1 + (end - begin + 1) * i / kGrid,
+                     off = k > kGrid ? end + 1 : begin + (end - begin) * k / kGrid;
+        if (off - on < minimum || (i == 0 && k > kGrid)) continue;  // on all the time is no step
+        Consider({on, off});
+      }
+    if (best_.gain.gain > 0) Refine(0.5 / kGrid, 6);
+    if (best_.eta[1] - best_.eta[0] < minimum) best_.gain = Gain{};
+  }
+
+  Candidate& c_;
+  const Evidence& e_;
+  const Metric& m_;
+  Found best_;
+  int searched_ = 0;
+};
+
+}  // namespace
+
+bool IsExcited(const Candidate& candidate, const Evidence& evidence) {
+  const int j = candidate.joints().empty() ? candidate.rows().back() : candidate.joints()[0];
+  const auto& joint = evidence.model->robot().joint[j];
+  const int rows = evidence.index[j].size();
+  if (rows < 200) return false;
+  for (const std::string& need : candidate.record().needs) {
+    if (need == "low_speed" || need == "high_speed") {
+      const VectorXd v = OwnSignal(candidate, evidence, "qd").cwiseAbs();
+      const double fastest = v.maxCoeff();
+      if (need == "high_speed" && fastest < 0.1 * joint.speed_limit_radps) return false;
+      if (need == "low_speed" && ((v.array() < 0.1 * fastest).count() < 30 || fastest < 5 * joint.v_min_radps))
+        return false;
+    } else if (need == "temp_span") {
+      const VectorXd temp = OwnSignal(candidate, evidence, "temp");
+      if (temp.maxCoeff() - temp.minCoeff() < 2) return false;
+    } else if (need == "load_span") {
+      const VectorXd load = OwnSignal(candidate, evidence, "tau_rigid").cwiseAbs();
+      if (load.maxCoeff() - load.minCoeff() < 2 * joint.torque_noise_Nm) return false;
+    }
+  }
+  return true;
+}
+
+double Score(const Found& found, double gain, const Evidence& evidence) {
+  int rows = 0;
+  for (const int j : found.candidate->rows()) rows += evidence.index[j].size();
+  return gain - found.parameters * std::log(std::max(2, rows)) - 2 * std::log(found.tried) -
+         found.candidate->record().generic_penalty;
+}
+
+Found SearchCandidate(Candidate& candidate, const Evidence& evidence, const Metric& metric) {
+  return Searcher(candidate, evidence, metric).Run();
+}
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,57 @@
+// diagnosis - the state of one diagnosis: logs, current terms, rows of the base model; used by diagnose.cpp only.
+#pragma once
+
+#include "host_sim/diagnosis/diagnose.hpp"
+
+namespace armcal::diagnosis {
+
+// A candidate that has been added, with its parameters.
+struct Chosen {
+  Candidate* candidate = nullptr;
+  std::vector<double> eta;
+  Found found;
+  Eigen::VectorXd folds;
+  std::vector<std::string> also_fits;
+  std::string runner_up;
+  double runner_up_score = 0;
+  bool confirmed = true;
+};
+
+struct Diagnosis::Work {
+  Work(const codegen::Model& model, const codegen::Catalogue& catalogue,
+       std::vector<const calibration::Dataset*> train);
+
+  // x, amplitudes, sigma and model torque for the given terms (white metric, the same method with and without terms).
+  struct Estimate {
+    Eigen::VectorXd x;                           // filter columns and gains
+    std::vector<Eigen::VectorXd> amplitude, sd;  // per term
+    Eigen::VectorXd sigma, innovation;
+  };
+  Estimate Solve(const std::vector<const Chosen*>& terms);
+
+  // Refreshes model torque and base rows at the estimate, the given terms' columns included.
+  void Prepare(const std::vector<const Chosen*>& terms);
+  std::vector<NoiseModel> WhiteNoise() const;
+
+  const codegen::Model& model;
+  std::vector<const calibration::Dataset*> train;
+  calibration::Prior prior;
+  calibration::Fit declared;
+  std::vector<std::unique_ptr<Candidate>> candidates;
+  Evidence evidence;
+  BaseRows rows;
+  Estimate estimate;
+  std::vector<Chosen> chosen;
+  std::vector<std::string> standby;  // records compiled in, not yet estimated
+  bool needs_flange = false;
+};
+
+// Model torque and body columns of one dataset at x.
+Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, const Eigen::VectorXd& x,
+                          const std::vector<double>& eta, bool flange);
+
+// Torque of a candidate with given parameters on a dataset, N x n.
+Eigen::MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities,
+                                const std::vector<double>& eta, const Eigen::VectorXd& amplitude);
+
+}  // namespace armcal::diagnosis

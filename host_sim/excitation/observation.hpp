@@ -1,0 +1,51 @@
+// excitation - how well a motion shows a model's parameters, equation (26), and its torque; knows no trajectory family.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "codegen/src/generator/model.hpp"
+
+namespace armcal::excitation {
+
+// One convention for the condition number of K: columns are the filter coordinates that are estimated (rigid base,
+// Coulomb, viscous, effects), rows are divided by their joint's torque noise, columns are scaled to unit norm.
+class Observation {
+ public:
+  enum class Rotors { kAsked, kLeftOut };
+
+  // Left out are columns whose state is not `estimated`, and effects that motion alone does not excite: those that look
+  // at temperature, time or a flag, and states of the run. Rotors::kLeftOut: without the rotor inertias, as in the
+  // survey. The model must outlive the observation.
+  explicit Observation(const codegen::Model& model, Rotors rotors = Rotors::kAsked);
+
+  const codegen::Model& model() const { return model_; }
+  const std::vector<int>& columns() const { return column_; }             // filter columns asked for
+  const std::vector<std::string>& left_out() const { return left_out_; }  // names of estimated columns not asked for
+  const Eigen::VectorXd& mean() const { return mean_; }                   // [model columns] the file's values
+  double weight(int joint) const;                                         // 1 / noise^2
+
+  // row[i]: [samples x model columns], at the robot file's values where a column depends on them. Reuses row's memory.
+  void Rows(const codegen::Signals& s, std::vector<Eigen::MatrixXd>& row) const;
+
+  // The file's torque, [samples x joints]. Only joints whose bodies are known: see Model::robot().has_prior.
+  Eigen::MatrixXd Torque(const codegen::Signals& s) const;
+
+  // sum_i K_i' K_i / noise_i^2 over the columns asked for, of the first `samples` rows.
+  Eigen::MatrixXd Gram(const std::vector<Eigen::MatrixXd>& row, Eigen::Index samples) const;
+
+  // cond(K); infinite if a column is zero or K is singular to working precision. Long motions are taken piece by piece.
+  double ConditionNumber(const codegen::Signals& s) const;
+
+ private:
+  const codegen::Model& model_;
+  std::vector<int> column_;
+  std::vector<std::string> left_out_;
+  Eigen::VectorXd mean_;
+};
+
+// G with its diagonal scaled to one: the Gram matrix of unit columns.
+Eigen::MatrixXd Equilibrated(const Eigen::MatrixXd& gram);
+
+}  // namespace armcal::excitation

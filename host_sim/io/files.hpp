@@ -1,0 +1,24 @@
+// io - whole files: read (plain or gzip), write atomically, hash; knows no format.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace armcal::io {
+
+// The whole content; gzip is recognised by its content, not by the name. InputError: cannot be opened, or is cut short.
+std::string ReadWholeFile(const std::filesystem::path& path);
+
+// Writes beside the target and renames, so that a reader sees the old file or the new one, never a part.
+// A name that ends in ".gz" is compressed (byte-reproducible: no time stamp). Missing parent folders are made.
+// InputError: cannot be written.
+void AtomicWrite(const std::filesystem::path& path, std::string_view text);
+
+// SHA-256 of the file's bytes as they lie on disk, 64 hex digits. InputError: cannot be opened.
+std::string FileHash(const std::filesystem::path& path);
+
+// SHA-256 of a text, 64 hex digits (FIPS 180-4).
+std::string Sha256(std::string_view text);
+
+}  // namespace armcal::io

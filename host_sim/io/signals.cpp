@@ -1,0 +1,155 @@
+// io - the derivation of speed and acceleration; knows no model.
+#include "host_sim/io/signals.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "host_sim/io/butterworth.hpp"
+#include "host_sim/io/input_error.hpp"
+#include "host_sim/io/quintic_spline.hpp"
+
+namespace armcal::io {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kLowest_Hz = 20;        // an arm's motion lies below
+constexpr double kHighest_Hz = 60;       // above, the current loop no longer follows
+constexpr double kHighestOfRate = 0.4;   // the filter needs room below half the rate
+constexpr double kShareOfJitter = 0.07;  // encoder noise adds 0.25 % to the torque's noise power at this share
+constexpr double kWideGap = 5;           // sample times over which a spline may still bridge
+constexpr double kIrregular = 1e-4;      // time jitter over sample time below which a grid counts as uniform
+constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
+
+VectorXd Difference(const VectorXd& x) { return x.tail(x.size() - 1) - x.head(x.size() - 1); }
+
+double Median(std::vector<double> x) {
+  if (x.empty()) return 0;
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  std::nth_element(x.begin(), middle, x.end());
+  return *middle;
+}
+
+// Standard deviation of white noise under a smooth signal, from its difference of some order: robust against the few
+// samples where the signal itself jumps. Samples at rest (no difference at all) say nothing and are left out.
+double NoiseUnderSmooth(VectorXd x, int order) {
+  double power = 1;  // sum of squared binomials: what white noise of variance 1 becomes
+  for (int k = 1; k <= order; ++k) {
+    if (x.size() < 2) return 0;
+    x = Difference(x);
+    power *= (4.0 * k - 2) / k;
+  }
+  std::vector<double> size;
+  for (const double value : x) {
+    if (value != 0) size.push_back(std::abs(value));
+  }
+  return Median(std::move(size)) / kNormalMad / std::sqrt(power);
+}
+
+// The smallest change of q that the log shows: the encoder step, when there is one to see.
+double SmallestStep(const VectorXd& q) {
+  double smallest = INFINITY;
+  for (const double change : Difference(q)) {
+    if (change != 0) smallest = std::min(smallest, std::abs(change));
+  }
+  return std::isfinite(smallest) ? smallest : 0;
+}
+
+struct Piece {
+  Index first, count;
+};
+
+// The log cut at wide gaps.
+std::vector<Piece> Pieces(const Log& log) {
+  std::vector<Piece> pieces;
+  const double widest_s = kWideGap * log.step_s();
+  Index first = 0;
+  for (const int gap : log.gaps) {
+    if (log.t[gap + 1] - log.t[gap] <= widest_s) continue;
+    pieces.push_back({first, gap + 1 - first});
+    first = gap + 1;
+  }
+  pieces.push_back({first, log.samples() - first});
+  return pieces;
+}
+
+VectorXd EvenGrid(const VectorXd& t) { return VectorXd::LinSpaced(t.size(), t[0], t[t.size() - 1]); }
+
+bool IsUniform(const VectorXd& t) {
+  const double step = (t[t.size() - 1] - t[0]) / static_cast<double>(t.size() - 1);
+  return (t - EvenGrid(t)).cwiseAbs().maxCoeff() < kIrregular * step;
+}
+
+// q as it would have been sampled evenly; a time that jitters would otherwise look like noise of q.
+Eigen::MatrixXd OnEvenGrid(const VectorXd& t, const Eigen::MatrixXd& q) {
+  if (t.size() < QuinticSpline::kMinSamples || IsUniform(t)) return q;
+  return QuinticSpline(t, q).Evaluate(EvenGrid(t), 0);
+}
+
+void DerivePiece(const VectorXd& t, const Eigen::MatrixXd& q, const Piece& piece, Derivatives& out) {
+  const Index count = t.size();
+  const double rate_Hz = static_cast<double>(count - 1) / (t[count - 1] - t[0]);
+  Eigen::MatrixXd smooth = OnEvenGrid(t, q);
+  for (Index j = 0; j < q.cols(); ++j) smooth.col(j) = ZeroPhaseLowPass(smooth.col(j), out.cutoff_Hz[j], rate_Hz);
+  const QuinticSpline spline(EvenGrid(t), smooth);
+  out.q.middleRows(piece.first, count) = spline.Evaluate(t, 0);
+  out.qd.middleRows(piece.first, count) = spline.Evaluate(t, 1);
+  out.qdd.middleRows(piece.first, count) = spline.Evaluate(t, 2);
+  const double edge_s = 3 / out.cutoff_Hz.minCoeff();  // the reflection there bends q: 1 % of qdd after 1.5 periods
+  for (Index k = 0; k < count; ++k) {
+    out.settled[piece.first + k] = t[k] - t[0] >= edge_s && t[count - 1] - t[k] >= edge_s;
+  }
+}
+
+}  // namespace
+
+JointNoise EstimateNoise(const Log& log, int joint) {
+  const std::vector<Piece> pieces = Pieces(log);
+  const Piece longest =
+      *std::max_element(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.count < b.count; });
+  const VectorXd t = log.t.segment(longest.first, longest.count);
+  const VectorXd q = log.q.col(joint).segment(longest.first, longest.count);
+  const VectorXd tau = log.tau.col(joint).segment(longest.first, longest.count);
+  // Orders: q moves smoothly over six samples, torque over two; beyond that the difference shows the noise alone.
+  return {std::max(SmallestStep(q) / std::sqrt(12.0), NoiseUnderSmooth(OnEvenGrid(t, q), 6)), NoiseUnderSmooth(tau, 2)};
+}
+
+double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz) {
+  // White noise s in q has the density 2 s^2 / rate; through gain 1 / (1 + (f/c)^8) and two derivatives its variance is
+  // s^2 (2 pi)^4 c^5 (2 / rate) x 0.1594, the integral of x^4 / (1 + x^8)^2 over x > 0.
+  constexpr double kIntegral = 0.1594;
+  const double highest_Hz = std::min(kHighest_Hz, kHighestOfRate * rate_Hz);
+  const double unit =
+      inertia * noise.position_rad * std::pow(2 * std::numbers::pi, 2) * std::sqrt(2 * kIntegral / rate_Hz);
+  if (unit <= 0) return highest_Hz;
+  const double cutoff_Hz = std::pow(kShareOfJitter * noise.torque_Nm / unit, 2.0 / 5);
+  return std::min(std::max(cutoff_Hz, kLowest_Hz), highest_Hz);
+}
+
+Derivatives DeriveSignals(const Log& log, const VectorXd& inertia_per_joint, double cutoff_scale) {
+  if (inertia_per_joint.size() != log.joints) {
+    throw InputError(log.source + ": has " + std::to_string(log.joints) + " joints, the model has " +
+                     std::to_string(inertia_per_joint.size()));
+  }
+  if (log.samples() < QuinticSpline::kMinSamples) throw InputError(log.source + ": too few samples for derivatives");
+  const double rate_Hz = 1 / log.step_s();
+  Derivatives out;
+  out.q = log.q;
+  out.qd = out.qdd = Eigen::MatrixXd::Zero(log.samples(), log.joints);
+  out.settled = Eigen::VectorXi::Zero(log.samples());
+  out.cutoff_Hz.resize(log.joints);
+  for (int j = 0; j < log.joints; ++j) {
+    out.cutoff_Hz[j] = cutoff_scale * ChooseCutoff_Hz(EstimateNoise(log, j), inertia_per_joint[j], rate_Hz);
+  }
+  for (const Piece& piece : Pieces(log)) {
+    if (piece.count < QuinticSpline::kMinSamples) continue;
+    DerivePiece(log.t.segment(piece.first, piece.count), log.q.middleRows(piece.first, piece.count), piece, out);
+  }
+  return out;
+}
+
+}  // namespace armcal::io

@@ -1,0 +1,54 @@
+// plant - what a robot file says of mechanics, motors and sensors; knows no regressor, prior or effect list.
+//
+// The plant reads the same files as the generator, but with its own reader and in its own convention (bodies about
+// their centres, KDL frames), so that an error in one of the two shows up as a disagreement. Keys that only the
+// generator needs are left to the generator, which also refuses unknown ones.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <kdl/frames.hpp>
+
+namespace armcal::plant {
+
+// A rigid body: centre in the link frame, inertia xx xy xz yy yz zz about the centre in link axes.
+struct Body {
+  double mass_kg = 0;
+  std::array<double, 3> center_m{};
+  std::array<double, 6> inertia_kgm2{};
+};
+
+// Rotary quantities; for a prismatic joint read m, m/s, N, N s/m, and rad/m for the gear ratio.
+struct JointData {
+  std::string name;
+  bool prismatic = false;
+  double alpha_rad = 0, a_m = 0, d_m = 0, theta_rad = 0;  // modified DH (Craig), offsets included
+  double torque_limit_Nm = 0, torque_noise_Nm = 0;        // noise: standard deviation of one tick's reading
+  double coulomb_Nm = 0, viscous_Nmsprad = 0;
+  double counts_per_turn = 0;  // of the motor
+  long long zero_counts = 0;
+  double gear_ratio = 1;                                                           // signed, motor per joint
+  double current_A_per_lsb = 0, torque_constant_NmpA = 0, rotor_inertia_kgm2 = 0;  // at the motor shaft
+  Body body;
+};
+
+struct RobotFile {
+  std::string path, name;
+  KDL::Vector gravity_mps2;  // base frame
+  KDL::Frame base_frame;     // pose of frame 0 in the base frame
+  KDL::Frame tool_frame;     // pose of the flange in the last link frame
+  double tick_rate_Hz = 1000;
+  std::vector<JointData> joint;
+  Eigen::MatrixXd coupling;  // C of q_motor = C q, tau = C^T tau_motor; all sides in joint units
+
+  int joints() const { return static_cast<int>(joint.size()); }
+};
+
+// Throws io::InputError (file, key, what was expected); also when bodies or motors are missing, without which there
+// is nothing to simulate.
+RobotFile ReadRobotFile(const std::string& path);
+
+}  // namespace armcal::plant

@@ -1,0 +1,28 @@
+// report - how far a long step is, on stderr; knows no step.
+#pragma once
+
+#include <cstdio>
+#include <string>
+
+namespace armcal::report {
+
+// On a terminal one line that rewrites itself; elsewhere (a file, a log of a build server) one plain line per 10 %.
+// It clears its line when it goes, so that a message never stands inside it.
+class Progress {
+ public:
+  explicit Progress(std::string task, std::FILE* out = stderr);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  // done: 0 to 1. Cheap when nothing visible changes.
+  void Set(double done);
+
+ private:
+  std::string task_;
+  std::FILE* out_;
+  bool terminal_;
+  int shown_percent_ = -1;
+};
+
+}  // namespace armcal::report

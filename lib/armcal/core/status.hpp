@@ -1,0 +1,41 @@
+// core - the one answer every call gives; knows no room above it.
+// Numbers are part of SPEC.md (readable as a register) and never change meaning.
+#pragma once
+
+#include <cstdint>
+
+namespace armcal::core {
+
+// 0 ok; 1-31 refused (the caller's input); 32-63 fault (the world); 64-95 limited (done, but held back).
+// Unless ok or limited, the object that answered is byte-identical to before the call.
+enum class [[nodiscard]] Status : std::uint8_t{
+    kOk = 0,
+    kNotFinite = 1,      // a number is NaN or infinite
+    kOutOfRange = 2,     // a number lies outside its documented range
+    kWrongSize = 3,      // a count or length does not fit
+    kWrongOrder = 4,     // not allowed in the present state of a transaction
+    kWrongSchema = 5,    // made for another model
+    kUnphysical = 6,     // a body whose pseudo-inertia is not positive definite
+    kAxisEnabled = 7,    // refused while an axis is enabled
+    kLocked = 8,         // the session is not unlocked
+    kFull = 9,           // no room; the new item was refused whole
+    kEmpty = 10,         // nothing there to take
+    kBadCrc = 11,        // content and checksum differ
+    kBadAddress = 12,    // no such register
+    kBadFunction = 13,   // no such function code
+    kReadOnly = 14,      // this register cannot be written
+    kBusy = 15,          // an earlier command is still running
+    kStorageFault = 32,  // the storage refused or returned what was not written
+    kBlank = 33,         // storage holds no record at all
+    kCorrupt = 34,       // storage holds a record that fails its checks
+    kTimeout = 35,       // a partner did not answer in time
+    kGated = 64,         // accepted, but no row of the sample may update an estimate
+    kClamped = 65,       // a value was cut to its limit; the limit's counter went up
+    kHeld = 66,          // the supervisor keeps the last good value
+};
+
+constexpr bool IsOk(Status s) { return s == Status::kOk; }
+constexpr bool IsRefused(Status s) { return static_cast<std::uint8_t>(s) >= 1 && static_cast<std::uint8_t>(s) < 32; }
+constexpr bool IsLimited(Status s) { return static_cast<std::uint8_t>(s) >= 64 && static_cast<std::uint8_t>(s) < 96; }
+
+}  // namespace armcal::core

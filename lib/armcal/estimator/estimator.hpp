@@ -1,0 +1,241 @@
+// estimator - where model and filter meet: samples in, estimates out; knows no register and no storage.
+#pragma once
+
+#include "armcal/core/mailbox.hpp"
+#include "armcal/core/sample_ring.hpp"
+#include "armcal/estimator/image.hpp"
+#include "armcal/monitor/monitor.hpp"
+#include "armcal/signal/signal_path.hpp"
+
+namespace armcal::estimator {
+
+// What the estimator knows at one instant. Columns in filter coordinates [front, dense], own units.
+template <class Model>
+struct Estimates {
+  std::uint32_t generation = 0;  // of the table that the filter started from
+  std::uint32_t tick = 0;        // of the last sample inside
+  std::uint32_t samples = 0;     // processed since adoption
+  std::uint32_t stale = 0;       // samples of another generation, dropped
+  std::uint32_t refused = 0;     // samples lost because the ring was full, since power-up
+  float value[Model::kColumns] = {};
+  float sd[Model::kColumns] = {};
+  std::uint32_t rows_used[Model::kJoints] = {};
+  std::uint32_t rows_gated[Model::kJoints] = {};    // not valid, not moving, or outside the innovation gate
+  std::uint32_t rows_refused[Model::kJoints] = {};  // not finite or beyond filter::kRowLimit
+  float nis[Model::kJoints] = {};                   // see monitor::JointMonitor
+  float residual_rms_Nm[Model::kJoints] = {};       // measured minus committed model, used rows
+};
+
+// Signal axes of a generated model.
+template <class Model>
+signal::Axes<Model::kJoints> AxesOf() {
+  constexpr int n = Model::kJoints;
+  signal::Axes<n> axes = {};
+  for (int i = 0; i < n; ++i) {
+    axes.counts_to_rad[i] = Model::kAxes[i].counts_to_rad;
+    axes.zero_counts[i] = Model::kAxes[i].zero_counts;
+    axes.lsb_to_Nm[i] = Model::kAxes[i].lsb_to_Nm;
+  }
+  for (int i = 0; i < n * n; ++i) {
+    axes.motor_to_joint[i] = Model::kMotorToJoint[i];
+    axes.motor_torque_to_joint[i] = Model::kMotorTorqueToJoint[i];
+  }
+  axes.tick_rate_Hz = static_cast<float>(Model::kTickRate_Hz);
+  return axes;
+}
+
+// Filter: filter::ForgettingFilter<Model> or filter::KalmanFilter<Model>.
+// Push and PushSample belong to the tick (use one of the two), everything else to the background.
+template <class Model, class Filter>
+class Estimator {
+ public:
+  static constexpr int n = Model::kJoints;
+  static constexpr std::uint32_t kRingSamples = 16;
+  // Called once a sample after its rows: flags carry kUsed where a row changed the estimate.
+  using Observer = void (*)(void* context, const model::Sample<n>& sample, const float* tau_model_Nm);
+
+  Estimator() : path_(AxesOf<Model>()) {}
+
+  // One control tick. kOk; kFull: a sample became ready and was refused whole because the background is late
+  // (counted). Context: tick.
+  core::Status Push(const model::RawSample<n>& raw) {
+    TakeSettings();
+    if (!path_.PushTick(raw)) return core::Status::kOk;
+    return ring_.Push({path_.sample(), path_.generation()});
+  }
+
+  // A sample that a signal path made elsewhere (torque scale and flags already inside); the rest is bit for bit the
+  // same. kFull as above. Context: tick, or a host's only thread.
+  core::Status PushSample(const model::Sample<n>& sample) {
+    TakeSettings();
+    return ring_.Push({sample, path_.generation()});
+  }
+
+  // Restarts filter, statistics and signal path from `image`, which must stay as it is until the next Adopt; its
+  // generation must differ from the one before and from 0. Samples made before are dropped. adopted_tick: zero of the
+  // model's time. Context: background.
+  void Adopt(const Image<Model>& image, std::uint32_t adopted_tick) {
+    image_ = &image;
+    adopted_tick_ = adopted_tick;
+    filter_.Restart(image.prior);
+    estimates_ = Estimates<Model>{};
+    estimates_.generation = image.committed.generation;
+    for (monitor::JointMonitor& m : monitors_) m = monitor::JointMonitor{};
+    stage_ = Stage::kIdle;
+    read_out_due_ = true;
+    signal::Settings<n> settings = {};
+    for (int i = 0; i < n; ++i) {
+      settings.v_min_radps[i] = image.committed.v_min_radps[i];
+      settings.torque_scale[i] = image.committed.torque_scale[i];
+    }
+    settings.generation = image.committed.generation;
+    settings_.Post(settings);
+  }
+
+  // One bounded slice: a sample's regressor, one row, the end of a sample, or a slice of the read-out.
+  // False: nothing to do. Context: background.
+  bool Step() {
+    switch (stage_) {
+      case Stage::kIdle:
+        return StartSample();
+      case Stage::kRow:
+        RowSlice();
+        return true;
+      case Stage::kEnd:
+        EndSample();
+        return true;
+      case Stage::kReadOut:
+        if (!filter_.StepReadOut(read_out_)) return true;
+        Publish();
+        stage_ = Stage::kIdle;
+        return true;
+    }
+    return false;
+  }
+
+  // Latest published estimates; false: nothing new since the last call. Context: one reader, any.
+  bool Take(Estimates<Model>& out) { return published_.Take(out); }
+
+  // Publish after the sample in work, besides every `publish_every` samples. Context: background.
+  void RequestReadOut() { read_out_due_ = true; }
+  void SetPublishEvery(std::uint32_t samples) { publish_every_ = math::Max<std::uint32_t>(samples, 1); }
+  void SetObserver(Observer observer, void* context) {
+    observer_ = observer;
+    observer_context_ = context;
+  }
+
+  std::uint32_t refused_samples() const { return ring_.refused(); }
+  std::uint32_t pending() const { return ring_.size(); }  // samples waiting for Step; context: any
+  std::uint32_t tick_gaps() const { return path_.gap_count(); }  // restarts of the signal path; context: tick
+  const Filter& filter() const { return filter_; }
+
+ private:
+  enum class Stage : std::uint8_t { kIdle, kRow, kEnd, kReadOut };
+  struct Item {
+    model::Sample<n> sample;
+    std::uint32_t generation;
+  };
+
+  void TakeSettings() {
+    if (settings_.Refresh()) path_.SetSettings(settings_.latest());
+  }
+
+  bool StartSample() {
+    if (image_ != nullptr && read_out_due_) {
+      read_out_due_ = false;
+      filter_.BeginReadOut(read_out_);
+      stage_ = Stage::kReadOut;
+      return true;
+    }
+    if (!core::IsOk(ring_.Pop(item_))) return false;
+    if (image_ == nullptr || item_.generation != image_->committed.generation) {
+      ++estimates_.stale;
+      return true;
+    }
+    const model::Sample<n>& s = item_.sample;
+    model::ModelInput<float, n> state;
+    moving_ = 0;
+    for (int i = 0; i < n; ++i) {
+      state.q[i] = s.q[i];
+      state.qd[i] = s.qd[i];
+      state.qdd[i] = s.qdd[i];
+      state.temp[i] = s.temperature_degC[i];
+      constexpr int kUpdates = model::kValid | model::kMoving;
+      moving_ |= static_cast<std::uint32_t>((s.flags[i] & kUpdates) == kUpdates) << i;
+    }
+    state.t = static_cast<float>(s.tick - adopted_tick_) / static_cast<float>(Model::kTickRate_Hz);
+    Model::Regressor(state, image_->committed.p, image_->committed.eta, rows_.front, rows_.dense);
+    joint_ = 0;
+    stage_ = Stage::kRow;
+    return true;
+  }
+
+  // Whitens the row of joint_ into prior units and hands it to the filter.
+  void RowSlice() {
+    const int i = joint_, first = Model::kFrontBegin[i];
+    const float whiten = 1.0f / image_->sigma_Nm[i];
+    const auto scaled = [&](float value, int column) {
+      return math::Masked(value * (image_->scale[column] * whiten), image_->prior.active[column]);
+    };
+    float front[Model::kFront > 0 ? Model::kFront : 1], dense[Model::kDense];
+    for (int k = first; k < Model::kFrontBegin[i + 1]; ++k) front[k - first] = scaled(rows_.front[k], k);
+    for (int k = 0; k < Model::kDense; ++k) dense[k] = scaled(rows_.dense[i * Model::kDense + k], Model::kFront + k);
+    tau_model_Nm_[i] = feedforward::RowTorque(image_->committed.p, rows_, i);
+    const float residual_Nm = item_.sample.tau[i] - tau_model_Nm_[i];
+
+    const bool use = ((moving_ >> i) & 1u) != 0u;
+    const filter::UpdateReport report = filter_.Update(i, front, dense, residual_Nm * whiten, use);
+    item_.sample.flags[i] =
+        static_cast<std::uint8_t>((item_.sample.flags[i] & ~model::kUsed) | (report.accepted ? model::kUsed : 0));
+    estimates_.rows_used[i] += report.accepted;
+    estimates_.rows_gated[i] += report.status == core::Status::kGated;
+    estimates_.rows_refused[i] += core::IsRefused(report.status);
+    if (report.accepted) monitors_[i].Add(report.innovation, report.variance, residual_Nm);
+    if (++joint_ == n) stage_ = Stage::kEnd;
+  }
+
+  void EndSample() {
+    filter_.EndSample(moving_);
+    estimates_.tick = item_.sample.tick;
+    if (observer_ != nullptr) observer_(observer_context_, item_.sample, tau_model_Nm_);
+    if (++estimates_.samples % publish_every_ == 0u) read_out_due_ = true;
+    stage_ = Stage::kIdle;
+  }
+
+  void Publish() {
+    for (int k = 0; k < Model::kColumns; ++k) {
+      estimates_.value[k] = image_->committed.p[k] + image_->scale[k] * read_out_.x[k];
+      estimates_.sd[k] = image_->scale[k] * read_out_.sd[k];
+    }
+    for (int i = 0; i < n; ++i) {
+      estimates_.nis[i] = monitors_[i].nis();
+      estimates_.residual_rms_Nm[i] = monitors_[i].residual_rms_Nm();
+    }
+    estimates_.refused = ring_.refused();
+    published_.Post(estimates_);
+  }
+
+  signal::SignalPath<n, Model::kSampleTicks> path_;  // the tick's
+  core::Mailbox<signal::Settings<n>> settings_;
+  core::SampleRing<Item, kRingSamples> ring_;
+  core::Mailbox<Estimates<Model>> published_;
+
+  const Image<Model>* image_ = nullptr;  // the background's, from here on
+  Filter filter_;
+  typename Filter::ReadOut read_out_;
+  feedforward::Rows<Model> rows_ = {};
+  monitor::JointMonitor monitors_[n];
+  Estimates<Model> estimates_;
+  Item item_ = {};
+  float tau_model_Nm_[n] = {};
+  std::uint32_t adopted_tick_ = 0;
+  std::uint32_t moving_ = 0;
+  std::uint32_t publish_every_ = 125;
+  Observer observer_ = nullptr;
+  void* observer_context_ = nullptr;
+  int joint_ = 0;
+  Stage stage_ = Stage::kIdle;
+  bool read_out_due_ = false;
+};
+
+}  // namespace armcal::estimator

@@ -1,0 +1,101 @@
+// estimator - the bodies' prior seen through the base map b = B phi, and the way back; knows no filter.
+//
+// A body parameter's prior is Gaussian in (m, c, I about the centre, rotor inertia): phi ~ phi0 + J S xi, xi ~ N(0, 1),
+// J = d(m, mc, Io) / d(m, c, Ic) at the mean, S = diag(sd). Base coordinates: b - b0 = W xi with W = B J S.
+// Factored as W = U w~, w~ w~' = D, the standard-parameter Kalman read-out phi = phi0 + P0 B' (B P0 B')^-1 (b - b0)
+// is phi0 + J S w~' D^-1 U^-1 (b - b0). T: float on the target, double on the host. Context: background.
+#pragma once
+
+#include "armcal/math/ud.hpp"
+#include "armcal/model/contract.hpp"
+#include "armcal/physical/physical.hpp"
+
+namespace armcal::estimator {
+
+template <class Model, class T>
+struct RigidPrior {
+  static constexpr int kBodies = Model::kBodyParameters;
+  T mean[kBodies];                    // phi0, blocks of 11 per link
+  T sd[kBodies];                      // 0: known exactly
+  T w[Model::kRigid * kBodies];       // W, then w~
+  T ud[math::UdSize(Model::kRigid)];  // base covariance B P0 B'
+};
+
+// base [kRigid] = B body [kBodyParameters].
+template <class Model, class T>
+void MapBodies(const T* body, T* base) {
+  for (int r = 0; r < Model::kRigid; ++r) {
+    T sum = T(0);
+    for (int e = Model::kMapBegin[r]; e < Model::kMapBegin[r + 1]; ++e)
+      sum += T(Model::kMapValue[e]) * body[Model::kMapColumn[e]];
+    base[r] = sum;
+  }
+}
+
+// J of one link at its mean. Shape: jacobian [100].
+template <class T>
+void LinkJacobian(const T* body, T* jacobian) {
+  T centre[3];
+  for (int i = 0; i < 3; ++i) centre[i] = math::Divide(body[1 + i], body[0]);
+  physical::BodyJacobian(body[0], centre, jacobian);
+}
+
+// W = B J S from mean and sd.
+template <class Model, class T>
+void SpreadPrior(RigidPrior<Model, T>& prior) {
+  constexpr int kBodies = Model::kBodyParameters, kBlock = model::kBodyBlock;
+  for (T& w : prior.w) w = T(0);
+  for (int link = 0; link < Model::kJoints; ++link) {
+    T jacobian[100];
+    LinkJacobian(prior.mean + link * kBlock, jacobian);
+    const T* sd = prior.sd + link * kBlock;
+    for (int r = 0; r < Model::kRigid; ++r) {
+      T* w = prior.w + r * kBodies + link * kBlock;
+      for (int e = Model::kMapBegin[r]; e < Model::kMapBegin[r + 1]; ++e) {
+        const int parameter = Model::kMapColumn[e] - link * kBlock;
+        if (parameter < 0 || parameter >= kBlock) continue;
+        const T value = T(Model::kMapValue[e]);
+        if (parameter == model::kRotor) w[model::kRotor] += value * sd[model::kRotor];
+        else
+          for (int k = 0; k < 10; ++k) w[k] += value * jacobian[parameter * 10 + k] * sd[k];
+      }
+    }
+  }
+}
+
+// After SpreadPrior: ud = U D U', w becomes w~. About kRigid^2 kBodyParameters multiplications, once per table.
+template <class Model, class T>
+void FactorPrior(RigidPrior<Model, T>& prior) {
+  math::UdFromSquareRoot<Model::kRigid, Model::kBodyParameters>(prior.w, prior.ud);
+}
+
+// After FactorPrior: body [kBodyParameters] from base [kRigid] = b. What the base does not determine follows the
+// prior's correlation. Linear: the result of a large step need not be physical.
+template <class Model, class T>
+void ReadBodies(const RigidPrior<Model, T>& prior, const T* base, T* body) {
+  constexpr int kBodies = Model::kBodyParameters, kBlock = model::kBodyBlock;
+  T u[Model::kRigid];
+  MapBodies<Model>(prior.mean, u);
+  for (int r = 0; r < Model::kRigid; ++r) u[r] = base[r] - u[r];
+  math::UdSolveUpper<Model::kRigid>(prior.ud, u);
+  for (int r = 0; r < Model::kRigid; ++r) u[r] = math::Divide(u[r], prior.ud[math::UdIndex(r, r)]);
+  for (int link = 0; link < Model::kJoints; ++link) {
+    T step[kBlock], jacobian[100];
+    for (int k = 0; k < kBlock; ++k) {
+      const int column = link * kBlock + k;
+      T xi = T(0);
+      for (int r = 0; r < Model::kRigid; ++r) xi += prior.w[r * kBodies + column] * u[r];
+      step[k] = prior.sd[column] * xi;
+    }
+    const T* mean = prior.mean + link * kBlock;
+    T* out = body + link * kBlock;
+    LinkJacobian(mean, jacobian);
+    for (int i = 0; i < 10; ++i) {
+      out[i] = mean[i];
+      for (int k = 0; k < 10; ++k) out[i] += jacobian[i * 10 + k] * step[k];
+    }
+    out[model::kRotor] = mean[model::kRotor] + step[model::kRotor];
+  }
+}
+
+}  // namespace armcal::estimator

@@ -1,0 +1,120 @@
+// estimator - what one trace record holds: averaged raw samples, or processed samples; knows no ring and no register.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/math/elementary.hpp"
+#include "armcal/model/parameters.hpp"
+#include "armcal/model/sample.hpp"
+
+namespace armcal::estimator {
+
+// Trace 0, averaged over the arm's decimation. Per joint and channel, in this order; 32-bit values high word first:
+//   bit 0  motor counts, int32 in 1/16 count (wraps) and current, int32 in 1/16 LSB
+//   bit 1  temperature, f32, deg C
+//   bit 2  flags, u16: RawSample flags of all ticks (enabled: and; saturated, stale: or)
+//   bit 3  set-point position, f32, and feed-forward torque, f32, joint side
+inline constexpr std::uint32_t kRawMotion = 1, kRawTemperature = 2, kRawFlags = 4, kRawSetPoint = 8, kRawAll = 15;
+
+// Trace 1, one record an estimator sample. Per joint: q, qd, qdd, tau, temperature f32, flags u16 (kUsed tells whether
+// the row updated filter A), committed model torque at this state f32.
+inline constexpr std::uint32_t kSampleAll = 1;
+inline constexpr int kSampleWordsPerJoint = 13;
+
+template <int n>
+constexpr std::uint16_t RawRecordWords(std::uint32_t channels) {
+  const int per_joint = (channels & kRawMotion ? 4 : 0) + (channels & kRawTemperature ? 2 : 0) +
+                        (channels & kRawFlags ? 1 : 0) + (channels & kRawSetPoint ? 4 : 0);
+  return channels > kRawAll ? std::uint16_t{0} : static_cast<std::uint16_t>(n * per_joint);
+}
+
+template <int n>
+constexpr std::uint16_t SampleRecordWords(std::uint32_t channels) {
+  return channels == kSampleAll ? static_cast<std::uint16_t>(n * kSampleWordsPerJoint) : std::uint16_t{0};
+}
+
+// Sums ticks of one record. Context: tick.
+template <int n>
+class RawRecord {
+ public:
+  void Clear() { *this = RawRecord{}; }
+
+  void Add(const model::RawSample<n>& raw, const float* q_reference, const float* feedforward_Nm) {
+    for (int j = 0; j < n; ++j) {
+      if (count_ == 0) first_[j] = static_cast<std::uint32_t>(raw.counts[j]);
+      counts_[j] += static_cast<std::int32_t>(static_cast<std::uint32_t>(raw.counts[j]) - first_[j]);
+      current_[j] += raw.current[j];
+      temperature_[j] += raw.temperature_degC[j];
+      enabled_[j] = static_cast<std::uint8_t>(count_ == 0 ? raw.flags[j] : enabled_[j] & raw.flags[j]);
+      any_[j] = static_cast<std::uint8_t>(any_[j] | raw.flags[j]);
+      reference_[j] += q_reference[j];
+      feedforward_[j] += feedforward_Nm[j];
+    }
+    ++count_;
+  }
+
+  // words [RawRecordWords<n>(channels)].
+  void Write(std::uint32_t channels, std::uint16_t* w) const {
+    const float share = 1.0f / static_cast<float>(count_ > 0 ? count_ : 1);
+    for (int j = 0; j < n; ++j) {
+      if (channels & kRawMotion) {
+        model::words::PutU32(w, first_[j] * 16u + static_cast<std::uint32_t>(Sixteenths(counts_[j])));
+        model::words::PutU32(w + 2, static_cast<std::uint32_t>(Sixteenths(current_[j])));
+        w += 4;
+      }
+      if (channels & kRawTemperature) model::words::PutF32(w, temperature_[j] * share), w += 2;
+      if (channels & kRawFlags)
+        *w++ = static_cast<std::uint16_t>((enabled_[j] & model::kEnabled) |
+                                          (any_[j] & (model::kSaturated | model::kStale)));
+      if (channels & kRawSetPoint) {
+        model::words::PutF32(w, reference_[j] * share);
+        model::words::PutF32(w + 2, feedforward_[j] * share);
+        w += 4;
+      }
+    }
+  }
+
+ private:
+  // 16 x mean, rounded to nearest
+  std::int32_t Sixteenths(std::int32_t sum) const {
+    const std::int64_t scaled = static_cast<std::int64_t>(sum) * 32 + (sum >= 0 ? count_ : -count_);
+    return count_ > 0 ? static_cast<std::int32_t>(scaled / (2 * count_)) : 0;
+  }
+
+  std::int32_t count_ = 0;
+  std::uint32_t first_[n] = {};
+  std::int32_t counts_[n] = {}, current_[n] = {};
+  float temperature_[n] = {}, reference_[n] = {}, feedforward_[n] = {};
+  std::uint8_t enabled_[n] = {}, any_[n] = {};
+};
+
+// words [SampleRecordWords<n>(kSampleAll)]. Context: background.
+template <int n>
+void WriteSampleRecord(const model::Sample<n>& s, const float* tau_model_Nm, std::uint16_t* w) {
+  using model::words::PutF32;
+  for (int j = 0; j < n; ++j, w += kSampleWordsPerJoint) {
+    PutF32(w, s.q[j]);
+    PutF32(w + 2, s.qd[j]);
+    PutF32(w + 4, s.qdd[j]);
+    PutF32(w + 6, s.tau[j]);
+    PutF32(w + 8, s.temperature_degC[j]);
+    w[10] = s.flags[j];
+    PutF32(w + 11, tau_model_Nm[j]);
+  }
+}
+
+template <int n>
+void ReadSampleRecord(const std::uint16_t* w, model::Sample<n>& s, float* tau_model_Nm) {
+  using model::words::GetF32;
+  for (int j = 0; j < n; ++j, w += kSampleWordsPerJoint) {
+    s.q[j] = GetF32(w);
+    s.qd[j] = GetF32(w + 2);
+    s.qdd[j] = GetF32(w + 4);
+    s.tau[j] = GetF32(w + 6);
+    s.temperature_degC[j] = GetF32(w + 8);
+    s.flags[j] = static_cast<std::uint8_t>(w[10]);
+    tau_model_Nm[j] = GetF32(w + 11);
+  }
+}
+
+}  // namespace armcal::estimator

@@ -1,0 +1,55 @@
+// feedforward - the committed parameters and the torque they predict; knows no filter and no table layout.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/math/elementary.hpp"
+#include "armcal/model/contract.hpp"
+
+namespace armcal::feedforward {
+
+// Filter coordinates of one adopted table. All zero: no valid table.
+template <class Model>
+struct Committed {
+  static constexpr int n = Model::kJoints;
+  bool valid = false;
+  bool bumpless = false;         // may be adopted while axes are enabled, cross-faded over blend_ticks
+  std::uint32_t generation = 0;  // every adoption has its own
+  std::uint32_t blend_ticks = 0;
+  float p[Model::kColumns] = {};
+  float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
+  float limit_Nm[n] = {};
+  float v_min_radps[n] = {};
+  float torque_scale[n] = {};
+};
+
+// The regressor at one state; room for it belongs to whoever asks.
+template <class Model>
+struct Rows {
+  float front[Model::kFront > 0 ? Model::kFront : 1];
+  float dense[Model::kJoints * Model::kDense];
+};
+
+// Committed torque of one joint. A column whose parameter is zero adds nothing, even if its value is not finite
+// (an effect in standby may read a sensor that is not there). Context: any.
+template <class Model>
+float RowTorque(const float* p, const Rows<Model>& rows, int joint) {
+  float sum = 0.0f;
+  for (int k = 0; k < Model::kDense; ++k) {
+    const float parameter = p[Model::kFront + k];
+    sum += parameter * math::Masked(rows.dense[joint * Model::kDense + k], math::MaskOf(parameter != 0.0f));
+  }
+  for (int k = Model::kFrontBegin[joint]; k < Model::kFrontBegin[joint + 1]; ++k)
+    sum += p[k] * math::Masked(rows.front[k], math::MaskOf(p[k] != 0.0f));
+  return sum;
+}
+
+// Torque of all joints at a state, unclamped. Shape: tau_Nm [kJoints]. Not finite where the model is not. Context: any.
+template <class Model>
+void ModelTorque(const Committed<Model>& committed, const model::ModelInput<float, Model::kJoints>& state,
+                 Rows<Model>& rows, float* tau_Nm) {
+  Model::Regressor(state, committed.p, committed.eta, rows.front, rows.dense);
+  for (int i = 0; i < Model::kJoints; ++i) tau_Nm[i] = RowTorque(committed.p, rows, i);
+}
+
+}  // namespace armcal::feedforward

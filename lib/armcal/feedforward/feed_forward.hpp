@@ -1,0 +1,87 @@
+// feedforward - committed table and set-point to joint torque; knows no filter, no live estimate, no table layout.
+#pragma once
+
+#include "armcal/core/mailbox.hpp"
+#include "armcal/core/status.hpp"
+#include "armcal/feedforward/committed.hpp"
+
+namespace armcal::feedforward {
+
+template <class Model>
+class FeedForward {
+ public:
+  static constexpr int n = Model::kJoints;
+
+  // Hands over the next committed set; it takes effect at the next tick. kAxisEnabled: an axis is enabled and the
+  // set is not bumpless; nothing changed. Context: background.
+  core::Status Offer(const Committed<Model>& next, bool any_axis_enabled) {
+    if (any_axis_enabled && !next.bumpless) return core::Status::kAxisEnabled;
+    offered_.Post(next);
+    return core::Status::kOk;
+  }
+
+  // Torque of the set-point. Shapes: all [kJoints]; t_s: seconds since the table was adopted. A set-point speed below
+  // v_min counts as standing, so that friction does not chatter. kOk; kClamped (a joint was cut to its limit and
+  // counted); kEmpty (no valid table; torque zero); kNotFinite (set-point or model not finite; that joint zero).
+  // Always evaluates both sets of a cross-fade: constant time. Context: tick.
+  core::Status Evaluate(const float* q, const float* qd, const float* qdd, const float* temperature_degC, float t_s,
+                        float* tau_Nm) {
+    Adopt();
+    model::ModelInput<float, n> state;
+    for (int i = 0; i < n; ++i) {
+      state.q[i] = q[i];
+      state.qd[i] = math::Select(math::Abs(qd[i]) < active_.v_min_radps[i], 0.0f, qd[i]);
+      state.qdd[i] = qdd[i];
+      state.temp[i] = temperature_degC[i];
+    }
+    state.t = t_s;
+    blended_ticks_ += blended_ticks_ < active_.blend_ticks;
+    const bool blending = blended_ticks_ < active_.blend_ticks;
+    const float share =
+        math::Select(blending, static_cast<float>(blended_ticks_) / Positive(active_.blend_ticks), 1.0f);
+    float before[n], now[n];
+    ModelTorque(previous_, state, rows_, before);
+    ModelTorque(active_, state, rows_, now);
+
+    core::Status status = active_.valid ? core::Status::kOk : core::Status::kEmpty;
+    const std::uint32_t fading = math::MaskOf(blending && previous_.valid);
+    for (int i = 0; i < n; ++i) {
+      const float tau = share * now[i] + math::Masked((1.0f - share) * before[i], fading);
+      const bool usable = active_.valid && math::IsFinite(tau);
+      if (active_.valid && !usable) status = core::Status::kNotFinite;
+      tau_Nm[i] = Clamp(math::Masked(tau, math::MaskOf(usable)), active_.limit_Nm[i], status);
+    }
+    return status;
+  }
+
+  std::uint32_t clamp_count() const { return clamp_count_; }  // joint-ticks cut to the limit
+  std::uint32_t generation() const { return active_.generation; }
+  bool valid() const { return active_.valid; }
+  bool blending() const { return blended_ticks_ < active_.blend_ticks; }
+
+ private:
+  static float Positive(std::uint32_t ticks) { return static_cast<float>(math::Max<std::uint32_t>(ticks, 1)); }
+
+  void Adopt() {
+    if (!offered_.Refresh()) return;
+    previous_ = active_;
+    active_ = offered_.latest();
+    if (!active_.bumpless) active_.blend_ticks = 0;
+    blended_ticks_ = 0;
+  }
+
+  float Clamp(float tau, float limit, core::Status& status) {
+    const bool over = math::Abs(tau) > limit;
+    clamp_count_ += over;
+    if (over && status == core::Status::kOk) status = core::Status::kClamped;
+    return math::Max(-limit, math::Min(limit, tau));
+  }
+
+  core::Mailbox<Committed<Model>> offered_;
+  Committed<Model> active_, previous_;
+  Rows<Model> rows_ = {};
+  std::uint32_t blended_ticks_ = 0;
+  std::uint32_t clamp_count_ = 0;
+};
+
+}  // namespace armcal::feedforward

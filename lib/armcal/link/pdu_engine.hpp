@@ -1,0 +1,42 @@
+// link - one Modbus request in, one reply out; knows function codes, not transports and not what registers mean.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "armcal/link/register_map.hpp"
+
+namespace armcal::link {
+
+inline constexpr std::size_t kMaxPdu = 253;
+
+// Texts of function 43/14, at most 60 characters each so that a reply holds them all.
+struct DeviceIdentification {
+  const char* vendor;
+  const char* product;
+  const char* revision;
+};
+
+// Serves functions 3, 4, 6, 16 and 43/14. The whole request is checked before anything is applied, in the order
+// function (01), quantity and byte count (03), address (02), values (03), state (04), busy (06).
+// Reference: MODBUS Application Protocol Specification V1.1b3, section 6. Context: background.
+class PduEngine {
+ public:
+  PduEngine(RegisterMap& map, const DeviceIdentification& identification)
+      : map_(map), identification_(identification) {}
+
+  // `request` [count], `reply` [kMaxPdu]. Returns the reply's length; 0 for an empty request, which has no answer.
+  std::size_t Handle(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
+
+ private:
+  std::size_t Refuse(std::uint8_t function, std::uint16_t address, core::Status status, std::uint8_t* reply);
+  std::size_t ReadRegisters(RegisterKind kind, const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
+  std::size_t WriteOne(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
+  std::size_t WriteMany(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
+  std::size_t Identify(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
+
+  RegisterMap& map_;
+  DeviceIdentification identification_;
+};
+
+}  // namespace armcal::link

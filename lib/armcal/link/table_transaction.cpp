@@ -1,0 +1,158 @@
+// link - the flashing state machine; knows the order of steps, not what the words mean.
+#include "armcal/link/table_transaction.hpp"
+
+#include <cstring>
+
+#include "armcal/core/crc.hpp"
+
+namespace armcal::link {
+
+using core::Status;
+
+namespace {
+bool Same(const TableCommand& a, const TableCommand& b) {
+  return a.sequence == b.sequence && a.command == b.command && a.schema == b.schema && a.words == b.words &&
+         a.crc == b.crc;
+}
+}  // namespace
+
+TableTransaction::TableTransaction(const TableApplication& application, table::TableStore& store, std::uint32_t schema,
+                                   std::uint16_t* staged, std::uint16_t* active, std::uint16_t words)
+    : application_(application), store_(store), schema_(schema), staged_(staged), active_(active), words_(words) {
+  active_crc_ = core::Crc32Words(active_, words_);
+}
+
+Status TableTransaction::Boot() {
+  table_status_ = store_.Load(staged_);
+  if (!core::IsOk(table_status_)) return table_status_;
+  table_status_ = application_.check(application_.context, staged_, words_);
+  if (!core::IsOk(table_status_)) return table_status_;
+  state_ = TransactionState::kCommitting;
+  phase_ = Phase::kBooting;
+  Adopt();
+  return table_status_;
+}
+
+Status TableTransaction::Command(const TableCommand& command) {
+  if (command.sequence == last_.sequence && command.sequence != 0)
+    return Same(command, last_) ? Status::kOk : Status::kWrongOrder;
+  if (command.sequence == 0) return Status::kWrongOrder;
+  if (phase_ != Phase::kNone) return Status::kBusy;
+  const Status status = Apply(command);
+  status_ = status;
+  if (core::IsOk(status)) {
+    last_ = command;
+    touched_ms_ = now_ms_;
+  }
+  return status;
+}
+
+Status TableTransaction::Apply(const TableCommand& command) {
+  if (command.command != reg::kOpen && command.command != reg::kCheck && command.command != reg::kSave)
+    return Status::kOutOfRange;
+  if (command.schema != schema_) return Status::kWrongSchema;
+  if (command.words != words_) return Status::kWrongSize;
+  if (command.command == reg::kOpen) return Open();
+  return command.command == reg::kCheck ? Check(command) : Save(command);
+}
+
+Status TableTransaction::Open() {
+  std::memset(staged_, 0, 2u * words_);
+  state_ = TransactionState::kOpen;
+  return Status::kOk;
+}
+
+Status TableTransaction::Check(const TableCommand& command) {
+  if (state_ != TransactionState::kLoading && state_ != TransactionState::kChecked) return Status::kWrongOrder;
+  if (core::Crc32Words(staged_, words_) != command.crc) return Status::kBadCrc;
+  const Status status = application_.check(application_.context, staged_, words_);
+  if (!core::IsOk(status)) return status;
+  checked_crc_ = command.crc;
+  state_ = TransactionState::kChecked;
+  return Status::kOk;
+}
+
+Status TableTransaction::Save(const TableCommand& command) {
+  if (state_ != TransactionState::kChecked) return Status::kWrongOrder;
+  if (command.crc != checked_crc_) return Status::kBadCrc;
+  Status status = application_.permit(application_.context, staged_, words_);
+  if (!core::IsOk(status)) return status;
+  status = store_.Save(staged_);
+  if (!core::IsOk(status)) return status;
+  state_ = TransactionState::kCommitting;
+  phase_ = Phase::kStoring;
+  return Status::kOk;
+}
+
+Status TableTransaction::WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words) {
+  if (phase_ != Phase::kNone) return Status::kBusy;
+  if (state_ != TransactionState::kOpen && state_ != TransactionState::kLoading && state_ != TransactionState::kChecked)
+    return Status::kWrongOrder;
+  std::memcpy(staged_ + offset, words, 2u * count);
+  state_ = TransactionState::kLoading;  // what was checked is no longer what is staged
+  touched_ms_ = now_ms_;
+  return Status::kOk;
+}
+
+void TableTransaction::Step(std::uint32_t now_ms) {
+  now_ms_ = now_ms;
+  switch (phase_) {
+    case Phase::kNone: {
+      const bool staging = state_ == TransactionState::kOpen || state_ == TransactionState::kLoading ||
+                           state_ == TransactionState::kChecked;
+      if (staging && now_ms - touched_ms_ >= kStageTimeout_ms) Finish(TransactionState::kIdle, Status::kTimeout);
+      return;
+    }
+    case Phase::kStoring: {
+      const Status stored = store_.Step();
+      if (stored == Status::kBusy) return;
+      if (!core::IsOk(stored)) return Finish(TransactionState::kFailed, stored);
+      phase_ = Phase::kAdopting;
+      touched_ms_ = now_ms;
+      return;
+    }
+    case Phase::kAdopting:
+    case Phase::kBooting:
+      return Adopt();
+    case Phase::kRevoking: {
+      const Status revoked = store_.Step();
+      if (revoked == Status::kBusy) return;
+      return Finish(TransactionState::kFailed, core::IsOk(revoked) ? refusal_ : revoked);
+    }
+  }
+}
+
+// An axis may have been enabled since it was permitted: wait for it, but not for ever.
+void TableTransaction::Adopt() {
+  const bool booting = phase_ == Phase::kBooting;
+  const Status status = application_.adopt(application_.context, staged_, words_);
+  if (core::IsOk(status)) {
+    Activate();
+    return Finish(booting ? TransactionState::kIdle : TransactionState::kActive, Status::kOk);
+  }
+  if (booting) {
+    table_status_ = status;
+    if (status != Status::kBusy) Finish(TransactionState::kIdle, status);
+    return;
+  }
+  const bool may_change = status == Status::kBusy || status == Status::kAxisEnabled;
+  if (may_change && now_ms_ - touched_ms_ < kStageTimeout_ms) return;
+  refusal_ = status == Status::kBusy ? Status::kTimeout : status;
+  const Status revoking = store_.Revoke();
+  if (!core::IsOk(revoking)) return Finish(TransactionState::kFailed, revoking);
+  phase_ = Phase::kRevoking;
+}
+
+void TableTransaction::Activate() {
+  std::memcpy(active_, staged_, 2u * words_);
+  active_crc_ = core::Crc32Words(active_, words_);
+  table_status_ = Status::kOk;
+}
+
+void TableTransaction::Finish(TransactionState state, Status status) {
+  phase_ = Phase::kNone;
+  state_ = state;
+  status_ = status;
+}
+
+}  // namespace armcal::link

@@ -1,0 +1,160 @@
+// link - the trace ring: the producer's constant-time half and the reader's pages; knows no channel.
+#include "armcal/link/trace.hpp"
+
+#include <cstring>
+
+#include "armcal/core/words.hpp"
+#include "armcal/link/registers.hpp"
+
+namespace armcal::link {
+
+using core::Status;
+
+Trace::Trace(std::uint16_t* storage, std::uint32_t storage_words, std::uint32_t tick_step, RecordWords record_words,
+             void* context)
+    : storage_(storage),
+      storage_words_(storage_words),
+      tick_step_(tick_step),
+      record_words_(record_words),
+      context_(context) {}
+
+Status Trace::Arm(TraceArm arm) {
+  if (arm.mode != TraceMode::kOff) {
+    if (arm.mode != TraceMode::kOneShot && arm.mode != TraceMode::kStreaming) return Status::kOutOfRange;
+    arm.record_words = record_words_(context_, arm.channels);
+    if (arm.decimation == 0 || arm.record_words == 0 || arm.record_words > reg::kPageDataCount)
+      return Status::kOutOfRange;
+    if (Slots(arm.record_words) == 0) return Status::kOutOfRange;
+  }
+  requested_ = arm;
+  page_ = TracePage{};
+  tail_slot_ = 0;
+  tail_.store(0, std::memory_order_release);
+  mailbox_.Post({arm, ++serial_});
+  return Status::kOk;
+}
+
+Status Trace::Acknowledge(std::uint32_t next) {
+  const std::uint32_t tail = tail_.load(std::memory_order_relaxed);
+  const std::uint32_t step = next - tail;
+  if (static_cast<std::int32_t>(step) <= 0) return Status::kOk;
+  if (step > page_.count) return Status::kOutOfRange;
+  tail_slot_ = (tail_slot_ + step) % Slots(requested_.record_words);
+  page_.count = 0;
+  page_.first_record = next;
+  tail_.store(next, std::memory_order_release);
+  return Status::kOk;
+}
+
+const TracePage& Trace::Page() {
+  if (page_.count == 0 && requested_.mode != TraceMode::kOff && Ready()) FormPage();
+  return page_;
+}
+
+// Stamp and record of the n-th unreleased record.
+const std::uint16_t* Trace::Slot(std::uint32_t behind_tail) const {
+  const std::uint32_t slots = Slots(requested_.record_words);
+  std::uint32_t slot = tail_slot_ + behind_tail;
+  if (slot >= slots) slot -= slots;
+  return storage_ + slot * (requested_.record_words + kStampWords);
+}
+
+void Trace::FormPage() {
+  const std::uint32_t tail = tail_.load(std::memory_order_relaxed);
+  std::uint32_t there = head_.load(std::memory_order_acquire) - tail;
+  const std::uint32_t most = reg::kPageDataCount / requested_.record_words;
+  if (there == 0) return;
+  if (there > most) there = most;
+  const std::uint32_t first_tick = core::GetU32(Slot(0));
+  const std::uint16_t generation = Slot(0)[2];
+  std::uint32_t count = 1;
+  while (count < there && core::GetU32(Slot(count)) == first_tick + count * record_ticks() &&
+         Slot(count)[2] == generation)
+    ++count;
+  page_ = {tail, first_tick, static_cast<std::uint16_t>(count), generation};
+}
+
+Status Trace::ReadPage(std::uint32_t offset, std::uint16_t count, std::uint16_t* words) const {
+  const std::uint32_t record_words = requested_.record_words;
+  if (offset + count > page_.count * record_words) return Status::kBadAddress;
+  std::uint32_t record = offset / record_words;
+  std::uint32_t word = offset % record_words;
+  for (std::uint16_t i = 0; i < count; ++i) {
+    words[i] = Slot(record)[kStampWords + word];
+    if (++word == record_words) {
+      word = 0;
+      ++record;
+    }
+  }
+  return Status::kOk;
+}
+
+std::uint32_t Trace::waiting() const {
+  if (!Ready()) return 0;
+  return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_relaxed) - page_.count;
+}
+
+std::uint32_t Trace::lost() const { return Ready() ? lost_.load(std::memory_order_relaxed) : 0; }
+
+TraceState Trace::state() const {
+  if (requested_.mode == TraceMode::kOff) return TraceState::kOff;
+  return Ready() ? static_cast<TraceState>(state_.load(std::memory_order_acquire)) : TraceState::kWaiting;
+}
+
+// The counters restart before `started_` tells the reader so.
+void Trace::Begin() {
+  slots_ = armed_.mode == TraceMode::kOff ? 0 : Slots(armed_.record_words);
+  head_slot_ = 0;
+  taken_ = 0;
+  phase_ = 0;
+  head_.store(0, std::memory_order_relaxed);
+  lost_.store(0, std::memory_order_relaxed);
+  const TraceState begin = armed_.mode == TraceMode::kOff ? TraceState::kOff : TraceState::kWaiting;
+  state_.store(static_cast<std::uint32_t>(begin), std::memory_order_relaxed);
+}
+
+TraceTurn Trace::Offer(std::uint32_t tick) {
+  if (mailbox_.Refresh()) {
+    armed_ = mailbox_.latest().arm;
+    Begin();
+    started_.store(mailbox_.latest().serial, std::memory_order_release);
+  }
+  auto state = static_cast<TraceState>(state_.load(std::memory_order_relaxed));
+  if (state == TraceState::kWaiting && static_cast<std::int32_t>(tick - armed_.start_tick) >= 0) {
+    state = TraceState::kRecording;
+    state_.store(static_cast<std::uint32_t>(state), std::memory_order_relaxed);
+    expected_tick_ = tick;
+  }
+  if (state != TraceState::kRecording) return {false, false, false};
+  if (tick != expected_tick_) phase_ = 0;
+  expected_tick_ = tick + tick_step_;
+  const bool first = phase_ == 0;
+  if (first) window_tick_ = tick;
+  const bool last = ++phase_ == armed_.decimation;
+  if (last) phase_ = 0;
+  return {true, first, last};
+}
+
+Status Trace::Push(const std::uint16_t* record, std::uint32_t generation) {
+  const std::uint32_t head = head_.load(std::memory_order_relaxed);
+  const bool full = head - tail_.load(std::memory_order_acquire) >= slots_;
+  if (full && armed_.mode == TraceMode::kStreaming) {
+    lost_.store(lost_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    return Status::kFull;
+  }
+  if (full) {
+    state_.store(static_cast<std::uint32_t>(TraceState::kDone), std::memory_order_release);
+    return Status::kFull;
+  }
+  std::uint16_t* slot = storage_ + head_slot_ * (armed_.record_words + kStampWords);
+  core::PutU32(slot, window_tick_);
+  slot[2] = static_cast<std::uint16_t>(generation & 0xFFFFu);
+  std::memcpy(slot + kStampWords, record, 2u * armed_.record_words);
+  head_slot_ = head_slot_ + 1 == slots_ ? 0 : head_slot_ + 1;
+  head_.store(head + 1, std::memory_order_release);
+  if (armed_.limit != 0 && ++taken_ == armed_.limit)
+    state_.store(static_cast<std::uint32_t>(TraceState::kDone), std::memory_order_release);
+  return Status::kOk;
+}
+
+}  // namespace armcal::link

@@ -1,0 +1,139 @@
+// link - a ring of fixed-size records that the reader takes in pages; knows words and ticks, not what is recorded.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "armcal/core/mailbox.hpp"
+#include "armcal/core/status.hpp"
+
+namespace armcal::link {
+
+enum class TraceMode : std::uint16_t { kOff = 0, kOneShot = 1, kStreaming = 2 };
+enum class TraceState : std::uint16_t { kOff = 0, kWaiting = 1, kRecording = 2, kDone = 3 };
+
+struct TraceArm {
+  std::uint16_t number = 0;  // the client's; the same arm written twice starts one recording
+  TraceMode mode = TraceMode::kOff;
+  std::uint16_t decimation = 1;  // samples averaged into one record
+  std::uint32_t start_tick = 0;  // one in the past (up to 2^31 ticks) starts at once
+  std::uint32_t limit = 0;       // records, 0: no limit
+  std::uint32_t channels = 0;
+  std::uint16_t record_words = 0;  // follows from channels
+};
+
+// Where one sample stands in the averaging window of a record.
+struct TraceTurn {
+  bool recording;  // the sample belongs to a window
+  bool first;      // of its window: clear the sums
+  bool last;       // of its window: Push the record
+};
+
+// What a page is: consecutive records of one generation, evenly spaced in time.
+struct TracePage {
+  std::uint32_t first_record = 0;
+  std::uint32_t first_tick = 0;
+  std::uint16_t count = 0;
+  std::uint16_t generation = 0;
+};
+
+// Producer (tick or background) and reader (background) are one context each and never wait for one another. When the
+// ring is full the NEW record is refused and counted. A page stays as it is until the reader names the next record it
+// wants, so a lost reply can be read again.
+class Trace {
+ public:
+  // How many words a record of these channels has; 0: not served.
+  using RecordWords = std::uint16_t (*)(void* context, std::uint32_t channels);
+
+  // `tick_step`: ticks from one offered sample to the next. Storage is the caller's (TraceRing below).
+  Trace(std::uint16_t* storage, std::uint32_t storage_words, std::uint32_t tick_step, RecordWords record_words,
+        void* context);
+  Trace(const Trace&) = delete;
+
+  // Reader ------------------------------------------------------------------------------------------------------------
+  // Drops what is there and starts anew. kOutOfRange: mode, decimation 0, channels not served or a record too long.
+  core::Status Arm(TraceArm arm);
+  const TraceArm& requested() const { return requested_; }
+
+  // Releases all records before `next`. kOutOfRange: beyond the page. One already released: kOk, nothing happens.
+  core::Status Acknowledge(std::uint32_t next);
+  std::uint32_t acknowledged() const { return tail_.load(std::memory_order_relaxed); }
+
+  // The present page; forms one if there is none and records wait. Count 0: nothing there.
+  const TracePage& Page();
+  // Words of the present page. kBadAddress: beyond it.
+  core::Status ReadPage(std::uint32_t offset, std::uint16_t count, std::uint16_t* words) const;
+
+  std::uint32_t record_ticks() const { return tick_step_ * requested_.decimation; }
+  std::uint32_t waiting() const;  // records behind the present page
+  std::uint32_t lost() const;
+  TraceState state() const;
+
+  // Producer ----------------------------------------------------------------------------------------------------------
+  // Offer every sample; takes over a new arm. A missing tick starts the averaging window anew.
+  TraceTurn Offer(std::uint32_t tick);
+  // After `last`: `record` [armed().record_words]. kFull: refused, counted (one-shot: the recording ends instead).
+  core::Status Push(const std::uint16_t* record, std::uint32_t generation);
+  const TraceArm& armed() const { return armed_; }
+  // Records that still fit: a simulation may wait for room, a real tick never does.
+  std::uint32_t room() const {
+    return slots_ - (head_.load(std::memory_order_relaxed) - tail_.load(std::memory_order_acquire));
+  }
+
+ private:
+  static constexpr std::uint32_t kStampWords = 3;  // tick and generation before each record
+
+  struct Request {
+    TraceArm arm;
+    std::uint32_t serial;
+  };
+
+  void Begin();
+  bool Ready() const { return started_.load(std::memory_order_acquire) == serial_; }
+  std::uint32_t Slots(std::uint16_t record_words) const { return storage_words_ / (record_words + kStampWords); }
+  const std::uint16_t* Slot(std::uint32_t behind_tail) const;
+  void FormPage();
+
+  std::uint16_t* storage_;
+  std::uint32_t storage_words_;
+  std::uint32_t tick_step_;
+  RecordWords record_words_;
+  void* context_;
+
+  // Reader's.
+  TraceArm requested_;
+  std::uint32_t serial_ = 0;
+  TracePage page_;
+  std::uint32_t tail_slot_ = 0;
+
+  // Shared. head_ and tail_ count records since the arm and wrap.
+  core::Mailbox<Request> mailbox_;
+  std::atomic<std::uint32_t> started_{0};  // serial of the arm that the producer works on
+  std::atomic<std::uint32_t> head_{0};
+  std::atomic<std::uint32_t> tail_{0};
+  std::atomic<std::uint32_t> lost_{0};
+  std::atomic<std::uint32_t> state_{0};
+
+  // Producer's.
+  TraceArm armed_;
+  std::uint32_t slots_ = 0;
+  std::uint32_t head_slot_ = 0;
+  std::uint32_t taken_ = 0;  // records accepted since the arm, stops at the limit
+  std::uint16_t phase_ = 0;
+  std::uint32_t window_tick_ = 0;
+  std::uint32_t expected_tick_ = 0;
+};
+
+inline constexpr std::uint32_t kDefaultTraceWords = 32768;  // 64 KB
+
+template <std::uint32_t kWords = kDefaultTraceWords>
+class TraceRing : public Trace {
+ public:
+  TraceRing(std::uint32_t tick_step, RecordWords record_words, void* context)
+      : Trace(words_, kWords, tick_step, record_words, context) {}
+
+ private:
+  std::uint16_t words_[kWords] = {};
+};
+
+}  // namespace armcal::link

@@ -1,0 +1,133 @@
+// math - symmetric matrices as P = U D U', U unit upper triangular, packed; knows no filter and no parameter.
+//
+// Packed by columns: element (i, j), i <= j, at j (j + 1) / 2 + i; the diagonal holds D. Size n (n + 1) / 2.
+// Every kernel takes the same instructions whatever the numbers are, allocates nothing and calls nothing.
+// A zero vector h leaves every bit of the factor as it was, so that a masked row is a row of zeros.
+// G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, 1977. Context: any.
+#pragma once
+
+#include "armcal/math/elementary.hpp"
+
+namespace armcal::math {
+
+constexpr int UdSize(int n) { return n * (n + 1) / 2; }
+constexpr int UdIndex(int i, int j) { return j * (j + 1) / 2 + i; }
+
+// f = U' h. Shapes: ud [UdSize(n)], h, f [n].
+template <int n, class T>
+void UdProject(const T* ud, const T* h, T* f) {
+  for (int j = 0; j < n; ++j) {
+    const T* column = ud + UdIndex(0, j);
+    T sum = h[j];
+    for (int i = 0; i < j; ++i) sum += column[i] * h[i];
+    f[j] = sum;
+  }
+}
+
+// h' P h from f = U' h.
+template <int n, class T>
+T UdQuadratic(const T* ud, const T* f) {
+  T sum = T(0);
+  for (int j = 0; j < n; ++j) sum += ud[UdIndex(j, j)] * f[j] * f[j];
+  return sum;
+}
+
+// Scalar measurement y = h' x + noise of variance r > 0 (Bierman). In: f = U' h. Out: ud updated,
+// gain [n] = P h / S. Returns S = h' P h + r.
+template <int n, class T>
+T UdMeasure(T* __restrict ud, const T* __restrict f, T r, T* __restrict gain) {
+  T alpha = r;
+  for (int j = 0; j < n; ++j) {
+    T* column = ud + UdIndex(0, j);
+    const T v = column[j] * f[j];
+    const T next = alpha + v * f[j];
+    const T shift = -f[j] / alpha;
+    column[j] *= alpha / next;
+    for (int i = 0; i < j; ++i) {
+      const T u = column[i];
+      column[i] = u + gain[i] * shift;
+      gain[i] += u * v;
+    }
+    gain[j] = v;
+    alpha = next;
+  }
+  const T scale = T(1) / alpha;
+  for (int j = 0; j < n; ++j) gain[j] *= scale;
+  return alpha;
+}
+
+// P + c a a', c >= 0 (Agee-Turner). Shapes: a [n], overwritten.
+template <int n, class T>
+void UdAdd(T* __restrict ud, T c, T* __restrict a) {
+  for (int j = n - 1; j >= 0; --j) {
+    T* column = ud + UdIndex(0, j);
+    const T old = column[j];
+    const T now = old + c * a[j] * a[j];
+    const bool tiny = !(now > T(1e-30f));
+    const T inverse = T(1) / Select(tiny, T(1), now);
+    const T step = Select(tiny, T(0), c * a[j] * inverse);
+    for (int i = 0; i < j; ++i) {
+      a[i] -= a[j] * column[i];
+      column[i] += step * a[i];
+    }
+    column[j] = now;
+    c *= Select(tiny, T(1), old * inverse);
+  }
+}
+
+// P = W W' by modified weighted Gram-Schmidt (Thornton). Shapes: w [n x m] row-major, overwritten by rows w~ with
+// W = U w~, w~ w~' = D; ud [UdSize(n)]. A row that depends on those below it (to 1e-10 of its square) gets D = 0.
+template <int n, int m, class T>
+void UdFromSquareRoot(T* w, T* ud) {
+  T before[n];
+  for (int j = 0; j < n; ++j) {
+    T sum = T(0);
+    for (int k = 0; k < m; ++k) sum += w[j * m + k] * w[j * m + k];
+    before[j] = sum;
+  }
+  for (int j = n - 1; j >= 0; --j) {
+    T* wj = w + j * m;
+    T d = T(0);
+    for (int k = 0; k < m; ++k) d += wj[k] * wj[k];
+    const bool none = !(d > T(1e-10f) * before[j]);
+    const T inverse = Select(none, T(0), T(1) / Select(none, T(1), d));
+    for (int i = 0; i < j; ++i) {
+      T* wi = w + i * m;
+      T dot = T(0);
+      for (int k = 0; k < m; ++k) dot += wi[k] * wj[k];
+      const T u = dot * inverse;
+      ud[UdIndex(i, j)] = u;
+      for (int k = 0; k < m; ++k) wi[k] -= u * wj[k];
+    }
+    ud[UdIndex(j, j)] = Select(none, T(0), d);
+  }
+}
+
+// diagonal [n] of P.
+template <int n, class T>
+void UdDiagonal(const T* ud, T* diagonal) {
+  for (int i = 0; i < n; ++i) diagonal[i] = ud[UdIndex(i, i)];
+  for (int j = 1; j < n; ++j) {
+    const T* column = ud + UdIndex(0, j);
+    for (int i = 0; i < j; ++i) diagonal[i] += column[j] * column[i] * column[i];
+  }
+}
+
+// Scales P to S P S: U_ij s_i / s_j, D_j s_j^2, with inverse [n] = 1 / s (0 where s = 0: the column becomes zero).
+template <int n, class T>
+void UdScale(T* ud, const T* s, const T* inverse) {
+  for (int j = 0; j < n; ++j) {
+    T* column = ud + UdIndex(0, j);
+    for (int i = 0; i < j; ++i) column[i] *= s[i] * inverse[j];
+    column[j] *= s[j] * s[j];
+  }
+}
+
+// x [n] = U^-1 b, in place.
+template <int n, class T>
+void UdSolveUpper(const T* ud, T* x) {
+  for (int j = n - 1; j >= 0; --j)
+    for (int i = 0; i < j; ++i) x[i] -= ud[UdIndex(i, j)] * x[j];
+}
+
+}  // namespace armcal::math

@@ -1,0 +1,72 @@
+// model - what a generated model must supply; knows no filter, no register and no storage.
+//
+// A generated model is a struct of constants and one static function, `struct Er20Like { ... }`:
+//
+//   kJoints      n, rows of the regressor (one torque per joint)
+//   kFront       columns that touch ONE row only (friction, joint effects); ordered by joint:
+//                columns kFrontBegin[i] .. kFrontBegin[i+1]-1 belong to joint i   (int kFrontBegin[n+1])
+//   kRigid       base inertial columns (rotor inertias included)
+//   kDense       kRigid + columns of pair and arm effects (they touch several rows)
+//   kRowBegin[i] first dense column that is not structurally zero in row i        (int kRowBegin[n])
+//   kColumns     kFront + kDense: the filter coordinates, in the order [front, dense]
+//   kNonlinear   nonlinear effect parameters eta (frozen outside the extended Kalman filter)
+//   kBodyParameters  11 n: per link m, m cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz (about the link-frame
+//                origin, in the link frame) and the rotor inertia on the joint side
+//   kParameters  the table: [body, front columns, dense effect columns, eta]
+//   kSchema      uint32: equal for two models only if their tables mean the same
+//   kInfo[kParameters]   ParameterInfo: name, unit, default mean, default prior sd, default state ...
+//   kAxes[n]     AxisInfo: encoder, current scale, gear, limits, torque noise, v_min
+//   kMotorToJoint[n*n], kMotorTorqueToJoint[n*n]  coupling, row-major: q = A q_motor, tau = B tau_motor (unit if none)
+//   kTickRate_Hz (float), kSampleTicks (int)
+//   kForgetting[kForgettingGroups]  default forgetting per estimator sample of each group (float)
+//   kMapBegin[kRigid+1], kMapColumn[], kMapValue[]  base = B body, compressed rows (float)
+//
+//   template <class T> static void Regressor(const ModelInput<T, n>& x, const T* committed, const T* eta,
+//                                            T* front, T* dense);
+//     front[kFront]: value of each front column in its own row.
+//     dense[kJoints * kDense]: row-major. Structural zeros are written too.
+//     committed[kColumns]: the committed parameters, read only by columns that depend on the estimate.
+//     tau_i = sum_{c in front(i)} front[c] p[c] + sum_d dense[i*kDense+d] p[kFront+d].
+//     Straight-line, no branch, no call; float in, float out.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/model/sample.hpp"
+
+namespace armcal::model {
+
+// State of a parameter in the table.
+enum class ParameterState : std::uint8_t {
+  kEstimated = 0,
+  kConsidered = 1,  // its uncertainty counts, it is not updated (Kalman forms only)
+  kFixed = 2,       // its torque is subtracted, its column zeroed
+  kStandby = 3,     // compiled in, amplitude zero, column zeroed
+};
+
+// Index of a body parameter inside its link's block of 11.
+enum BodyParameter : int { kM, kMx, kMy, kMz, kIxx, kIxy, kIxz, kIyy, kIyz, kIzz, kRotor, kBodyBlock };
+
+struct ParameterInfo {
+  const char* name;      // "m3", "Fc2", "torque_offset.To4", ...
+  const char* unit;      // "kg", "N*m", ...
+  float mean;            // default mean (body: about the link origin)
+  float sd;              // default prior standard deviation; body: of (m, cx, cy, cz, I about the centre, rotor)
+  float lower, upper;    // bounds a table value must keep; -inf / +inf where there is none
+  float process_noise;   // default variance added per estimator sample (filter coordinates; 0 for bodies)
+  ParameterState state;  // default state
+  std::uint8_t group;    // default forgetting group
+};
+
+// One motor axis. q_motor = counts_to_rad (counts - zero_counts), tau_motor = lsb_to_Nm current, both joint side
+// (gear ratio and sign inside); joint quantities follow by the coupling matrices.
+struct AxisInfo {
+  float counts_to_rad;
+  std::int32_t zero_counts;
+  float lsb_to_Nm;
+  float sigma_Nm;         // torque noise of one estimator sample's row (standard deviation)
+  float v_min_radps;      // below this the joint counts as standing
+  float torque_limit_Nm;  // feed-forward is clamped to +- this
+};
+
+}  // namespace armcal::model

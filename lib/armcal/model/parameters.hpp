@@ -1,0 +1,140 @@
+// model - the parameter table as numbers, and its one byte layout; knows no storage and no register.
+//
+// The byte layout is the same on the wire (Modbus registers), in storage and in the host's files:
+// big-endian 16-bit words, 32-bit values with the high word first. Layout version 1, in 16-bit words:
+//   header  (16 words): schema u32, layout version u16, joints u16, parameters u16, flags u16 (bit 0: bumpless),
+//                       blend_ms u32, forgetting[4] f32 (per estimator sample, group 0..3, in (0, 1])
+//   joint   (8 words each): sigma f32, v_min f32, torque_limit f32, torque_scale f32
+//   parameter (8 words each): mean f32, sd f32, process_noise f32, state u8 << 8 | group u8, 0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "armcal/core/status.hpp"
+#include "armcal/model/contract.hpp"
+
+namespace armcal::model {
+
+inline constexpr std::uint16_t kLayoutVersion = 1;
+inline constexpr int kForgettingGroups = 4;  // 0 bodies, 1 friction, 2 effects, 3 free
+inline constexpr std::uint16_t kFlagBumpless = 1;
+inline constexpr int kHeaderWords = 16;
+inline constexpr int kJointWords = 8;
+inline constexpr int kParameterWords = 8;
+
+struct JointEntry {
+  float sigma_Nm;
+  float v_min_radps;
+  float torque_limit_Nm;
+  float torque_scale;  // measured torque = torque_scale x nominal torque constant x current
+};
+
+struct ParameterEntry {
+  float mean;           // committed value, and where the filters start
+  float sd;             // prior standard deviation; bodies in (m, c, I about the centre, rotor)
+  float process_noise;  // variance per estimator sample
+  ParameterState state;
+  std::uint8_t group;
+};
+
+// Shapes: n joints, p parameters.
+template <int n, int p>
+struct ParameterTable {
+  static constexpr int kWords = kHeaderWords + n * kJointWords + p * kParameterWords;
+
+  std::uint32_t schema = 0;
+  std::uint16_t flags = 0;
+  std::uint32_t blend_ms = 0;
+  float forgetting[kForgettingGroups] = {1, 1, 1, 1};
+  JointEntry joint[n] = {};
+  ParameterEntry parameter[p] = {};
+};
+
+namespace words {
+inline void PutU32(std::uint16_t* w, std::uint32_t v) {
+  w[0] = static_cast<std::uint16_t>(v >> 16);
+  w[1] = static_cast<std::uint16_t>(v & 0xFFFFu);
+}
+inline std::uint32_t GetU32(const std::uint16_t* w) { return (static_cast<std::uint32_t>(w[0]) << 16) | w[1]; }
+inline void PutF32(std::uint16_t* w, float v) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &v, sizeof bits);
+  PutU32(w, bits);
+}
+inline float GetF32(const std::uint16_t* w) {
+  const std::uint32_t bits = GetU32(w);
+  float v;
+  std::memcpy(&v, &bits, sizeof v);
+  return v;
+}
+}  // namespace words
+
+// words: [ParameterTable<n,p>::kWords], native 16-bit values (the wire and the store put the high byte first).
+template <int n, int p>
+void Encode(const ParameterTable<n, p>& t, std::uint16_t* w) {
+  using namespace words;
+  PutU32(w, t.schema);
+  w[2] = kLayoutVersion;
+  w[3] = n;
+  w[4] = p;
+  w[5] = t.flags;
+  PutU32(w + 6, t.blend_ms);
+  for (int g = 0; g < kForgettingGroups; ++g) PutF32(w + 8 + 2 * g, t.forgetting[g]);
+  w += kHeaderWords;
+  for (int j = 0; j < n; ++j, w += kJointWords) {
+    PutF32(w, t.joint[j].sigma_Nm);
+    PutF32(w + 2, t.joint[j].v_min_radps);
+    PutF32(w + 4, t.joint[j].torque_limit_Nm);
+    PutF32(w + 6, t.joint[j].torque_scale);
+  }
+  for (int k = 0; k < p; ++k, w += kParameterWords) {
+    PutF32(w, t.parameter[k].mean);
+    PutF32(w + 2, t.parameter[k].sd);
+    PutF32(w + 4, t.parameter[k].process_noise);
+    w[6] = static_cast<std::uint16_t>((static_cast<unsigned>(t.parameter[k].state) << 8) | t.parameter[k].group);
+    w[7] = 0;
+  }
+}
+
+// kWrongSchema, kWrongSize (layout version, joints or parameters differ), kNotFinite, kOutOfRange (sigma, v_min,
+// limit, scale, forgetting not positive, sd or noise negative, unknown state or group). On refusal `t` is unchanged.
+// Bodies are judged by physical::IsPhysical, not here. Context: background.
+template <int n, int p>
+core::Status Decode(const std::uint16_t* w, std::uint32_t schema, ParameterTable<n, p>& t) {
+  using namespace words;
+  using core::Status;
+  if (GetU32(w) != schema) return Status::kWrongSchema;
+  if (w[2] != kLayoutVersion || w[3] != n || w[4] != p) return Status::kWrongSize;
+  const std::uint16_t* jw = w + kHeaderWords;
+  const std::uint16_t* pw = jw + n * kJointWords;
+  for (int g = 0; g < kForgettingGroups; ++g) {
+    const float f = GetF32(w + 8 + 2 * g);
+    if (!std::isfinite(f)) return Status::kNotFinite;
+    if (!(f > 0.0f && f <= 1.0f)) return Status::kOutOfRange;
+  }
+  for (int k = 0; k < 4 * n; ++k) {
+    const float v = GetF32(jw + 2 * k);
+    if (!std::isfinite(v)) return Status::kNotFinite;
+    if (!(v > 0.0f)) return Status::kOutOfRange;
+  }
+  for (int k = 0; k < p; ++k) {
+    const std::uint16_t* e = pw + k * kParameterWords;
+    const float mean = GetF32(e), sd = GetF32(e + 2), noise = GetF32(e + 4);
+    if (!std::isfinite(mean) || !std::isfinite(sd) || !std::isfinite(noise)) return Status::kNotFinite;
+    if (sd < 0.0f || noise < 0.0f || (e[6] >> 8) > 3 || (e[6] & 0xFF) >= kForgettingGroups) return Status::kOutOfRange;
+  }
+  t.schema = schema;
+  t.flags = w[5];
+  t.blend_ms = GetU32(w + 6);
+  for (int g = 0; g < kForgettingGroups; ++g) t.forgetting[g] = GetF32(w + 8 + 2 * g);
+  for (int j = 0; j < n; ++j, jw += kJointWords)
+    t.joint[j] = {GetF32(jw), GetF32(jw + 2), GetF32(jw + 4), GetF32(jw + 6)};
+  for (int k = 0; k < p; ++k, pw += kParameterWords)
+    t.parameter[k] = {GetF32(pw), GetF32(pw + 2), GetF32(pw + 4), static_cast<ParameterState>(pw[6] >> 8),
+                      static_cast<std::uint8_t>(pw[6] & 0xFF)};
+  return Status::kOk;
+}
+
+}  // namespace armcal::model

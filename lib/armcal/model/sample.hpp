@@ -1,0 +1,51 @@
+// model - what one sample is, raw and processed; knows no robot and no filter.
+#pragma once
+
+#include <cstdint>
+
+namespace armcal::model {
+
+// Flags of one joint in a RawSample.
+inline constexpr std::uint8_t kEnabled = 1;    // the axis is under control
+inline constexpr std::uint8_t kSaturated = 2;  // the current stood at its limit
+inline constexpr std::uint8_t kStale = 4;      // position or current is older than one tick
+
+// One control tick, as the drive's hardware gives it. Shapes: [n] joints (motor axes).
+template <int n>
+struct RawSample {
+  std::uint32_t tick = 0;          // control ticks since power-up, wraps
+  std::int32_t counts[n] = {};     // motor encoder, wraps; only differences are used
+  std::int16_t current[n] = {};    // measured (not commanded) torque-producing current, LSB
+  std::uint8_t flags[n] = {};      // kEnabled | kSaturated | kStale
+  float temperature_degC[n] = {};  // joint or motor temperature; NaN where there is no sensor
+};
+
+// Flags of one joint in a Sample.
+inline constexpr std::uint8_t kValid = 1;   // enabled, not saturated, not stale over the whole window
+inline constexpr std::uint8_t kMoving = 2;  // |qd| above v_min and of one sign over the whole window
+inline constexpr std::uint8_t kUsed = 4;    // set by the estimator: this row updated the estimate
+
+// One estimator sample: all quantities belong to the same instant, `tick` (the centre of the averaging window).
+// Joint side, SI: rad or m, N m or N. tau is measured torque x the table's torque scale.
+template <int n>
+struct Sample {
+  std::uint32_t tick = 0;
+  float q[n] = {};
+  float qd[n] = {};
+  float qdd[n] = {};
+  float tau[n] = {};
+  float temperature_degC[n] = {};
+  std::uint8_t flags[n] = {};
+};
+
+// What a generated regressor reads. T: float on the target, any scalar elsewhere.
+template <class T, int n>
+struct ModelInput {
+  T q[n];
+  T qd[n];
+  T qdd[n];
+  T temp[n];  // deg C
+  T t;        // s since the committed table was adopted
+};
+
+}  // namespace armcal::model

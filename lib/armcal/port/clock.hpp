@@ -1,0 +1,18 @@
+// port - what time a target supplies; integers only, because a float clock loses its ticks after hours.
+#pragma once
+
+#include <cstdint>
+
+namespace armcal::port {
+
+// Both counters wrap; only differences are used. Context: any.
+struct Clock {
+  void* context;
+  std::uint32_t (*ticks)(void* context);  // control ticks since power-up
+  std::uint32_t (*ms)(void* context);     // milliseconds, for time-outs
+
+  std::uint32_t Ticks() const { return ticks(context); }
+  std::uint32_t Ms() const { return ms(context); }
+};
+
+}  // namespace armcal::port

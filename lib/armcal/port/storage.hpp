@@ -1,0 +1,34 @@
+// port - what non-volatile memory a target supplies; knows no record and no driver.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/core/status.hpp"
+
+namespace armcal::port {
+
+// Erasable memory of equal sectors. Every function is bounded, returns when the operation is complete, and answers kOk
+// or kStorageFault (a driver may report its ECC errors so). Context: background.
+struct Storage {
+  void* context;
+  std::uint32_t sector_count;  // at least 2; the lower half is slot 0, the upper half slot 1
+  std::uint32_t sector_bytes;
+  std::uint32_t program_unit;  // bytes programmed at once, a power of two up to 64; a unit is written once per erase
+  std::uint8_t erased_value;   // what an erased byte reads as
+
+  // `address` counts bytes from the start of sector 0.
+  core::Status (*read)(void* context, std::uint32_t address, std::uint8_t* bytes, std::uint32_t count);
+  // `address` and `count` are multiples of program_unit; `count` is at most 64 bytes.
+  core::Status (*program)(void* context, std::uint32_t address, const std::uint8_t* bytes, std::uint32_t count);
+  core::Status (*erase)(void* context, std::uint32_t sector);
+
+  core::Status Read(std::uint32_t address, std::uint8_t* bytes, std::uint32_t count) const {
+    return read(context, address, bytes, count);
+  }
+  core::Status Program(std::uint32_t address, const std::uint8_t* bytes, std::uint32_t count) const {
+    return program(context, address, bytes, count);
+  }
+  core::Status Erase(std::uint32_t sector) const { return erase(context, sector); }
+};
+
+}  // namespace armcal::port

@@ -1,0 +1,188 @@
+// signal - raw counts and currents to joint motion and torque of one instant; knows axes, no model and no filter.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/math/elementary.hpp"
+#include "armcal/model/sample.hpp"
+
+namespace armcal::signal {
+
+// What an arm is built with. Shapes: [n] motor axes, matrices [n x n] row-major. Joint side, see model::AxisInfo.
+template <int n>
+struct Axes {
+  float counts_to_rad[n];
+  std::int32_t zero_counts[n];
+  float lsb_to_Nm[n];
+  float motor_to_joint[n * n];         // q = A q_motor
+  float motor_torque_to_joint[n * n];  // tau = B tau_motor
+  float tick_rate_Hz;
+};
+
+// What the committed table says about measuring. Shapes: [n] joints.
+template <int n>
+struct Settings {
+  float v_min_radps[n];
+  float torque_scale[n];
+  std::uint32_t generation;
+};
+
+// One sample from every kSampleTicks ticks. Counts, currents and temperatures are averaged over the same windows of
+// kSampleTicks ticks, so motion and torque have the same delay. Of the last five windows the CENTRE one is given out:
+// q, qd, qdd by five-point fourth-order formulas over the window averages, tau and temperature of that window.
+// Convention: Sample::tick is the FIRST tick of the centre window; the instant that all its quantities belong to is
+// (kSampleTicks - 1) / 2 ticks later. Windows start where tick % kSampleTicks == 0.
+// Differences are taken in integers before any float. Limit: counts over five windows x kSampleTicks < 2^31.
+// Context: tick, every member; constant time but for the tick that completes a window.
+template <int n, int kSampleTicks>
+class SignalPath {
+ public:
+  explicit SignalPath(const Axes<n>& axes) : axes_(axes) {
+    for (int i = 0; i < n; ++i) settings_.torque_scale[i] = 1.0f;
+    for (int i = 0; i < n * n; ++i)
+      if (axes.motor_to_joint[i] != 0.0f || axes.motor_torque_to_joint[i] != 0.0f) axes_of_joint_[i / n] |= 1u << i % n;
+  }
+
+  // The history restarts, so that no sample mixes two settings.
+  void SetSettings(const Settings<n>& settings) {
+    settings_ = settings;
+    Restart();
+  }
+
+  // True when `sample()` is new. A tick that does not follow its predecessor restarts the history.
+  bool PushTick(const model::RawSample<n>& raw) {
+    if (running_ && raw.tick != last_tick_ + 1u) {
+      Restart();
+      ++gap_count_;
+    }
+    last_tick_ = raw.tick;
+    if (!running_ && raw.tick % kSampleTicks != 0u) return false;
+    running_ = true;
+    Accumulate(raw);
+    if (++phase_ < kSampleTicks) return false;
+    phase_ = 0;
+    newest_ = (newest_ + 1) % kWindows;
+    if (complete_ < kWindows) ++complete_;
+    if (complete_ < kWindows) return false;
+    MakeSample();
+    return true;
+  }
+
+  const model::Sample<n>& sample() const { return sample_; }
+  std::uint32_t generation() const { return settings_.generation; }
+  std::uint32_t gap_count() const { return gap_count_; }  // restarts because a tick was missing
+
+ private:
+  static constexpr int kWindows = 5;
+
+  struct Window {
+    std::uint32_t tick;
+    std::uint32_t first[n];  // counts of the first tick
+    std::int32_t rest[n];    // sum of (counts - first)
+    std::int32_t current[n];
+    float temperature[n];
+    std::uint8_t spoilt[n];  // not enabled or saturated
+    std::uint8_t stale[n];
+  };
+
+  void Restart() {
+    running_ = false;
+    phase_ = 0;
+    newest_ = 0;
+    complete_ = 0;
+  }
+
+  void Accumulate(const model::RawSample<n>& raw) {
+    Window& w = window_[newest_];
+    if (phase_ == 0) {
+      w = Window{};
+      w.tick = raw.tick;
+      for (int i = 0; i < n; ++i) w.first[i] = static_cast<std::uint32_t>(raw.counts[i]);
+    }
+    for (int i = 0; i < n; ++i) {
+      w.rest[i] += static_cast<std::int32_t>(static_cast<std::uint32_t>(raw.counts[i]) - w.first[i]);
+      w.current[i] += raw.current[i];
+      w.temperature[i] += raw.temperature_degC[i];
+      const std::uint8_t usable = static_cast<std::uint8_t>(raw.flags[i] & (model::kEnabled | model::kSaturated));
+      w.spoilt[i] |= usable != model::kEnabled;
+      w.stale[i] |= (raw.flags[i] & model::kStale) != 0;
+    }
+  }
+
+  // kSampleTicks x (average of window a - average of window b), exact.
+  static float Difference(const Window& a, const Window& b, int axis) {
+    const std::uint32_t first = (a.first[axis] - b.first[axis]) * static_cast<std::uint32_t>(kSampleTicks);
+    const std::uint32_t rest = static_cast<std::uint32_t>(a.rest[axis]) - static_cast<std::uint32_t>(b.rest[axis]);
+    return static_cast<float>(static_cast<std::int32_t>(first + rest));
+  }
+
+  void MakeSample() {
+    // Oldest to newest; `newest_` is the slot that the next window will take, hence the oldest.
+    const Window* w[kWindows];
+    for (int k = 0; k < kWindows; ++k) w[k] = &window_[(newest_ + k) % kWindows];
+    const Window& centre = *w[2];
+    constexpr float kShare = 1.0f / kSampleTicks;
+    const float step_rate_Hz = axes_.tick_rate_Hz * kShare;
+
+    float q[n], qd[n], qdd[n], tau[n], step[4][n];
+    for (int i = 0; i < n; ++i) {
+      const float scale = axes_.counts_to_rad[i], share = scale * kShare;
+      const std::uint32_t from_zero = centre.first[i] - static_cast<std::uint32_t>(axes_.zero_counts[i]);
+      q[i] =
+          scale * static_cast<float>(static_cast<std::int32_t>(from_zero)) + share * static_cast<float>(centre.rest[i]);
+      for (int k = 0; k < 4; ++k) step[k][i] = share * Difference(*w[k + 1], *w[k], i);
+      const float inner = Difference(*w[3], *w[1], i), outer = Difference(*w[4], *w[0], i);
+      qd[i] = (8.0f * inner - outer) * (share / 12.0f) * step_rate_Hz;
+      const float bend_inner = Difference(*w[3], centre, i) - Difference(centre, *w[1], i);
+      const float bend_outer = Difference(*w[4], centre, i) - Difference(centre, *w[0], i);
+      qdd[i] = (16.0f * bend_inner - bend_outer) * (share / 12.0f) * step_rate_Hz * step_rate_Hz;
+      tau[i] = axes_.lsb_to_Nm[i] * kShare * static_cast<float>(centre.current[i]);
+      sample_.temperature_degC[i] = centre.temperature[i] * kShare;
+    }
+    sample_.tick = centre.tick;
+    const std::uint32_t good = GoodAxes();
+    for (int i = 0; i < n; ++i) {
+      const float* a = axes_.motor_to_joint + i * n;
+      sample_.q[i] = Dot(a, q);
+      sample_.qd[i] = Dot(a, qd);
+      sample_.qdd[i] = Dot(a, qdd);
+      sample_.tau[i] = settings_.torque_scale[i] * Dot(axes_.motor_torque_to_joint + i * n, tau);
+      bool moving = math::Abs(sample_.qd[i]) > settings_.v_min_radps[i];
+      for (int k = 0; k < 4; ++k) moving &= Dot(a, step[k]) * sample_.qd[i] > 0.0f;
+      const bool valid = (axes_of_joint_[i] & ~good) == 0u;
+      sample_.flags[i] = static_cast<std::uint8_t>((valid ? model::kValid : 0) | (moving ? model::kMoving : 0));
+    }
+  }
+
+  // Bit per axis. A stale axis spoils all: every row of a model reads every joint's motion.
+  std::uint32_t GoodAxes() const {
+    std::uint32_t good = ~0u;
+    bool any_stale = false;
+    for (const Window& w : window_)
+      for (int i = 0; i < n; ++i) {
+        good &= ~(static_cast<std::uint32_t>(w.spoilt[i]) << i);
+        any_stale |= w.stale[i] != 0;
+      }
+    return good & ~math::MaskOf(any_stale);
+  }
+
+  static float Dot(const float* row, const float* x) {
+    float sum = 0.0f;
+    for (int k = 0; k < n; ++k) sum += row[k] * x[k];
+    return sum;
+  }
+
+  Axes<n> axes_;
+  Settings<n> settings_ = {};
+  std::uint32_t axes_of_joint_[n] = {};
+  Window window_[kWindows] = {};
+  model::Sample<n> sample_;
+  std::uint32_t last_tick_ = 0;
+  std::uint32_t gap_count_ = 0;
+  int phase_ = 0;
+  int newest_ = 0;
+  int complete_ = 0;
+  bool running_ = false;
+};
+
+}  // namespace armcal::signal

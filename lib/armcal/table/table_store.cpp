@@ -1,0 +1,242 @@
+// table - the two-slot store: inspection at power-up and the stepped save; knows no meaning of the words.
+#include "armcal/table/table_store.hpp"
+
+#include "armcal/core/crc.hpp"
+
+namespace armcal::table {
+
+using core::Status;
+
+TableStore::TableStore(const port::Storage& storage, std::uint32_t schema, std::uint32_t words)
+    : storage_(storage), schema_(schema), words_(words) {}
+
+bool TableStore::Fits() const {
+  const std::uint32_t unit = storage_.program_unit;
+  if (unit == 0 || unit > kChunkBytes || (unit & (unit - 1)) != 0 || storage_.sector_bytes % unit != 0) return false;
+  if (words_ == 0 || words_ > kMaxPayloadWords || storage_.sector_count < 2) return false;
+  return RecordBytes(words_, unit) <= storage_.sector_count / 2 * storage_.sector_bytes;
+}
+
+SlotState TableStore::Inspect(int slot) {
+  const std::uint32_t base = AddressOf(slot);
+  const std::uint32_t slot_bytes = storage_.sector_count / 2 * storage_.sector_bytes;
+  std::uint8_t bytes[kChunkBytes];
+  if (slot_bytes < kHeaderBytes) return SlotState::kCorrupt;
+  if (!IsOk(storage_.Read(base, bytes, kHeaderBytes))) return SlotState::kCorrupt;
+  bool blank = true;
+  for (std::uint32_t i = 0; i < kHeaderBytes; ++i) blank = blank && bytes[i] == storage_.erased_value;
+  if (blank) return SlotState::kBlank;
+
+  const Header header = GetHeader(bytes);
+  if (core::GetBytes32(bytes) != kRecordMagic || header.words > kMaxPayloadWords) return SlotState::kCorrupt;
+  if (RecordBytes(header.words, storage_.program_unit) > slot_bytes) return SlotState::kCorrupt;
+
+  std::uint32_t crc = 0;
+  const std::uint32_t covered = kHeaderBytes + 2 * header.words;
+  for (std::uint32_t at = 0; at < covered;) {
+    const std::uint32_t count = covered - at < sizeof bytes ? covered - at : static_cast<std::uint32_t>(sizeof bytes);
+    if (!IsOk(storage_.Read(base + at, bytes, count))) return SlotState::kCorrupt;
+    crc = core::Crc32(bytes, count, crc);
+    at += count;
+  }
+  if (!IsOk(storage_.Read(base + covered, bytes, kCrcBytes)) || core::GetBytes32(bytes) != crc)
+    return SlotState::kCorrupt;
+  const std::uint32_t commit_at = base + CommitOffset(header.words, storage_.program_unit);
+  if (!IsOk(storage_.Read(commit_at, bytes, 4)) || core::GetBytes32(bytes) != kCommitWord) return SlotState::kCorrupt;
+
+  sequence_[slot] = header.sequence;
+  const bool ours = header.format == kFormat && header.schema == schema_ && header.words == words_;
+  return ours ? SlotState::kGood : SlotState::kOtherSchema;
+}
+
+// Reads the payload once more together with its checksum: what is handed out is what was checked.
+Status TableStore::CopyOut(int slot, std::uint16_t* out) const {
+  const std::uint32_t base = AddressOf(slot);
+  std::uint8_t bytes[kChunkBytes];
+  if (!IsOk(storage_.Read(base, bytes, kHeaderBytes))) return Status::kStorageFault;
+  const std::uint32_t header_crc = core::Crc32(bytes, kHeaderBytes);
+  for (std::uint32_t done = 0; done < words_;) {
+    const std::uint32_t room = static_cast<std::uint32_t>(sizeof bytes) / 2;
+    const std::uint32_t count = words_ - done < room ? words_ - done : room;
+    if (!IsOk(storage_.Read(base + kHeaderBytes + 2 * done, bytes, 2 * count))) return Status::kStorageFault;
+    for (std::uint32_t i = 0; i < count; ++i) out[done + i] = core::GetBytes16(bytes + 2 * i);
+    done += count;
+  }
+  if (!IsOk(storage_.Read(base + kHeaderBytes + 2 * words_, bytes, kCrcBytes))) return Status::kStorageFault;
+  return core::Crc32Words(out, words_, header_crc) == core::GetBytes32(bytes) ? Status::kOk : Status::kCorrupt;
+}
+
+// The slot in `wanted` state with the highest sequence (difference as a signed number, so that it may wrap); -1: none.
+int TableStore::Newest(SlotState wanted) const {
+  if (state_[0] == wanted && state_[1] == wanted)
+    return static_cast<std::int32_t>(sequence_[1] - sequence_[0]) > 0 ? 1 : 0;
+  if (state_[0] == wanted) return 0;
+  return state_[1] == wanted ? 1 : -1;
+}
+
+Status TableStore::Load(std::uint16_t* out) {
+  if (!Fits()) return Status::kWrongSize;
+  if (busy()) return Status::kBusy;
+  revocable_ = false;
+  for (int slot = 0; slot < kSlots; ++slot) state_[slot] = Inspect(slot);
+  for (int attempt = 0; attempt < kSlots; ++attempt) {
+    current_ = Newest(SlotState::kGood);
+    if (current_ < 0) break;
+    if (IsOk(CopyOut(current_, out))) return Status::kOk;
+    state_[current_] = SlotState::kCorrupt;
+  }
+  current_ = -1;
+  if (Newest(SlotState::kOtherSchema) >= 0) return Status::kWrongSchema;
+  return Newest(SlotState::kCorrupt) >= 0 ? Status::kCorrupt : Status::kBlank;
+}
+
+Status TableStore::Save(const std::uint16_t* words) {
+  if (busy()) return Status::kBusy;
+  if (!Fits()) return Status::kWrongSize;
+  // Keep the table in force; without one, the newest record of another schema.
+  const int keep = current_ >= 0 ? current_ : Newest(SlotState::kOtherSchema);
+  target_ = keep == 0 ? 1 : 0;
+  const bool whole[kSlots] = {state_[0] == SlotState::kGood || state_[0] == SlotState::kOtherSchema,
+                              state_[1] == SlotState::kGood || state_[1] == SlotState::kOtherSchema};
+  std::uint32_t newest = 0;
+  if (whole[0]) newest = sequence_[0];
+  if (whole[1] && (!whole[0] || static_cast<std::int32_t>(sequence_[1] - newest) > 0)) newest = sequence_[1];
+
+  PutHeader(header_, {kFormat, schema_, words_, newest + 1});
+  crc_ = core::Crc32Words(words, words_, core::Crc32(header_, kHeaderBytes));
+  source_ = words;
+  previous_ = current_;
+  revocable_ = false;
+  at_ = 0;
+  stage_ = Stage::kErase;
+  return Status::kOk;
+}
+
+Status TableStore::Revoke() {
+  if (busy()) return Status::kBusy;
+  if (!revocable_) return Status::kWrongOrder;
+  current_ = previous_;
+  result_ = Status::kOk;
+  stage_ = Stage::kRevoke;
+  return Status::kOk;
+}
+
+Status TableStore::Step() {
+  switch (stage_) {
+    case Stage::kIdle:
+      return Status::kOk;
+    case Stage::kErase:
+      return EraseNext();
+    case Stage::kProgram:
+      return ProgramNext();
+    case Stage::kVerify:
+      return VerifyNext();
+    case Stage::kCommit:
+      return Commit();
+    case Stage::kVerifyCommit:
+      return VerifyCommit();
+    case Stage::kRevoke:
+      return EraseTarget();
+  }
+  return Status::kOk;
+}
+
+// The record's bytes [first, first + count); beyond its end the erased value.
+void TableStore::FillBody(std::uint32_t first, std::uint8_t* bytes, std::uint32_t count) const {
+  const std::uint32_t payload_end = kHeaderBytes + 2 * words_;
+  std::uint8_t crc[kCrcBytes];
+  core::PutBytes32(crc, crc_);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t at = first + i;
+    if (at < kHeaderBytes) {
+      bytes[i] = header_[at];
+    } else if (at < payload_end) {
+      const std::uint16_t word = source_[(at - kHeaderBytes) / 2];
+      bytes[i] = static_cast<std::uint8_t>((at - kHeaderBytes) % 2 == 0 ? word >> 8 : word & 0xFF);
+    } else {
+      bytes[i] = at < payload_end + kCrcBytes ? crc[at - payload_end] : storage_.erased_value;
+    }
+  }
+}
+
+void TableStore::FillCommit(std::uint8_t* bytes) const {
+  for (std::uint32_t i = 0; i < RoundUp(4, storage_.program_unit); ++i) bytes[i] = storage_.erased_value;
+  core::PutBytes32(bytes, kCommitWord);
+}
+
+Status TableStore::EraseNext() {
+  state_[target_] = SlotState::kCorrupt;  // until the new record is whole
+  if (!IsOk(storage_.Erase(BaseOf(target_) + at_))) return Abandon();
+  ++at_;
+  if (at_ * storage_.sector_bytes >= RecordBytes(words_, storage_.program_unit)) {
+    stage_ = Stage::kProgram;
+    at_ = 0;
+  }
+  return Status::kBusy;
+}
+
+Status TableStore::ProgramNext() {
+  const std::uint32_t end = CommitOffset(words_, storage_.program_unit);
+  const std::uint32_t count = end - at_ < kChunkBytes ? end - at_ : kChunkBytes;
+  std::uint8_t bytes[kChunkBytes];
+  FillBody(at_, bytes, count);
+  if (!IsOk(storage_.Program(AddressOf(target_) + at_, bytes, count))) return Abandon();
+  at_ += count;
+  if (at_ == end) {
+    stage_ = Stage::kVerify;
+    at_ = 0;
+  }
+  return Status::kBusy;
+}
+
+Status TableStore::VerifyNext() {
+  const std::uint32_t end = CommitOffset(words_, storage_.program_unit);
+  const std::uint32_t count = end - at_ < kChunkBytes ? end - at_ : kChunkBytes;
+  std::uint8_t wanted[kChunkBytes];
+  std::uint8_t found[kChunkBytes];
+  FillBody(at_, wanted, count);
+  if (!IsOk(storage_.Read(AddressOf(target_) + at_, found, count))) return Abandon();
+  if (std::memcmp(wanted, found, count) != 0) return Abandon();
+  at_ += count;
+  if (at_ == end) stage_ = Stage::kCommit;
+  return Status::kBusy;
+}
+
+Status TableStore::Commit() {
+  std::uint8_t bytes[kChunkBytes];
+  FillCommit(bytes);
+  const std::uint32_t at = AddressOf(target_) + CommitOffset(words_, storage_.program_unit);
+  if (!IsOk(storage_.Program(at, bytes, RoundUp(4, storage_.program_unit)))) return Abandon();
+  stage_ = Stage::kVerifyCommit;
+  return Status::kBusy;
+}
+
+Status TableStore::VerifyCommit() {
+  std::uint8_t found[4];
+  const std::uint32_t at = AddressOf(target_) + CommitOffset(words_, storage_.program_unit);
+  if (!IsOk(storage_.Read(at, found, sizeof found)) || core::GetBytes32(found) != kCommitWord) return Abandon();
+  state_[target_] = SlotState::kGood;
+  sequence_[target_] = core::GetBytes32(header_ + 16);
+  current_ = target_;
+  revocable_ = true;
+  stage_ = Stage::kIdle;
+  return Status::kOk;
+}
+
+// A failed record must not come to life at the next power-up, even if only its commit word could not be read back.
+Status TableStore::Abandon() {
+  result_ = Status::kStorageFault;
+  stage_ = Stage::kRevoke;
+  return Status::kBusy;
+}
+
+// The header's sector is enough: a record without its header is no record.
+Status TableStore::EraseTarget() {
+  const bool erased = IsOk(storage_.Erase(BaseOf(target_)));
+  state_[target_] = erased ? SlotState::kBlank : SlotState::kCorrupt;
+  revocable_ = false;
+  stage_ = Stage::kIdle;
+  return erased ? result_ : Status::kStorageFault;
+}
+
+}  // namespace armcal::table

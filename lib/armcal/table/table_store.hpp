@@ -1,0 +1,88 @@
+// table - keeps one table of opaque words in two slots; old or new after a power cut, never mixed. Knows no meaning.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/core/status.hpp"
+#include "armcal/port/storage.hpp"
+#include "armcal/table/record.hpp"
+
+namespace armcal::table {
+
+// What lies in a slot. The numbers are readable as registers (SPEC.md).
+enum class SlotState : std::uint8_t {
+  kBlank = 0,
+  kGood = 1,
+  kOtherSchema = 2,  // whole, but of another schema, length or format: kept as long as there is another place to write
+  kCorrupt = 3,
+};
+
+// Save: erase the other slot, program it, read it back, then program the commit word; one storage operation a Step.
+// The slot that holds the table in force is never touched. All calls: background context.
+class TableStore {
+ public:
+  static constexpr int kSlots = 2;
+
+  // The words of a table of this schema are always `words` long.
+  TableStore(const port::Storage& storage, std::uint32_t schema, std::uint32_t words);
+
+  // Reads both slots and copies the good one of highest sequence to `out` [words]. At power-up only: reads everything
+  // at once. kOk; without a good record: kWrongSchema (another one is kept), kCorrupt, kBlank; kWrongSize: a record
+  // does not fit this storage. `out` may hold a rejected record's words unless kOk.
+  core::Status Load(std::uint16_t* out);
+
+  // Starts a save. `words` [words] must stay unchanged until Step no longer answers kBusy.
+  // kBusy: a save is running. kWrongSize: a record does not fit this storage.
+  core::Status Save(const std::uint16_t* words);
+
+  // Takes the last completed save back by erasing its slot: the table before it is in force again.
+  // kWrongOrder: no completed save to take back. kBusy: a save is running.
+  core::Status Revoke();
+
+  // One storage operation. kBusy: call again. kOk: nothing left to do. kStorageFault: the save failed; its slot has
+  // been erased and the table before it is still in force.
+  core::Status Step();
+
+  bool busy() const { return stage_ != Stage::kIdle; }
+  SlotState slot_state(int slot) const { return state_[slot]; }
+  std::uint32_t sequence() const { return current_ < 0 ? 0 : sequence_[current_]; }  // of the table in force, 0: none
+  int slot() const { return current_; }                                              // -1: none
+
+ private:
+  enum class Stage : std::uint8_t { kIdle, kErase, kProgram, kVerify, kCommit, kVerifyCommit, kRevoke };
+
+  bool Fits() const;
+  std::uint32_t BaseOf(int slot) const { return static_cast<std::uint32_t>(slot) * (storage_.sector_count / 2); }
+  std::uint32_t AddressOf(int slot) const { return BaseOf(slot) * storage_.sector_bytes; }
+  SlotState Inspect(int slot);
+  core::Status CopyOut(int slot, std::uint16_t* out) const;
+  int Newest(SlotState wanted) const;
+  void FillBody(std::uint32_t first, std::uint8_t* bytes, std::uint32_t count) const;
+  void FillCommit(std::uint8_t* bytes) const;
+  core::Status EraseNext();
+  core::Status ProgramNext();
+  core::Status VerifyNext();
+  core::Status Commit();
+  core::Status VerifyCommit();
+  core::Status EraseTarget();
+  core::Status Abandon();
+
+  port::Storage storage_;
+  std::uint32_t schema_;
+  std::uint32_t words_;
+  SlotState state_[kSlots] = {SlotState::kBlank, SlotState::kBlank};
+  std::uint32_t sequence_[kSlots] = {0, 0};
+  int current_ = -1;   // slot of the table in force
+  int previous_ = -1;  // what Revoke returns to
+
+  Stage stage_ = Stage::kIdle;
+  bool revocable_ = false;
+  int target_ = 0;
+  std::uint32_t at_ = 0;  // sector or byte offset inside the running stage
+  const std::uint16_t* source_ = nullptr;
+  std::uint8_t header_[kHeaderBytes] = {};
+  std::uint32_t crc_ = 0;
+  core::Status result_ = core::Status::kOk;  // what kRevoke ends with
+};
+
+}  // namespace armcal::table

@@ -1,0 +1,35 @@
+// port_linux - storage in a file that behaves like NOR flash; knows no record.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "armcal/port/storage.hpp"
+
+namespace armcal::port_linux {
+
+// Erase sets bytes to 0xFF, programming only clears bits. What an operation wrote survives the end of the process at
+// any instant; surviving the end of the machine is left to the file system.
+class FileStorage {
+ public:
+  FileStorage(std::uint32_t sector_count, std::uint32_t sector_bytes, std::uint32_t program_unit);
+  ~FileStorage();
+  FileStorage(const FileStorage&) = delete;
+  FileStorage& operator=(const FileStorage&) = delete;
+
+  // Opens the file; one that is missing or short is filled up as erased. kStorageFault: cannot be opened or written.
+  core::Status Open(const std::string& path);
+
+  // Valid while this object lives. Context: background.
+  port::Storage storage();
+
+ private:
+  static core::Status Read(void* self, std::uint32_t address, std::uint8_t* bytes, std::uint32_t count);
+  static core::Status Program(void* self, std::uint32_t address, const std::uint8_t* bytes, std::uint32_t count);
+  static core::Status Erase(void* self, std::uint32_t sector);
+
+  std::uint32_t sector_count_, sector_bytes_, program_unit_;
+  int file_ = -1;
+};
+
+}  // namespace armcal::port_linux

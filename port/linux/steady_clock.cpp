@@ -1,0 +1,24 @@
+// port_linux - the machine's monotonic time as the port's clock; knows no application.
+#include "port/linux/steady_clock.hpp"
+
+#include <chrono>
+
+namespace armcal::port_linux {
+
+namespace {
+
+std::uint32_t Ticks(void* context) {
+  return static_cast<std::atomic<std::uint32_t>*>(context)->load(std::memory_order_relaxed);
+}
+
+std::uint32_t Milliseconds(void*) {
+  using std::chrono::duration_cast;
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return static_cast<std::uint32_t>(duration_cast<std::chrono::milliseconds>(now).count());
+}
+
+}  // namespace
+
+port::Clock SteadyClock(std::atomic<std::uint32_t>& ticks) { return {&ticks, &Ticks, &Milliseconds}; }
+
+}  // namespace armcal::port_linux

@@ -1,0 +1,14 @@
+// port_linux - the machine's monotonic time as the port's clock; knows no application.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "armcal/port/clock.hpp"
+
+namespace armcal::port_linux {
+
+// Milliseconds of the machine; ticks as counted by the application in `ticks`, which outlives the clock.
+port::Clock SteadyClock(std::atomic<std::uint32_t>& ticks);
+
+}  // namespace armcal::port_linux

@@ -1,0 +1,169 @@
+// port_linux - poll() over a listener and four sockets; knows no protocol.
+#include "port/linux/tcp_server.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace armcal::port_linux {
+
+using core::Status;
+
+namespace {
+
+constexpr std::size_t kReceive = 1024;
+
+bool WouldWait() { return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR; }
+
+}  // namespace
+
+TcpServer::TcpServer(const ByteService& service, const port::Clock& clock, const TcpLimits& limits)
+    : service_(service), clock_(clock), limits_(limits) {}
+
+TcpServer::~TcpServer() {
+  for (Slot& slot : slots_) Close(slot);
+  if (listener_ >= 0) ::close(listener_);
+}
+
+Status TcpServer::Fail(Status status, const std::string& what) {
+  error_ = what + ": " + std::strerror(errno);
+  if (listener_ >= 0) ::close(listener_);
+  listener_ = -1;
+  return status;
+}
+
+Status TcpServer::Listen(const std::string& address, std::uint16_t port) {
+  if (listener_ >= 0) return Status::kWrongOrder;
+  const std::string name = address + ":" + std::to_string(port);
+  sockaddr_in where{};
+  where.sin_family = AF_INET;
+  where.sin_port = htons(port);
+  if (::inet_pton(AF_INET, address.c_str(), &where.sin_addr) != 1) {
+    errno = EINVAL;
+    return Fail(Status::kOutOfRange, name);
+  }
+  listener_ = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (listener_ < 0) return Fail(Status::kBadAddress, name);
+  const int on = 1;
+  ::setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  if (::bind(listener_, reinterpret_cast<sockaddr*>(&where), sizeof where) != 0 || ::listen(listener_, kSlots) != 0)
+    return Fail(errno == EADDRINUSE ? Status::kBusy : Status::kBadAddress, name);
+  socklen_t size = sizeof where;
+  if (::getsockname(listener_, reinterpret_cast<sockaddr*>(&where), &size) != 0) return Fail(Status::kBadAddress, name);
+  port_ = ntohs(where.sin_port);
+  return Status::kOk;
+}
+
+int TcpServer::connections() const {
+  int open = 0;
+  for (const Slot& slot : slots_) open += slot.socket >= 0;
+  return open;
+}
+
+Status TcpServer::Poll(int timeout_ms) {
+  if (listener_ < 0) return Status::kWrongOrder;
+  pollfd watched[1 + kSlots];
+  watched[0] = {listener_, POLLIN, 0};
+  for (int i = 0; i < kSlots; ++i) {
+    // A socket with an unsent reply is only written to, so a client that does not read cannot pile up requests here.
+    const short wanted = slots_[i].out.empty() ? POLLIN : POLLOUT;
+    watched[1 + i] = {slots_[i].socket, wanted, 0};
+  }
+  if (::poll(watched, 1 + kSlots, timeout_ms) > 0) {
+    for (int i = 0; i < kSlots; ++i)
+      if (slots_[i].socket >= 0 && watched[1 + i].revents != 0) Serve(i);
+    if (watched[0].revents != 0) Accept();
+  }
+  for (Slot& slot : slots_) CloseLate(slot);
+  return Status::kOk;
+}
+
+void TcpServer::Accept() {
+  const int socket = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (socket < 0) return;
+  for (int i = 0; i < kSlots; ++i) {
+    if (slots_[i].socket >= 0) continue;
+    const int on = 1;
+    ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    slots_[i] = Slot{};
+    slots_[i].socket = socket;
+    slots_[i].active_ms = clock_.Ms();
+    service_.open(service_.context, i);
+    return;
+  }
+  ::close(socket);
+}
+
+// Sends what waits, then receives and answers until the socket or the client's appetite is exhausted.
+void TcpServer::Serve(int index) {
+  Slot& slot = slots_[index];
+  if (!Send(slot)) return Close(slot);
+  if (slot.out.empty() && slot.in.empty()) Receive(slot);
+  if (!Answer(index)) return Close(slot);
+  if (slot.leaving && slot.in.empty() && slot.out.empty()) Close(slot);
+}
+
+void TcpServer::Receive(Slot& slot) {
+  std::uint8_t bytes[kReceive];
+  const ssize_t count = ::recv(slot.socket, bytes, sizeof bytes, 0);
+  if (count > 0) {
+    slot.in.assign(bytes, bytes + count);
+    slot.active_ms = clock_.Ms();
+  } else if (count == 0 || !WouldWait()) {
+    slot.leaving = true;
+  }
+}
+
+// Requests are taken one by one, and only while their replies find room in the socket.
+bool TcpServer::Answer(int index) {
+  Slot& slot = slots_[index];
+  std::size_t taken = 0;
+  while (taken < slot.in.size() && slot.out.empty()) {
+    std::size_t used = 0;
+    std::size_t reply_bytes = 0;
+    slot.out.resize(service_.max_reply);
+    const bool sound = service_.receive(service_.context, index, slot.in.data() + taken, slot.in.size() - taken, &used,
+                                        slot.out.data(), &reply_bytes);
+    slot.out.resize(reply_bytes);
+    taken += used;
+    const bool mid_frame = service_.mid_frame(service_.context, index);
+    if (mid_frame && !(slot.mid_frame && reply_bytes == 0)) slot.frame_ms = clock_.Ms();
+    slot.mid_frame = mid_frame;
+    if (!sound || !Send(slot)) return false;
+  }
+  slot.in.erase(slot.in.begin(), slot.in.begin() + static_cast<std::ptrdiff_t>(taken));
+  return true;
+}
+
+// False: the connection is gone.
+bool TcpServer::Send(Slot& slot) {
+  while (!slot.out.empty()) {
+    const ssize_t count = ::send(slot.socket, slot.out.data(), slot.out.size(), MSG_NOSIGNAL);
+    if (count < 0) return WouldWait();
+    slot.out.erase(slot.out.begin(), slot.out.begin() + count);
+    slot.active_ms = clock_.Ms();
+  }
+  return true;
+}
+
+void TcpServer::CloseLate(Slot& slot) {
+  if (slot.socket < 0) return;
+  const std::uint32_t now = clock_.Ms();
+  const bool idle = limits_.idle_ms != 0 && now - slot.active_ms >= limits_.idle_ms;
+  const bool partial = slot.mid_frame && now - slot.frame_ms >= limits_.partial_frame_ms;
+  if (idle || partial) Close(slot);
+}
+
+void TcpServer::Close(Slot& slot) {
+  if (slot.socket >= 0) ::close(slot.socket);
+  slot = Slot{};
+}
+
+}  // namespace armcal::port_linux

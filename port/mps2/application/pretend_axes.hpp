@@ -1,0 +1,55 @@
+// application - stands in for encoders and current sensors, which the board does not have; knows no filter.
+#pragma once
+
+#include "armcal/estimator/image.hpp"
+#include "armcal/feedforward/committed.hpp"
+#include "port/mps2/application/drive.hpp"
+
+namespace armcal::application {
+
+// Every axis swings in a sine of its own period, and the current is what the model's default parameters demand: an arm
+// that is exactly as the robot file says. A drive reads its hardware here instead.
+template <class Model>
+class PretendAxes {
+ public:
+  static constexpr int n = Model::kJoints;
+
+  PretendAxes() {
+    const auto table = estimator::DefaultTable<Model>();
+    float bodies[Model::kBodyParameters];
+    for (int k = 0; k < Model::kBodyParameters; ++k) bodies[k] = table.parameter[k].mean;
+    estimator::MapBodies<Model>(bodies, arm_.p + Model::kFront);
+    for (int k = 0; k < Model::kFront; ++k) arm_.p[k] = table.parameter[Model::kBodyParameters + k].mean;
+  }
+
+  // The sample of tick `tick` and the set-point that the axes follow. Context: tick.
+  void Read(std::uint32_t tick, model::RawSample<n>& raw, SetPoint<n>& set) {
+    constexpr float kAmplitude_rad = 0.4f, kTurn = 6.2831853f;
+    model::ModelInput<float, n> state = {};
+    for (int i = 0; i < n; ++i) {
+      const auto period = static_cast<std::uint32_t>(Model::kTickRate_Hz) * static_cast<std::uint32_t>(4 + i);
+      const float w_radps = kTurn * Model::kTickRate_Hz / static_cast<float>(period);
+      float s, c;
+      math::SinCos(kTurn * static_cast<float>(tick % period) / static_cast<float>(period), s, c);
+      state.q[i] = set.q[i] = kAmplitude_rad * s;
+      state.qd[i] = set.qd[i] = kAmplitude_rad * w_radps * c;
+      state.qdd[i] = set.qdd[i] = -kAmplitude_rad * w_radps * w_radps * s;
+    }
+    float tau_Nm[n];
+    feedforward::ModelTorque(arm_, state, rows_, tau_Nm);
+    raw.tick = tick;
+    for (int i = 0; i < n; ++i) {
+      const model::AxisInfo& axis = Model::kAxes[i];
+      raw.counts[i] = axis.zero_counts + static_cast<std::int32_t>(state.q[i] / axis.counts_to_rad);
+      raw.current[i] = static_cast<std::int16_t>(tau_Nm[i] / axis.lsb_to_Nm);
+      raw.flags[i] = model::kEnabled;
+      raw.temperature_degC[i] = 25.0f;
+    }
+  }
+
+ private:
+  feedforward::Committed<Model> arm_;
+  feedforward::Rows<Model> rows_ = {};
+};
+
+}  // namespace armcal::application

@@ -1,0 +1,71 @@
+// mps2 - vector table, reset and faults of a Cortex-M4F/M7; knows no peripheral and no room of armcal.
+#include <cstdint>
+
+#include "port/mps2/interrupts.hpp"
+
+extern "C" {
+extern std::uint32_t stack_top[], data_begin[], data_end[], data_load[], bss_begin[], bss_end[];  // sections.ld
+using Function = void (*)();
+extern Function init_array_begin[], init_array_end[];
+void Reset();
+void Fault();
+}
+
+namespace armcal::port::mps2 {
+FaultRecord fault_record;
+}  // namespace armcal::port::mps2
+
+namespace {
+
+volatile std::uint32_t& Register(std::uint32_t address) { return *reinterpret_cast<volatile std::uint32_t*>(address); }
+
+constexpr std::uint32_t kCoprocessorAccess = 0xE000ED88;
+constexpr std::uint32_t kConfigurableFault = 0xE000ED28, kHardFault = 0xE000ED2C;
+
+}  // namespace
+
+extern "C" {
+
+// GCC must not turn these loops into memcpy and memset: nothing of the image is there yet.
+__attribute__((optimize("no-tree-loop-distribute-patterns"), noreturn)) void Reset() {
+  Register(kCoprocessorAccess) = Register(kCoprocessorAccess) | (0xFu << 20);  // FPU on, before any float instruction
+  __asm volatile("dsb\n isb" ::: "memory");
+  const std::uint32_t* from = data_load;
+  for (std::uint32_t* to = data_begin; to != data_end; ++to) *to = *from++;
+  for (std::uint32_t* to = bss_begin; to != bss_end; ++to) *to = 0;
+  for (Function* constructor = init_array_begin; constructor != init_array_end; ++constructor) (*constructor)();
+  Application();
+}
+
+// Keeps what the core says about the fault for a debugger and stops. A drive takes the power stage's enable away here.
+__attribute__((noreturn)) void Fault() {
+  armcal::port::mps2::fault_record = {Register(kConfigurableFault), Register(kHardFault), 1};
+  __asm volatile("cpsid i");
+  for (;;) {
+  }
+}
+
+// Entry 0 is the initial stack pointer. Interrupts that nobody serves end in Fault.
+__attribute__((section(".vectors"), used)) const Function vectors[16 + 32] = {
+    reinterpret_cast<Function>(stack_top),
+    Reset,
+    Fault,  // NMI
+    Fault,  // hard fault
+    Fault,  // memory management
+    Fault,  // bus
+    Fault,  // usage
+    nullptr,
+    nullptr,
+    nullptr,
+    nullptr,
+    Fault,  // supervisor call
+    Fault,  // debug monitor
+    nullptr,
+    Fault,  // PendSV
+    TickInterrupt,
+    Fault,            // UART0 receive
+    Fault,            // UART0 transmit
+    SerialInterrupt,  // UART1 receive
+};
+
+}  // extern "C"

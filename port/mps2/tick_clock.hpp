@@ -1,0 +1,19 @@
+// mps2 - SysTick as control tick and clock; knows no application.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/port/clock.hpp"
+
+namespace armcal::port::mps2 {
+
+// Starts the tick interrupt. tick_rate_Hz: 2 to 1000000, an integer part of the core clock (25 MHz).
+void StartTick(std::uint32_t tick_rate_Hz);
+
+// One more tick has begun; call once in TickInterrupt. Returns its number.
+std::uint32_t CountTick();
+
+// Ticks, and milliseconds made of them.
+Clock TickClock();
+
+}  // namespace armcal::port::mps2

@@ -1,0 +1,17 @@
+// template - ticks and milliseconds for a new target; knows no application.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/port/clock.hpp"
+
+namespace armcal::port::target {
+
+inline constexpr std::uint32_t kTickRate_Hz = 1000;  // the rate of your control tick
+
+Clock TargetClock();
+
+// Your control tick calls this once, first of all. Returns the tick's number, which goes into RawSample::tick.
+std::uint32_t CountTick();
+
+}  // namespace armcal::port::target

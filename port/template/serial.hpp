@@ -1,0 +1,19 @@
+// template - a serial line for a new target: two rings between interrupt and background; knows no frame.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/port/serial.hpp"
+
+namespace armcal::port::target {
+
+Serial TargetSerial();
+
+// Your receive interrupt calls this with every byte. A byte that finds the ring full is lost, and its frame with it.
+void OnReceived(std::uint8_t byte);
+
+// Your transmit interrupt calls this for the next byte to send. False: nothing to send; disable the interrupt until
+// TargetSerial().Write has been called again.
+bool NextToSend(std::uint8_t& byte);
+
+}  // namespace armcal::port::target

@@ -1,0 +1,93 @@
+#!/usr/bin/env bash
+# tests - builds armcal and runs its tests; sets up whatever it needs.
+#   tests/run.sh [fast]   host build, unit and property tests
+#   tests/run.sh all      + end-to-end tests, the fast tests under sanitizers, both Cortex-M images
+#   tests/run.sh long     + the long tests
+# The last line is "N passed, M failed"; a CTest test, a build and a check count one each.
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+scope=${1:-fast}
+case $scope in
+  fast) labels='^fast$' ;;
+  all) labels='^(fast|all)$' ;;
+  long) labels='^(fast|all|long)$' ;;
+  *) sed -n '2,6p' "$0" >&2; exit 2 ;;
+esac
+
+jobs=$(nproc)
+((jobs > 2)) && jobs=2
+passed=0
+failed=0
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+say() { echo "== $*"; }
+finish() { echo "$passed passed, $failed failed"; exit $((failed > 0)); }
+
+# step NAME COMMAND...: one thing that can pass or fail; its output is shown only when it fails.
+step() {
+  local name=$1 start=$SECONDS
+  shift
+  if "$@" >"$log" 2>&1; then
+    passed=$((passed + 1))
+    say "$name: ok ($((SECONDS - start)) s)"
+  else
+    failed=$((failed + 1))
+    tail -n 60 "$log"
+    say "$name: FAILED"
+    return 1
+  fi
+}
+
+# run_ctest NAME BUILD_FOLDER LABELS: adds CTest's own counts.
+run_ctest() {
+  local name=$1 start=$SECONDS results=$2/Testing/results.xml
+  rm -f "$results"
+  ctest --test-dir "$2" -L "$3" -j "$jobs" --output-on-failure --no-tests=error --output-junit Testing/results.xml \
+    --test-output-size-passed 1000000 >"$log" 2>&1
+  local status=$? total bad skipped
+  count() { grep -om1 "\b$1=\"[0-9]*\"" "$results" 2>/dev/null | tr -dc 0-9; }
+  total=$(count tests)
+  bad=$(count failures)
+  if [[ -z $total || -z $bad ]] || ((status != 0 && bad == 0)); then total=1 bad=1; fi
+  passed=$((passed + total - bad))
+  failed=$((failed + bad))
+  skipped=$(sed -n 's/^\[  SKIPPED \] \([A-Za-z0-9_.\/]*\) (.*/\1/p' "$results" 2>/dev/null | sort -u | tr '\n' ' ')
+  [[ -z $skipped ]] || say "skipped inside tests: $skipped"
+  if ((bad > 0)); then
+    tail -n 200 "$log"
+    say "$name: $bad of $total FAILED"
+  else
+    say "$name: $total ok ($((SECONDS - start)) s)"
+  fi
+}
+
+configure_and_build() { cmake --preset "$1" && cmake --build --preset "$1" -j "$jobs" "${@:2}"; }
+
+step "host packages" toolchains/install.sh host || finish
+
+if [[ -z ${ARMCAL_DATA:-} && -d ../shared/data ]]; then
+  ARMCAL_DATA=$(cd ../shared/data && pwd)
+fi
+if [[ -n ${ARMCAL_DATA:-} && -d $ARMCAL_DATA ]]; then
+  export ARMCAL_DATA
+  say "measured logs: $ARMCAL_DATA"
+else
+  say "no measured logs (ARMCAL_DATA is not set): tests on them are skipped"
+fi
+
+say "building build/host"
+step "build host" configure_and_build host || finish
+run_ctest "tests ($scope)" build/host "$labels"
+
+if [[ $scope != fast ]]; then
+  step "cross packages" toolchains/install.sh cross
+  for image in cortex-m4f cortex-m7; do step "image $image" configure_and_build "$image"; done
+
+  say "building the fast tests with sanitizers"
+  if step "build host-asan" configure_and_build host-asan --target fast_tests; then
+    run_ctest "tests with sanitizers" build/host-asan '^fast$'
+  fi
+fi
+finish

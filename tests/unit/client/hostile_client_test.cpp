@@ -1,0 +1,208 @@
+// client - raw sockets that break the rules: bad headers, halves, floods, clients that do not read; others are served.
+#include <gtest/gtest.h>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "tests/unit/client/test_server.hpp"
+
+namespace {
+
+using namespace armcal;
+using Bytes = std::vector<std::uint8_t>;
+
+class RawClient {
+ public:
+  explicit RawClient(int port) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in where{};
+    where.sin_family = AF_INET;
+    where.sin_port = htons(static_cast<std::uint16_t>(port));
+    where.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const int on = 1;
+    ::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    connected_ = ::connect(socket_, reinterpret_cast<sockaddr*>(&where), sizeof where) == 0;
+  }
+  ~RawClient() { ::close(socket_); }
+  RawClient(const RawClient&) = delete;
+
+  bool connected() const { return connected_; }
+  void Send(const Bytes& bytes) { ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL); }
+  // Bytes that the socket takes without waiting.
+  ssize_t SendSome(const Bytes& bytes) {
+    return ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  }
+  void HalfClose() { ::shutdown(socket_, SHUT_WR); }
+  void Reset() {
+    const linger now = {1, 0};
+    ::setsockopt(socket_, SOL_SOCKET, SO_LINGER, &now, sizeof now);
+  }
+
+  // Up to `count` bytes; fewer if the server closes (or says nothing for ten seconds).
+  Bytes Receive(std::size_t count) {
+    Bytes bytes;
+    while (bytes.size() < count) {
+      pollfd watched = {socket_, POLLIN, 0};
+      std::uint8_t part[512];
+      if (::poll(&watched, 1, 10000) <= 0) break;
+      const ssize_t got = ::recv(socket_, part, std::min(sizeof part, count - bytes.size()), 0);
+      if (got <= 0) break;
+      bytes.insert(bytes.end(), part, part + got);
+    }
+    return bytes;
+  }
+  bool Closed() {
+    std::uint8_t byte;
+    pollfd watched = {socket_, POLLIN, 0};
+    return ::poll(&watched, 1, 10000) > 0 && ::recv(socket_, &byte, 1, 0) <= 0;
+  }
+
+ private:
+  int socket_;
+  bool connected_ = false;
+};
+
+const Bytes kProbe = {0, 7, 0, 0, 0, 6, 1, 4, 0, 14, 0, 2};
+const Bytes kAnswer = {0, 7, 0, 0, 0, 7, 1, 4, 4, 0x12, 0x34, 0x56, 0x78};
+
+TEST(TcpServer, Requests_SentInOnePieceOrByteByByte_AreAllAnswered) {
+  test::TestServer server;
+  RawClient client(server.port());
+  Bytes three;
+  for (int i = 0; i < 3; ++i) three.insert(three.end(), kProbe.begin(), kProbe.end());
+  client.Send(three);
+  EXPECT_EQ(client.Receive(39).size(), 39u);
+  for (const std::uint8_t byte : kProbe) client.Send({byte});
+  EXPECT_EQ(client.Receive(13), kAnswer);
+}
+
+TEST(TcpServer, MalformedHeader_ClosesThatConnectionOnly) {
+  test::TestServer server;
+  RawClient good(server.port());
+  for (const Bytes& header : {Bytes{0, 1, 0, 1, 0, 6, 1, 4, 0, 14, 0, 2}, Bytes{0, 1, 0, 0, 0, 0, 1, 4},
+                              Bytes{0, 1, 0, 0, 0, 1, 1, 4}, Bytes{0, 1, 0, 0, 0, 255, 1, 4},
+                              Bytes{0, 1, 0, 0, 255, 255, 1, 4}, Bytes{'G', 'E', 'T', ' ', '/', ' ', 'H', 'T'}}) {
+    RawClient bad(server.port());
+    bad.Send(header);
+    EXPECT_TRUE(bad.Closed());
+  }
+  good.Send(kProbe);
+  EXPECT_EQ(good.Receive(13), kAnswer);
+}
+
+TEST(TcpServer, DeclaredLength_DecidesWhereAFrameEnds) {
+  test::TestServer server;
+  RawClient client(server.port());
+  // function 4 with one byte too many: exception 03, and the stream stays in step
+  client.Send({0, 9, 0, 0, 0, 7, 1, 4, 0, 14, 0, 2, 0xEE});
+  EXPECT_EQ(client.Receive(9), (Bytes{0, 9, 0, 0, 0, 3, 1, 0x84, 3}));
+  // function 7 has no data; servers that guess lengths stumble over it
+  client.Send({0, 10, 0, 0, 0, 2, 1, 7});
+  EXPECT_EQ(client.Receive(9), (Bytes{0, 10, 0, 0, 0, 3, 1, 0x87, 1}));
+  client.Send(kProbe);
+  EXPECT_EQ(client.Receive(13), kAnswer);
+}
+
+TEST(TcpServer, HalfAFrame_IsClosedAfterTwoSeconds_AndDelaysNobody) {
+  test::TestServer server;
+  RawClient half(server.port()), good(server.port());
+  half.Send({0, 1, 0, 0, 0, 6, 1});
+  good.Send(kProbe);
+  EXPECT_EQ(good.Receive(13), kAnswer);
+  server.Jump(2000);
+  EXPECT_TRUE(half.Closed());
+  good.Send(kProbe);
+  EXPECT_EQ(good.Receive(13), kAnswer);
+}
+
+TEST(TcpServer, HalfClose_StillGetsItsReply) {
+  test::TestServer server;
+  RawClient client(server.port());
+  client.Send(kProbe);
+  client.HalfClose();
+  EXPECT_EQ(client.Receive(13), kAnswer);
+  EXPECT_TRUE(client.Closed());
+}
+
+Bytes Flood(int requests) {
+  const Bytes read = {0, 1, 0, 0, 0, 6, 1, 3, 0x20, 0, 0, 125};
+  Bytes flood;
+  for (int i = 0; i < requests; ++i) flood.insert(flood.end(), read.begin(), read.end());
+  return flood;
+}
+
+// The late client sends portions that the server takes whole, until the replies to one of them no longer fit into the
+// sockets: from then on only room to send can wake the server up.
+TEST(TcpServer, ClientThatReadsLate_GetsEveryReply) {
+  constexpr std::uint32_t kPortion = 80;
+  test::TestServer server;
+  RawClient late(server.port());
+  auto good = server.Connect();
+  const Bytes portion = Flood(kPortion);
+  std::uint32_t before = good.ReadInputU32(link::reg::kStatus + 22), sent = 0;
+  for (bool stuck = false; !stuck && sent < 200 * 1000;) {
+    late.Send(portion);
+    sent += kPortion;
+    stuck = true;
+    for (std::uint32_t asked = 1; asked <= 20 && stuck; ++asked)
+      stuck = good.ReadInputU32(link::reg::kStatus + 22) - before - asked < kPortion;
+    before = good.ReadInputU32(link::reg::kStatus + 22);
+  }
+  const std::size_t reply_bytes = std::size_t{sent} * (9 + 250);
+  EXPECT_EQ(late.Receive(reply_bytes).size(), reply_bytes);
+}
+
+TEST(TcpServer, ClientThatDoesNotRead_StallsOnlyItself) {
+  test::TestServer server;
+  RawClient deaf(server.port()), good(server.port());
+  const Bytes flood = Flood(2000);
+  std::size_t sent = 0;
+  for (int round = 0; round < 200; ++round) {
+    const ssize_t part = deaf.SendSome(flood);
+    if (part > 0) sent += static_cast<std::size_t>(part);
+    good.Send(kProbe);
+    ASSERT_EQ(good.Receive(13), kAnswer) << "round " << round;
+  }
+  EXPECT_GT(sent, 24000u);
+  EXPECT_TRUE(test::Await([&] {
+    server.Jump(1000);
+    return server.connections() == 0;
+  })) << "the deaf connection is idle, too";
+}
+
+TEST(TcpServer, FifthConnection_IsTurnedAway_AndSlotsAreReused) {
+  test::TestServer server;
+  {
+    RawClient a(server.port()), b(server.port()), c(server.port()), d(server.port());
+    d.Send(kProbe);
+    EXPECT_EQ(d.Receive(13), kAnswer);
+    RawClient e(server.port());
+    EXPECT_TRUE(e.Closed());
+    a.Send(kProbe);
+    EXPECT_EQ(a.Receive(13), kAnswer);
+  }
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_TRUE(test::Await([&] { return server.connections() < 4; }));
+    RawClient client(server.port());
+    client.Send(kProbe);
+    ASSERT_EQ(client.Receive(13), kAnswer) << i;
+    if (i % 2 == 0) client.Reset();
+  }
+}
+
+TEST(TcpServer, PortInUse_IsSaidClearly) {
+  test::TestServer server;
+  port_linux::TcpServer second({}, {nullptr, nullptr, nullptr});
+  EXPECT_EQ(second.Listen("127.0.0.1", static_cast<std::uint16_t>(server.port())), core::Status::kBusy);
+  EXPECT_NE(second.error().find("in use"), std::string::npos) << second.error();
+  EXPECT_EQ(second.Poll(0), core::Status::kWrongOrder);
+  EXPECT_EQ(second.Listen("localhost?", 0), core::Status::kOutOfRange);
+}
+
+}  // namespace

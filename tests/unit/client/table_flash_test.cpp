@@ -1,0 +1,150 @@
+// client - flashing over the wire: success, every refusal, a lying drive, and a connection cut at any byte.
+#include "host_sim/client/table_flash.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "host_sim/client/drive_client.hpp"
+#include "tests/unit/client/cutting_proxy.hpp"
+#include "tests/unit/client/test_server.hpp"
+
+namespace {
+
+using namespace armcal;
+using client::FlashTable;
+using client::RefusedError;
+using core::Status;
+using test::MakeTable;
+namespace reg = link::reg;
+using Words = std::vector<std::uint16_t>;
+
+Status RefusalOf(client::DriveClient& drive, const Words& words) {
+  try {
+    FlashTable(drive, words);
+  } catch (const RefusedError& error) {
+    return error.status;
+  }
+  return Status::kOk;
+}
+
+TEST(Flash, OfAGoodTable_IsActiveStoredAndReadBack) {
+  test::TestServer server;
+  auto drive = server.Connect();
+  double progress = 0;
+  const client::FlashReport report = FlashTable(drive, MakeTable(1), [&](double share) { progress = share; });
+  EXPECT_EQ(progress, 1.0);
+  EXPECT_EQ(report.crc, core::Crc32Words(MakeTable(1).data(), test::kTableWords));
+  EXPECT_EQ(report.store_sequence, 1u);
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(1));
+  EXPECT_EQ(FlashTable(drive, MakeTable(2)).store_sequence, 2u);
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(2));
+  EXPECT_EQ(drive.ReadStatus().table_status, Status::kOk);
+}
+
+TEST(Flash, Refused_SaysWhyAndLeavesTheOldTable) {
+  test::TestServer server;
+  auto drive = server.Connect();
+  FlashTable(drive, MakeTable(1));
+  EXPECT_EQ(RefusalOf(drive, MakeTable(2, 0x11112222)), Status::kWrongSchema);
+  EXPECT_EQ(RefusalOf(drive, Words(test::kTableWords - 2, 0)), Status::kWrongSchema);
+  Words shorter = MakeTable(2);
+  shorter.pop_back();
+  EXPECT_EQ(RefusalOf(drive, shorter), Status::kWrongSize);
+  Words unphysical = MakeTable(2);
+  unphysical[5] = test::kBadPhysics;
+  EXPECT_EQ(RefusalOf(drive, unphysical), Status::kUnphysical);
+  server.drive.application.enabled = true;
+  EXPECT_EQ(RefusalOf(drive, MakeTable(2)), Status::kAxisEnabled);
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(1));
+  EXPECT_EQ(drive.ReadStatus().store_sequence, 1u);
+  server.drive.application.enabled = false;
+  EXPECT_EQ(RefusalOf(drive, MakeTable(2)), Status::kOk);
+}
+
+TEST(Flash, WithAnAxisEnabledDuringTheSave_FailsAndIsTakenBack) {
+  std::atomic<test::TestServer*> running{nullptr};
+  test::TestServer server([&](test::TestDevice& drive) {
+    // the drive's own patience is over as soon as everything is stored
+    if (running != nullptr && drive.store.sequence() == 2) running.load()->Jump(1000);
+  });
+  auto drive = server.Connect();
+  FlashTable(drive, MakeTable(1));
+  server.drive.application.enable_on_save = true;
+  running = &server;
+  EXPECT_EQ(RefusalOf(drive, MakeTable(2)), Status::kAxisEnabled);
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(1));
+  EXPECT_EQ(drive.ReadStatus().store_sequence, 1u);
+}
+
+TEST(Flash, WithAWrongChecksum_IsRefusedAtTheCheck) {
+  test::TestServer server;
+  auto drive = server.Connect();
+  drive.WriteU32(reg::kUnlock, reg::kUnlockKey);
+  Words command(reg::kCommandCount);
+  core::PutU32(command.data(), 1);
+  core::PutU32(command.data() + 2, reg::kOpen);
+  core::PutU32(command.data() + 4, test::kSchema);
+  command[6] = test::kTableWords;
+  drive.Write(reg::kCommand, command);
+  const Words part(10, 3);
+  drive.Write(reg::kStaged + 50, part);
+  EXPECT_EQ(drive.ReadHolding(reg::kStaged + 50, 10), part);
+  core::PutU32(command.data(), 2);
+  core::PutU32(command.data() + 2, reg::kCheck);
+  core::PutU32(command.data() + 8, 0x12345678);
+  try {
+    drive.Write(reg::kCommand, command);
+    FAIL();
+  } catch (const RefusedError& error) {
+    EXPECT_EQ(error.status, Status::kBadCrc);
+    EXPECT_EQ(error.exception, 4);
+  }
+}
+
+TEST(Flash, AbandonedHalfWay_TimesOut) {
+  test::TestServer server;
+  auto drive = server.Connect();
+  drive.WriteU32(reg::kUnlock, reg::kUnlockKey);
+  Words command(reg::kCommandCount);
+  core::PutU32(command.data(), 1);
+  core::PutU32(command.data() + 2, reg::kOpen);
+  core::PutU32(command.data() + 4, test::kSchema);
+  command[6] = test::kTableWords;
+  drive.Write(reg::kCommand, command);
+  EXPECT_EQ(drive.ReadStatus().transaction_state, 1);
+  server.Jump(link::TableTransaction::kStageTimeout_ms);
+  EXPECT_TRUE(test::Await([&] { return drive.ReadStatus().transaction_state == 0; }));
+  EXPECT_EQ(drive.ReadStatus().transaction_status, Status::kTimeout);
+}
+
+TEST(Flash, WhenTheDriveReadsBackSomethingElse_IsAVerifyError) {
+  test::TestServer server([](test::TestDevice& drive) {
+    if (drive.transaction.state() == link::TransactionState::kActive) drive.active[200] = 0xBEEF;  // the planted fault
+  });
+  auto drive = server.Connect();
+  EXPECT_THROW(FlashTable(drive, MakeTable(1)), client::VerifyError);
+}
+
+// The connection is cut once, after every possible number of reply bytes: the client comes back and finishes, and each
+// table is adopted exactly once.
+TEST(Flash, WithTheConnectionCutAtAnyByte_EndsWithTheNewTable) {
+  test::TestServer server;
+  test::CuttingProxy proxy(server.port());
+  std::size_t total = 0;
+  {
+    client::DriveClient drive("127.0.0.1", proxy.port());
+    FlashTable(drive, MakeTable(0));
+    total = proxy.forwarded();
+  }
+  int flashes = 1;
+  for (std::size_t cut = 0; cut < total; cut += cut < 100 ? 1 : 23) {
+    proxy.CutAfter(cut);
+    client::DriveClient drive("127.0.0.1", proxy.port());
+    ASSERT_NO_THROW(FlashTable(drive, MakeTable(++flashes))) << "cut after " << cut << " of " << total;
+    ASSERT_EQ(client::ReadActiveTable(drive), MakeTable(flashes));
+    ASSERT_EQ(server.drive.application.adoptions, flashes);
+  }
+}
+
+}  // namespace

@@ -1,0 +1,81 @@
+// estimator - both filters on a generated six-axis model, float32 against the dense double oracle; knows no effect.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "armcal/filter/forgetting_filter.hpp"
+#include "armcal/filter/kalman_filter.hpp"
+#include "codegen/generated/er20_like/model.hpp"
+#include "tests/unit/estimator/oracle.hpp"
+
+namespace armcal::estimator {
+namespace {
+using namespace test;  // NOLINT: the bench of these tests
+using Model = generated::Er20Like;
+using Sample = model::Sample<6>;
+
+// A truth drawn from the table's own prior.
+Vector DrawTruth(const Table<Model>& table, const Vector& b0) {
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  const Matrix p = PriorCovariance<Model>(table);
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(p);
+  const Vector z = Vector::NullaryExpr(Model::kColumns, [&] { return normal(random); });
+  return b0 + eigen.eigenvectors() * (eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * z);
+}
+
+std::vector<Sample> Record(const Vector& truth, int count) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  std::vector<Sample> samples(count);
+  const double tone[6] = {0.9, 1.1, 1.3, 1.9, 2.3, 2.9}, size[6] = {1.0, 0.5, 0.7, 0.9, 0.9, 1.2};
+  for (int k = 0; k < count; ++k) {
+    Sample& s = samples[k];
+    s.tick = k * Model::kSampleTicks;
+    const double t = s.tick * 1e-3;
+    for (int i = 0; i < 6; ++i) {
+      double motion[3] = {};
+      for (int h = 1; h <= 3; ++h) {
+        const double w = h * tone[i], a = size[i] / (h * h), phase = 0.7 * i + h;
+        motion[0] += a * std::sin(w * t + phase);
+        motion[1] += a * w * std::cos(w * t + phase);
+        motion[2] -= a * w * w * std::sin(w * t + phase);
+      }
+      s.q[i] = static_cast<float>(motion[0]);
+      s.qd[i] = static_cast<float>(motion[1]);
+      s.qdd[i] = static_cast<float>(motion[2]);
+      s.flags[i] = static_cast<std::uint8_t>(model::kValid |
+                                             (std::abs(s.qd[i]) > Model::kAxes[i].v_min_radps ? model::kMoving : 0));
+    }
+    const Vector tau = Regressor<Model>(s) * truth;
+    for (int i = 0; i < 6; ++i) s.tau[i] = static_cast<float>(tau(i) + Model::kAxes[i].sigma_Nm * normal(random));
+  }
+  return samples;
+}
+
+template <class Filter>
+class SixAxis : public testing::Test {};
+using Filters = testing::Types<filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>>;
+TYPED_TEST_SUITE(SixAxis, Filters);
+
+TYPED_TEST(SixAxis, FortySeconds_AreTheBatchSolutionWithinATenthOfSigma) {
+  auto host = std::make_unique<Host<Model, TypeParam>>();
+  for (float& lambda : host->table.forgetting) lambda = 1;
+  for (model::ParameterEntry& p : host->table.parameter) p.process_noise = 0;
+  ASSERT_EQ(host->Adopt(), core::Status::kOk);
+  const Vector truth = DrawTruth(host->table, host->b0());
+  const std::vector<Sample> samples = Record(truth, 40 * 125);
+  for (const Sample& s : samples) ASSERT_EQ(host->Feed(s), core::Status::kOk);
+  const Oracle<Model> oracle(host->table, host->b0(), samples);
+  const Estimates<Model>& e = host->Read();
+  EXPECT_LT(oracle.Distance(e.value), 0.1);
+  double square = 0;
+  for (const int k : oracle.active) {
+    EXPECT_NEAR(e.sd[k] / oracle.sd(k), 1, 0.02) << k;
+    square += std::pow((e.value[k] - truth(k)) / e.sd[k], 2) / static_cast<double>(oracle.active.size());
+  }
+  EXPECT_LT(square, 2);  // 52 normal squares: mean 1, deviation 0.2
+}
+
+}  // namespace
+}  // namespace armcal::estimator

@@ -1,0 +1,152 @@
+// excitation tests - the search: its gradient, its limits, and that it beats chance.
+#include "host_sim/excitation/optimise.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/excitation/peaks.hpp"
+#include "tests/unit/excitation/arms.hpp"
+#include "tests/unit/io/temporary_folder.hpp"
+
+namespace armcal::excitation {
+namespace {
+
+using Eigen::VectorXd;
+
+OptimiseSettings Searches(int starts) {
+  OptimiseSettings settings;
+  settings.starts = starts;
+  settings.seconds = 1e6;
+  return settings;
+}
+
+codegen::Signals OnCheckGrid(const Fourier& series) { return series.At(test::OnePeriod(10000)); }
+
+TEST(Objective, Gradient_IsTheDifferenceQuotientOfTheValue) {
+  for (const char* name : {"er20_like", "two_link", "emps"}) {
+    codegen::Robot robot = test::RobotFile(name);
+    for (codegen::Joint& j : robot.joint) j.torque_limit_Nm /= 5;  // so that the torque's penalty takes part
+    const codegen::Model model = test::Arm(robot);
+    const Observation observation(model);
+    Objective objective(observation, {}, 0.6);
+    VectorXd gradient, unused;
+    const VectorXd u = VectorXd::LinSpaced(objective.size(), 0.1, 20).array().sin();
+    const double value = objective(u, gradient);
+    ASSERT_GT(value, 5) << "the penalties should take part";
+    const double d = 1e-6;
+    for (int k = 0; k < u.size(); k += 3) {
+      const VectorXd shift = d * VectorXd::Unit(u.size(), k);
+      const double quotient = (objective(u + shift, unused) - objective(u - shift, unused)) / (2 * d);
+      EXPECT_NEAR(gradient[k], quotient, 1e-5 * gradient.norm()) << name << " unknown " << k;
+    }
+  }
+}
+
+TEST(Objective, WithoutPenalties_IsCloseAboveTheLogarithmOfTheConditionNumber) {
+  const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
+  const Observation observation(model);
+  Objective objective(observation, {}, 1e3);
+  VectorXd gradient;
+  const VectorXd u = VectorXd::LinSpaced(objective.size(), 0.1, 20).array().sin();
+  const double value = objective(u, gradient);
+  const double exact = std::log(observation.ConditionNumber(objective.Series(u).At(test::OnePeriod(80))));
+  EXPECT_GE(value, exact);
+  EXPECT_LE(value, exact + 2 * std::log(52.0) / 10);  // p = 10: each sum has at most 52 terms of its largest
+}
+
+TEST(ScaleToLimits, OfASeriesThatBreaksThem_MeetsTheTightestOne) {
+  const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
+  const Observation observation(model);
+  Fourier series = test::PublishedSeries().Scaled(3);
+  ASSERT_GT(LargestShare(FindPeaks(observation, OnCheckGrid(series))), 1.5);
+  ASSERT_TRUE(ScaleToLimits(observation, 0.9, series));
+  EXPECT_NEAR(LargestShare(FindPeaks(observation, OnCheckGrid(series))), 0.9, 1e-6);
+}
+
+TEST(ScaleToLimits, WhereTorqueIsTheTightestLimit_MeetsIt) {
+  codegen::Robot robot = test::RobotFile("er20_like");
+  robot.joint[2].torque_limit_Nm = 250;
+  const codegen::Model model = test::Arm(robot);
+  const Observation observation(model);
+  Fourier series = test::PublishedSeries();
+  ASSERT_TRUE(ScaleToLimits(observation, 0.95, series));
+  const auto peaks = FindPeaks(observation, OnCheckGrid(series));
+  EXPECT_LE(LargestShare(peaks), 0.95);
+  EXPECT_GT(peaks[2].torque_share, 0.9);
+}
+
+TEST(ScaleToLimits, OfASeriesThatKeepsThem_ChangesNothing) {
+  const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
+  Fourier series = test::PublishedSeries().Scaled(0.5);
+  const Eigen::MatrixXd before = series.coefficient;
+  ASSERT_TRUE(ScaleToLimits(Observation(model), 0.95, series));
+  EXPECT_EQ(series.coefficient, before);
+}
+
+TEST(Optimise, KeepsEveryLimitWithItsMarginOnTheCheckGrid) {
+  const codegen::Model model = test::Arm(test::RobotFile("two_link"));
+  const Observation observation(model);
+  OptimiseSettings settings = Searches(3);
+  settings.margin = 0.2;
+  const Optimum best = Optimise(observation, settings);
+  EXPECT_LE(LargestShare(FindPeaks(observation, OnCheckGrid(best.series))), 0.8 + 1e-6);
+  EXPECT_EQ(best.starts, 3);
+}
+
+TEST(Optimise, OnASixAxisArm_BeatsTheBestOfFiftyRandomSeries) {
+  const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
+  const Observation observation(model);
+  const OptimiseSettings settings = Searches(2);
+  double best_random = INFINITY;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    Fourier series;
+    if (RandomSeries(observation, settings, seed, series))
+      best_random = std::min(best_random, PeriodCondition(observation, series));
+  }
+  const Optimum best = Optimise(observation, settings);
+  EXPECT_LT(best.condition, 0.7 * best_random);
+  EXPECT_LT(best.condition, 6);  // single searches end between 4.2 and 5.5
+  EXPECT_DOUBLE_EQ(best.condition, PeriodCondition(observation, best.series));
+}
+
+TEST(Optimise, WithTheSameSeedAndStarts_FindsTheSameOnAnyNumberOfThreads) {
+  const codegen::Model model = test::Arm(test::RobotFile("two_link"));
+  const Observation observation(model);
+  OptimiseSettings settings = Searches(4);
+  settings.threads = 1;
+  const Optimum one = Optimise(observation, settings);
+  settings.threads = 3;
+  EXPECT_EQ(one.series.coefficient, Optimise(observation, settings).series.coefficient);
+  settings.seed = 2;
+  EXPECT_NE(one.series.coefficient, Optimise(observation, settings).series.coefficient);
+}
+
+TEST(Optimise, StoppedBeforeItBegins_StillReturnsASeriesWithinTheLimits) {
+  const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
+  const Observation observation(model);
+  const std::atomic<bool> stop{true};
+  OptimiseSettings settings;
+  settings.stop = &stop;
+  const Optimum best = Optimise(observation, settings);
+  EXPECT_LE(LargestShare(FindPeaks(observation, OnCheckGrid(best.series))), 0.95 + 1e-6);
+}
+
+TEST(Optimise, ForMotorsThatCannotHoldTheArm_SaysSo) {
+  codegen::Robot robot = test::RobotFile("two_link");
+  robot.joint[0].torque_limit_Nm = 0.1;
+  const codegen::Model model = test::Arm(robot);
+  const Observation observation(model);
+  EXPECT_NE(io::test::ErrorOf([&] { Optimise(observation, Searches(2)); }).find("limits"), std::string::npos);
+}
+
+TEST(Optimise, ForARobotWithoutPrior_IgnoresTorqueLimits) {
+  codegen::Robot robot = test::RobotFile("emps");
+  robot.joint[0].torque_limit_Nm = 1e-3;
+  const codegen::Model model = test::Arm(robot);
+  EXPECT_LT(Optimise(Observation(model), Searches(4)).condition, 3);
+}
+
+}  // namespace
+}  // namespace armcal::excitation

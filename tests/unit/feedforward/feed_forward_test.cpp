@@ -1,0 +1,147 @@
+// feedforward - set-point torque against the same sum in double; knows no table.
+#include "armcal/feedforward/feed_forward.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "tests/unit/estimator/two_link_model.hpp"
+
+namespace armcal::feedforward {
+namespace {
+
+using test::TwoLink;
+using Set = Committed<TwoLink>;
+using core::Status;
+
+Set Example(std::uint32_t generation) {
+  Set c;
+  c.valid = true;
+  c.generation = generation;
+  const float p[TwoLink::kColumns] = {8, 5, 0, 4, 2, 0, 0, 3.0f, 4.5f, 0.2f, 1.0f, -0.1f, 0.25f, 0.3f, 0};
+  std::copy(p, p + TwoLink::kColumns, c.p);
+  c.eta[0] = 0.1f;
+  for (int i = 0; i < 2; ++i) {
+    c.limit_Nm[i] = 500.0f;
+    c.v_min_radps[i] = 0.01f;
+    c.torque_scale[i] = 1.0f;
+  }
+  return c;
+}
+
+struct FeedForwardTest : testing::Test {
+  std::unique_ptr<FeedForward<TwoLink>> ff = std::make_unique<FeedForward<TwoLink>>();
+  float q[2] = {0.4f, -0.9f}, qd[2] = {0.7f, -1.1f}, qdd[2] = {2.0f, 3.0f}, temp[2] = {30, 30}, tau[2] = {-1, -1};
+  Status Evaluate() { return ff->Evaluate(q, qd, qdd, temp, 0.0f, tau); }
+  double Exact(const Set& c, int joint) const {
+    model::ModelInput<double, 2> x{{q[0], q[1]}, {qd[0], qd[1]}, {qdd[0], qdd[1]}, {30, 30}, 0};
+    const double eta[1] = {c.eta[0]};
+    double front[TwoLink::kFront], dense[2 * TwoLink::kDense], sum = 0;
+    TwoLink::Regressor<double>(x, nullptr, eta, front, dense);
+    for (int k = TwoLink::kFrontBegin[joint]; k < TwoLink::kFrontBegin[joint + 1]; ++k) sum += front[k] * c.p[k];
+    for (int k = 0; k < TwoLink::kDense; ++k) sum += dense[joint * TwoLink::kDense + k] * c.p[TwoLink::kFront + k];
+    return sum;
+  }
+};
+
+TEST_F(FeedForwardTest, WithoutTable_IsZeroAndSaysSo) {
+  EXPECT_EQ(Evaluate(), Status::kEmpty);
+  EXPECT_EQ(tau[0], 0.0f);
+  EXPECT_EQ(tau[1], 0.0f);
+  EXPECT_FALSE(ff->valid());
+}
+
+TEST_F(FeedForwardTest, CommittedTable_GivesTheModelTorque) {
+  ASSERT_EQ(ff->Offer(Example(3), false), Status::kOk);
+  EXPECT_EQ(ff->generation(), 0u);
+  EXPECT_EQ(Evaluate(), Status::kOk);
+  EXPECT_EQ(ff->generation(), 3u);
+  for (int i = 0; i < 2; ++i) EXPECT_NEAR(tau[i], Exact(Example(3), i), 1e-5 * 50);
+}
+
+TEST_F(FeedForwardTest, SetPointBelowVMin_HasNoFriction) {
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  qd[0] = 0.009f;
+  EXPECT_EQ(Evaluate(), Status::kOk);
+  qd[0] = 0.0f;
+  for (int i = 0; i < 2; ++i) EXPECT_NEAR(tau[i], Exact(Example(1), i), 1e-5 * 50);
+}
+
+TEST_F(FeedForwardTest, TorqueBeyondTheLimit_IsCutAndCounted) {
+  Set c = Example(1);
+  c.limit_Nm[0] = 10.0f;
+  ASSERT_EQ(ff->Offer(c, false), Status::kOk);
+  EXPECT_EQ(Evaluate(), Status::kClamped);
+  EXPECT_EQ(tau[0], 10.0f);
+  EXPECT_EQ(Evaluate(), Status::kClamped);
+  EXPECT_EQ(ff->clamp_count(), 2u);
+}
+
+TEST_F(FeedForwardTest, NotFiniteSetPoint_GivesZeroAndSaysSo) {
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  qdd[1] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(Evaluate(), Status::kNotFinite);
+  EXPECT_EQ(tau[0], 0.0f);
+  EXPECT_EQ(tau[1], 0.0f);
+}
+
+TEST_F(FeedForwardTest, ColumnInStandby_AddsNothingEvenIfItsValueIsNotFinite) {
+  Set c = Example(1);
+  c.eta[0] = 0.0f;  // qd / 0: the Stribeck column is not a number
+  qd[1] = 0.0f;
+  ASSERT_EQ(ff->Offer(c, false), Status::kOk);
+  EXPECT_EQ(Evaluate(), Status::kOk);
+  EXPECT_NEAR(tau[0], Exact(Example(1), 0), 1e-5 * 50);
+}
+
+TEST_F(FeedForwardTest, PlainTableWhileEnabled_IsRefusedAndChangesNothing) {
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  std::vector<unsigned char> before(sizeof *ff), after(sizeof *ff);
+  std::memcpy(before.data(), static_cast<void*>(ff.get()), sizeof *ff);
+  EXPECT_EQ(ff->Offer(Example(2), true), Status::kAxisEnabled);
+  std::memcpy(after.data(), static_cast<void*>(ff.get()), sizeof *ff);
+  EXPECT_EQ(before, after);
+}
+
+TEST_F(FeedForwardTest, BumplessTable_IsCrossFadedWithoutAStep) {
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  const float from = tau[0];
+  Set c = Example(2);
+  for (float& p : c.p) p *= 2;
+  c.bumpless = true;
+  c.blend_ticks = 10;
+  ASSERT_EQ(ff->Offer(c, true), Status::kOk);
+  for (int tick = 1; tick <= 12; ++tick) {
+    ASSERT_EQ(Evaluate(), Status::kOk);
+    EXPECT_NEAR(tau[0], from * (1 + std::min(tick, 10) / 10.0), 1e-4);
+    EXPECT_EQ(ff->blending(), tick < 10);
+  }
+  EXPECT_NEAR(tau[0], Exact(c, 0), 1e-5 * 100);
+}
+
+TEST_F(FeedForwardTest, FirstBumplessTable_FadesInFromZero) {
+  Set c = Example(1);
+  c.bumpless = true;
+  c.blend_ticks = 4;
+  ASSERT_EQ(ff->Offer(c, true), Status::kOk);
+  EXPECT_EQ(Evaluate(), Status::kOk);
+  EXPECT_NEAR(tau[0], 0.25 * Exact(c, 0), 1e-4);
+}
+
+TEST_F(FeedForwardTest, ModelTorque_IsTheSameSumUnclamped) {
+  Set c = Example(1);
+  c.limit_Nm[0] = 1.0f;
+  Rows<TwoLink> rows;
+  float model_tau[2];
+  const model::ModelInput<float, 2> x{{q[0], q[1]}, {qd[0], qd[1]}, {qdd[0], qdd[1]}, {30, 30}, 0};
+  ModelTorque(c, x, rows, model_tau);
+  for (int i = 0; i < 2; ++i) EXPECT_NEAR(model_tau[i], Exact(c, i), 1e-5 * 50);
+}
+
+}  // namespace
+}  // namespace armcal::feedforward

@@ -1,0 +1,190 @@
+// filter - the forgetting form against re-triangularised double QR; knows no model.
+#include "armcal/filter/forgetting_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "armcal/filter/kalman_filter.hpp"
+#include "tests/unit/filter/rows.hpp"
+
+namespace armcal::filter {
+namespace {
+using namespace test;  // NOLINT: the bench of these tests
+
+constexpr std::uint32_t kAll = 7;
+using Filter = ForgettingFilter<Small>;
+constexpr int n = Small::kColumns;
+
+// The recursion [sqrt(lambda) R; rows] in double by Householder QR. Rows of R belong to columns because the column
+// order is the filter's, so the same blocks can forget under the same gates.
+struct Recursion {
+  Matrix r = Matrix::Zero(n, n + 1);
+  void Add(const Matrix& rows) {
+    Matrix a(n + rows.rows(), n + 1);
+    a << r, rows;
+    const Eigen::HouseholderQR<Matrix> qr(a);
+    r = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+  }
+  void Forget(const Prior<Small>& prior, std::uint32_t moving) {
+    for (int k = 0; k < n; ++k) {
+      const std::uint32_t needed = JointsOf<Small>(k);
+      if ((moving & needed) == needed) r.row(k) *= std::sqrt(static_cast<double>(prior.lambda[k]));
+    }
+  }
+  Posterior Solve(const Prior<Small>& prior) const {
+    return SolveBatch(PriorCovariance(prior), r.leftCols(n), r.col(n));
+  }
+};
+Matrix Augmented(const Row& row) {
+  Matrix a(1, n + 1);
+  a << Full<Small>(row).transpose(), row.y;
+  return a;
+}
+
+TEST(ForgettingFilter, LambdaOne_IsTheBatchSolution_AndTheKalmanForm) {
+  Bench bench;
+  bench.size = 3;
+  Filter filter;
+  KalmanFilter<Small> kalman;
+  filter.Restart(bench.prior);
+  kalman.Restart(bench.prior);
+  const std::vector<Row> rows = bench.Rows(2000);
+  for (const Row& r : rows) {
+    EXPECT_TRUE(filter.Update(r.joint, r.front, r.dense, r.y, true).accepted);
+    EXPECT_TRUE(kalman.Update(r.joint, r.front, r.dense, r.y, true).accepted);
+  }
+  const Posterior oracle = SolveBatch(bench.prior, rows);
+  const Filter::ReadOut out = Read(filter);
+  EXPECT_LT(Distance<Small>(out.x, oracle), 0.01);
+  const auto other = Read(kalman);
+  for (int k = 0; k < n; ++k) {
+    EXPECT_NEAR(out.sd[k] / oracle.sd(k), 1, 1e-3);
+    EXPECT_NEAR((out.x[k] - other.x[k]) / oracle.sd(k), 0, 0.01);
+  }
+}
+
+TEST(ForgettingFilter, GatedForgetting_IsTheGatedQrRecursion) {
+  Bench bench;
+  bench.size = 2;
+  for (int k = 0; k < n; ++k) bench.prior.lambda[k] = k < Small::kFront ? 0.99f : 0.997f;
+  Filter filter;
+  filter.Restart(bench.prior);
+  Recursion recursion;
+  for (int s = 0; s < 3000; ++s) {
+    const std::uint32_t moving = s / 200 % 4 == 3 ? s / 800 % 7 : kAll;  // now and then some joints rest
+    if (s == 1500) bench.truth *= -1;
+    for (int j = 0; j < Small::kJoints; ++j) {
+      const Row row = bench.Next(j);
+      const bool use = (moving >> j) & 1u;
+      filter.Update(j, row.front, row.dense, row.y, use);
+      if (use) recursion.Add(Augmented(row));
+    }
+    filter.EndSample(moving);
+    recursion.Forget(bench.prior, moving);
+    if (s % 100 == 99) {
+      EXPECT_LT(Distance<Small>(Read(filter).x, recursion.Solve(bench.prior)), 0.01) << s;
+    }
+  }
+}
+
+// The same comparison must notice a filter that is fed wrongly.
+TEST(ForgettingFilter, PlantedFault_MovesItAwayFromTheOracle) {
+  enum Fault { kNone, kWrongSign, kLostRow, kUngatedRest };
+  for (const Fault fault : {kNone, kWrongSign, kLostRow, kUngatedRest}) {
+    Bench bench;
+    bench.size = 3;
+    for (float& lambda : bench.prior.lambda) lambda = 0.999f;
+    Filter filter;
+    filter.Restart(bench.prior);
+    Recursion recursion;
+    for (int s = 0; s < 400; ++s) {
+      const bool rest = s >= 300;
+      for (int j = 0; j < Small::kJoints; ++j) {
+        Row row = bench.Next(j);
+        if (!rest) recursion.Add(Augmented(row));
+        if (fault == kWrongSign && j == 1) row.dense[4] = -row.dense[4];
+        if (fault == kLostRow && s == 150 && j == 0) continue;
+        if (rest) row.y += 3;  // torque at rest lies anywhere in the friction band
+        filter.Update(j, row.front, row.dense, row.y, !rest || fault == kUngatedRest);
+      }
+      const std::uint32_t moving = rest && fault != kUngatedRest ? 0 : kAll;
+      filter.EndSample(moving);
+      recursion.Forget(bench.prior, rest ? 0 : kAll);
+    }
+    const double distance = Distance<Small>(Read(filter).x, recursion.Solve(bench.prior));
+    if (fault == kNone) {
+      EXPECT_LT(distance, 0.005);
+    } else {
+      EXPECT_GT(distance, 0.02) << fault;
+    }
+  }
+}
+
+TEST(ForgettingFilter, Report_IsTheInnovationOfTheDataAlone) {
+  Bench bench;
+  Filter filter;
+  filter.Restart(bench.prior);
+  Matrix information = 1e-6 * Matrix::Identity(n, n);
+  Vector right = Vector::Zero(n);
+  int checked = 0;
+  for (const Row& r : bench.Rows(60)) {
+    const Vector h = Full<Small>(r);
+    const Eigen::LDLT<Matrix> solver(information);
+    const double innovation = r.y - h.dot(solver.solve(right)), variance = 1 + h.dot(solver.solve(h));
+    const UpdateReport got = filter.Update(r.joint, r.front, r.dense, r.y, true);
+    if (++checked > 60) {
+      EXPECT_NEAR(got.innovation, innovation, 1e-3 * (1 + std::abs(innovation)));
+      EXPECT_NEAR(got.variance / variance, 1, 1e-3);
+    }
+    information += h * h.transpose();
+    right += h * r.y;
+  }
+}
+
+TEST(ForgettingFilter, GatedOrRefusedRow_LeavesEveryBit) {
+  Bench bench;
+  Filter filter;
+  filter.Restart(bench.prior);
+  for (const Row& r : bench.Rows(50)) filter.Update(r.joint, r.front, r.dense, r.y, true);
+  const std::vector<unsigned char> before = Bytes(filter);
+  for (int j = 0; j < Small::kJoints; ++j) {
+    Row row = bench.Next(j);
+    EXPECT_EQ(filter.Update(j, row.front, row.dense, row.y, false).status, core::Status::kGated);
+    row.dense[Small::kDense - 1] = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_EQ(filter.Update(j, row.front, row.dense, row.y, true).status, core::Status::kNotFinite);
+    row.dense[Small::kDense - 1] = -2e6f;
+    EXPECT_EQ(filter.Update(j, row.front, row.dense, row.y, true).status, core::Status::kOutOfRange);
+  }
+  EXPECT_EQ(Bytes(filter), before);
+}
+
+TEST(ForgettingFilter, OneHourOfRest_LeavesEveryBit) {
+  Bench bench;
+  for (float& lambda : bench.prior.lambda) lambda = 0.99f;
+  Filter filter;
+  filter.Restart(bench.prior);
+  for (const Row& r : bench.Rows(500)) filter.Update(r.joint, r.front, r.dense, r.y, true);
+  const std::vector<unsigned char> before = Bytes(filter);
+  const Row row = bench.Next(1);
+  for (int s = 0; s < 125 * 3600; ++s) {
+    filter.Update(1, row.front, row.dense, row.y, false);
+    filter.EndSample(0);
+  }
+  EXPECT_EQ(Bytes(filter), before);
+}
+
+TEST(ForgettingFilter, WithoutData_ReadsThePrior) {
+  Bench bench;
+  Filter filter;
+  filter.Restart(bench.prior);
+  for (int s = 0; s < 100000; ++s) filter.EndSample(kAll);
+  const Filter::ReadOut out = Read(filter);
+  for (int k = 0; k < n; ++k) {
+    EXPECT_EQ(out.x[k], 0.0f);
+    EXPECT_NEAR(out.sd[k], 1.0f, 1e-5f);  // the floor counts as a millionth and was taken off
+  }
+}
+
+}  // namespace
+}  // namespace armcal::filter

@@ -1,0 +1,147 @@
+// filter - a small layout, random whitened rows and dense double oracles; the filter tests' bench.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstring>
+#include <random>
+#include <vector>
+
+#include "armcal/filter/prior.hpp"
+
+namespace armcal::filter::test {
+
+// Three joints with 2, 0 and 3 front columns and seven dense ones.
+struct Small {
+  static constexpr int kJoints = 3, kFront = 5, kDense = 7, kColumns = 12;
+  static constexpr int kFrontBegin[4] = {0, 2, 2, 5};
+  static constexpr int kRowBegin[3] = {0, 2, 4};
+};
+
+struct Row {
+  int joint;
+  float front[Small::kFront] = {};
+  float dense[Small::kDense] = {};
+  float y = 0;
+};
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+template <class Layout>
+Vector Full(const Row& row) {
+  Vector h = Vector::Zero(Layout::kColumns);
+  for (int k = Layout::kFrontBegin[row.joint]; k < Layout::kFrontBegin[row.joint + 1]; ++k)
+    h(k) = row.front[k - Layout::kFrontBegin[row.joint]];
+  for (int k = 0; k < Layout::kDense; ++k) h(Layout::kFront + k) = row.dense[k];
+  return h;
+}
+
+// Rows of a known truth with unit noise. Elements of size `size`.
+struct Bench {
+  std::mt19937 random{11};
+  std::normal_distribution<float> normal;
+  Prior<Small> prior;
+  Vector truth;
+  float size = 1.0f;
+
+  Bench() {
+    // A correlated dense prior with unit variances, random.
+    Matrix w = Matrix::NullaryExpr(Small::kDense, Small::kDense + 3, [&] { return normal(random); });
+    for (int i = 0; i < Small::kDense; ++i) w.row(i).normalize();
+    Eigen::Matrix<double, -1, -1, Eigen::RowMajor> rows = w;
+    double ud[math::UdSize(Small::kDense)];
+    math::UdFromSquareRoot<Small::kDense, Small::kDense + 3>(rows.data(), ud);
+    for (int k = 0; k < math::UdSize(Small::kDense); ++k) prior.dense_ud[k] = static_cast<float>(ud[k]);
+    for (int k = 0; k < Small::kColumns; ++k) {
+      prior.active[k] = ~0u;
+      prior.lambda[k] = 1.0f;
+    }
+    truth = Vector::NullaryExpr(Small::kColumns, [&] { return normal(random); });
+  }
+  Row Next(int joint) {
+    Row row;
+    row.joint = joint;
+    const int width = Small::kFrontBegin[joint + 1] - Small::kFrontBegin[joint];
+    for (int k = 0; k < width; ++k) row.front[k] = size * normal(random);
+    for (int k = Small::kRowBegin[joint]; k < Small::kDense; ++k) row.dense[k] = size * normal(random);
+    row.y = static_cast<float>(Full<Small>(row).dot(truth)) + normal(random);
+    return row;
+  }
+  std::vector<Row> Rows(int samples) {
+    std::vector<Row> rows;
+    for (int s = 0; s < samples; ++s)
+      for (int j = 0; j < Small::kJoints; ++j) rows.push_back(Next(j));
+    return rows;
+  }
+};
+
+// Prior covariance (prior units) of the full state.
+template <class Layout>
+Matrix PriorCovariance(const Prior<Layout>& prior) {
+  std::vector<float> ud(math::UdSize(Layout::kColumns));
+  ExpandPrior(prior, ud.data());
+  constexpr int n = Layout::kColumns;
+  Matrix u = Matrix::Identity(n, n), d = Matrix::Zero(n, n);
+  for (int j = 0; j < n; ++j) {
+    d(j, j) = ud[math::UdIndex(j, j)];
+    for (int i = 0; i < j; ++i) u(i, j) = ud[math::UdIndex(i, j)];
+  }
+  return u * d * u.transpose();
+}
+
+// Batch least squares in double by QR of [P0^-1/2; rows].
+struct Posterior {
+  Vector x, sd;
+};
+inline Posterior SolveBatch(const Matrix& prior_covariance, const Matrix& rows, const Vector& y) {
+  const int n = static_cast<int>(prior_covariance.rows());
+  const Matrix half = prior_covariance.llt().matrixL();
+  Matrix a(n + rows.rows(), n);
+  a << half.triangularView<Eigen::Lower>().solve(Matrix::Identity(n, n)), rows;
+  Vector b = Vector::Zero(n + y.size());
+  b.tail(y.size()) = y;
+  const Eigen::HouseholderQR<Matrix> qr(a);
+  const Matrix r = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+  const Matrix inverse = r.triangularView<Eigen::Upper>().solve(Matrix::Identity(n, n));
+  Posterior p;
+  p.x = inverse * (qr.householderQ().transpose() * b).head(n);
+  p.sd = inverse.rowwise().norm();
+  return p;
+}
+template <class Layout>
+Posterior SolveBatch(const Prior<Layout>& prior, const std::vector<Row>& rows) {
+  Matrix h(rows.size(), Layout::kColumns);
+  Vector y(rows.size());
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    h.row(k) = Full<Layout>(rows[k]);
+    y(k) = rows[k].y;
+  }
+  return SolveBatch(PriorCovariance(prior), h, y);
+}
+
+// Largest difference of estimate and oracle in the oracle's standard deviations.
+template <class Layout>
+double Distance(const float* x, const Posterior& oracle) {
+  double worst = 0;
+  for (int k = 0; k < Layout::kColumns; ++k) worst = std::max(worst, std::abs(x[k] - oracle.x(k)) / oracle.sd(k));
+  return worst;
+}
+
+template <class Filter>
+typename Filter::ReadOut Read(const Filter& filter) {
+  typename Filter::ReadOut out;
+  filter.BeginReadOut(out);
+  while (!filter.StepReadOut(out)) {
+  }
+  return out;
+}
+
+// Every bit of an object, padding included: the object never leaves its place in these tests.
+template <class T>
+std::vector<unsigned char> Bytes(const T& object) {
+  std::vector<unsigned char> bytes(sizeof object);
+  std::memcpy(bytes.data(), &object, sizeof object);
+  return bytes;
+}
+
+}  // namespace armcal::filter::test

@@ -1,0 +1,134 @@
+// link - what each function code answers, and in which order it refuses; replies are checked byte by byte.
+#include "armcal/link/pdu_engine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+
+#include "tests/unit/link/test_device.hpp"
+
+namespace {
+
+using namespace armcal;
+using Bytes = std::vector<std::uint8_t>;
+namespace reg = link::reg;
+
+class Engine : public testing::Test {
+ protected:
+  Bytes Ask(const Bytes& request) {
+    Bytes reply(link::kMaxPdu);
+    reply.resize(drive_.device.engine().Handle(request.data(), request.size(), reply.data()));
+    return reply;
+  }
+  core::Status LastStatus() { return drive_.device.map().last_error().status; }
+
+  test::TestDevice drive_;
+};
+
+TEST_F(Engine, Read_OfTheProbes_IsBigEndianWordByWord) {
+  EXPECT_EQ(Ask({4, 0, 0, 0, 2}), (Bytes{4, 4, 'A', 'R', 'M', 'C'}));
+  EXPECT_EQ(Ask({4, 0, 12, 0, 4}), (Bytes{4, 8, 0x47, 0xF1, 0x20, 0x65, 0x12, 0x34, 0x56, 0x78}));
+}
+
+TEST_F(Engine, Scratch_WrittenBy6And16_ReadsBack) {
+  EXPECT_EQ(Ask({6, 0, 0x20, 0xAB, 0xCD}), (Bytes{6, 0, 0x20, 0xAB, 0xCD}));
+  EXPECT_EQ(Ask({16, 0, 0x21, 0, 2, 4, 1, 2, 3, 4}), (Bytes{16, 0, 0x21, 0, 2}));
+  EXPECT_EQ(Ask({3, 0, 0x20, 0, 3}), (Bytes{3, 6, 0xAB, 0xCD, 1, 2, 3, 4}));
+}
+
+TEST_F(Engine, FunctionCode_NotServed_Gets01) {
+  for (int function = 0; function < 256; ++function) {
+    if (function == 3 || function == 4 || function == 6 || function == 16 || function == 43) continue;
+    const auto code = static_cast<std::uint8_t>(function);
+    EXPECT_EQ(Ask({code, 0, 0, 0, 1}), (Bytes{static_cast<std::uint8_t>(code | 0x80), 1})) << function;
+  }
+  EXPECT_EQ(Ask({43, 13, 1, 0}), (Bytes{0xAB, 1})) << "another encapsulated interface";
+  EXPECT_EQ(Ask({}), Bytes{});
+}
+
+TEST_F(Engine, Quantity_OutOfRange_Gets03_EvenWhereTheAddressIsWrongToo) {
+  for (const std::uint8_t function : {std::uint8_t{3}, std::uint8_t{4}}) {
+    const auto exception = static_cast<std::uint8_t>(function | 0x80);
+    EXPECT_EQ(Ask({function, 0x0F, 0xFF, 0, 0}), (Bytes{exception, 3}));
+    EXPECT_EQ(Ask({function, 0x0F, 0xFF, 0, 126}), (Bytes{exception, 3}));
+    EXPECT_EQ(Ask({function, 0, 0, 0}), (Bytes{exception, 3})) << "a byte short";
+    EXPECT_EQ(Ask({function, 0, 0, 0, 1, 0}), (Bytes{exception, 3})) << "a byte too many";
+  }
+  EXPECT_EQ(Ask({16, 0, 0x20, 0, 0, 0}), (Bytes{0x90, 3}));
+  EXPECT_EQ(Ask({16, 0, 0x20, 0, 1, 4, 0, 0, 0, 0}), (Bytes{0x90, 3})) << "byte count against quantity";
+  EXPECT_EQ(Ask({16, 0, 0x20, 0, 2, 4, 0, 0}), (Bytes{0x90, 3})) << "byte count against length";
+  Bytes many = {16, 0, 0x20, 0, 124, 248};
+  many.resize(6 + 248);
+  EXPECT_EQ(Ask(many), (Bytes{0x90, 3}));
+}
+
+TEST_F(Engine, Address_InAGapOrPastTheEnd_Gets02) {
+  EXPECT_EQ(Ask({4, 0, reg::kIdentityCount, 0, 1}), (Bytes{0x84, 2}));
+  EXPECT_EQ(Ask({4, 0, reg::kIdentityCount - 1, 0, 2}), (Bytes{0x84, 2})) << "runs into a gap";
+  EXPECT_EQ(Ask({3, 0xFF, 0xFF, 0, 2}), (Bytes{0x83, 2})) << "wraps";
+  EXPECT_EQ(Ask({16, 0xFF, 0xFF, 0, 2, 4, 0, 0, 0, 0}), (Bytes{0x90, 2}));
+  EXPECT_EQ(Ask({6, 0x07, 0, 0, 1}), (Bytes{0x86, 2}));
+  EXPECT_EQ(LastStatus(), core::Status::kBadAddress);
+}
+
+TEST_F(Engine, Write_OfHalfA32BitValueOrNaN_Gets03_AndChangesNothing) {
+  const Bytes before = Ask({3, 0, 0x50, 0, 16});
+  EXPECT_EQ(Ask({6, 0, 0x58, 0, 1}), (Bytes{0x86, 3}));
+  EXPECT_EQ(Ask({16, 0, 0x59, 0, 2, 4, 0, 1, 0, 1}), (Bytes{0x90, 3})) << "two halves";
+  EXPECT_EQ(Ask({16, 0, 0x50, 0, 1, 2, 0, 1}), (Bytes{0x90, 3}));
+  EXPECT_EQ(LastStatus(), core::Status::kWrongSize);
+  // the first float is fine, the second is NaN (then infinity): neither may be applied
+  EXPECT_EQ(Ask({16, 0, 0x50, 0, 4, 8, 0x3F, 0x80, 0, 0, 0x7F, 0xC0, 0, 0}), (Bytes{0x90, 3}));
+  EXPECT_EQ(Ask({16, 0, 0x50, 0, 4, 8, 0x3F, 0x80, 0, 0, 0xFF, 0x80, 0, 0}), (Bytes{0x90, 3}));
+  EXPECT_EQ(LastStatus(), core::Status::kNotFinite);
+  EXPECT_EQ(Ask({3, 0, 0x50, 0, 16}), before);
+  EXPECT_EQ(Ask({16, 0, 0x50, 0, 2, 4, 0x3F, 0x80, 0, 0}), (Bytes{16, 0, 0x50, 0, 2}));
+}
+
+TEST_F(Engine, Write_ToReadOnlyOrLocked_Gets04_WithTheReason) {
+  EXPECT_EQ(Ask({6, 0x20, 0, 0, 1}), (Bytes{0x86, 4}));
+  EXPECT_EQ(LastStatus(), core::Status::kReadOnly);
+  EXPECT_EQ(Ask({6, 0x10, 0, 0, 1}), (Bytes{0x86, 4}));
+  EXPECT_EQ(LastStatus(), core::Status::kLocked);
+  const Bytes error = Ask({4, 0, 0x58, 0, 4});  // exception, function, address, status
+  EXPECT_EQ(error, (Bytes{4, 8, 0, 4, 0, 6, 0x10, 0, 0, 8}));
+}
+
+TEST_F(Engine, LastErrorAddress_IsTheFirstRegisterOfTheRefusedRequest) {
+  Ask({4, 0x12, 0x34, 0, 1});
+  EXPECT_EQ(drive_.device.map().last_error().address, 0x1234);
+  EXPECT_EQ(drive_.device.map().last_error().request, drive_.device.map().requests());
+}
+
+TEST_F(Engine, DeviceIdentification_NamesVendorProductAndRevision) {
+  const Bytes all = Ask({43, 14, 1, 0});
+  const std::string text(all.begin(), all.end());
+  EXPECT_EQ(all[6], 3);
+  EXPECT_NE(text.find("armcal"), std::string::npos);
+  EXPECT_NE(text.find("test_arm"), std::string::npos);
+  EXPECT_EQ(Ask({43, 14, 4, 2}), (Bytes{43, 14, 4, 0x81, 0, 0, 1, 2, 3, '1', '.', '0'}));
+  EXPECT_EQ(Ask({43, 14, 4, 3}), (Bytes{0xAB, 2}));
+  EXPECT_EQ(Ask({43, 14, 5, 0}), (Bytes{0xAB, 3}));
+  EXPECT_EQ(Ask({43, 14, 1}), (Bytes{0xAB, 3}));
+}
+
+TEST_F(Engine, RandomRequests_GetLawfulReplies_AndLeaveTheActiveTableAlone) {
+  std::mt19937 random(11);
+  const std::uint8_t functions[] = {3, 4, 6, 16, 43, 3, 16};
+  for (int i = 0; i < 200000; ++i) {
+    Bytes request(random() % 24);
+    for (auto& byte : request) byte = static_cast<std::uint8_t>(random() % 4 == 0 ? random() : random() % 8);
+    if (!request.empty() && random() % 8 != 0) request[0] = functions[random() % 7];
+    const Bytes reply = Ask(request);
+    if (request.empty()) continue;
+    ASSERT_GE(reply.size(), 2u);
+    ASSERT_LE(reply.size(), link::kMaxPdu);
+    const bool exception = reply[0] == (request[0] | 0x80) && reply.size() == 2 && reply[1] >= 1 && reply[1] <= 6;
+    ASSERT_TRUE(exception || reply[0] == request[0]);
+  }
+  EXPECT_EQ(drive_.application.adoptions, 0);
+  EXPECT_EQ(drive_.active, std::vector<std::uint16_t>(test::kTableWords));
+}
+
+}  // namespace

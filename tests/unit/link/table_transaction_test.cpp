@@ -1,0 +1,287 @@
+// link - flashing step by step: order, retries, refusals, time-outs, power cuts; the old table or the new, never
+// another.
+#include "armcal/link/table_transaction.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/unit/link/test_device.hpp"
+
+namespace {
+
+using namespace armcal;
+using core::Status;
+using link::TableCommand;
+using link::TransactionState;
+using test::kSchema;
+using test::kTableWords;
+using test::MakeTable;
+namespace reg = link::reg;
+using Words = std::vector<std::uint16_t>;
+
+class Transaction : public testing::Test {
+ protected:
+  TableCommand Make(std::uint32_t command, const Words& words) {
+    return {++sequence_, command, core::GetU32(words.data()), static_cast<std::uint16_t>(words.size()),
+            core::Crc32Words(words.data(), words.size())};
+  }
+  Status Do(std::uint32_t command, const Words& words) { return t().Command(Make(command, words)); }
+  void Stage(const Words& words) {
+    for (std::uint16_t at = 0; at < words.size(); at = static_cast<std::uint16_t>(at + 100)) {
+      const auto count = static_cast<std::uint16_t>(std::min<std::size_t>(100, words.size() - at));
+      ASSERT_EQ(t().WriteStaged(at, count, words.data() + at), Status::kOk);
+    }
+  }
+  void Run() {
+    for (int i = 0; i < 1000 && t().state() == TransactionState::kCommitting; ++i) t().Step(now_ms_);
+  }
+  void Flash(int number) {
+    const Words words = MakeTable(number);
+    ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+    Stage(words);
+    ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+    ASSERT_EQ(Do(reg::kSave, words), Status::kOk);
+    Run();
+    ASSERT_EQ(t().state(), TransactionState::kActive);
+  }
+  // Stored, adopted and served are one table.
+  void ExpectInForce(int number) {
+    EXPECT_EQ(drive_.active, MakeTable(number));
+    EXPECT_EQ(drive_.application.adopted, MakeTable(number));
+    EXPECT_EQ(Stored(), MakeTable(number));
+  }
+  Words Stored() {
+    table::TableStore store(drive_.flash.storage(), kSchema, kTableWords);
+    Words words(kTableWords);
+    return core::IsOk(store.Load(words.data())) ? words : Words{};
+  }
+  link::TableTransaction& t() { return drive_.transaction; }
+
+  test::TestDevice drive_;
+  std::uint32_t sequence_ = 100;
+  std::uint32_t now_ms_ = 0;
+};
+
+TEST_F(Transaction, Flash_OfAGoodTable_IsStoredAdoptedAndServed) {
+  EXPECT_EQ(t().table_status(), Status::kBlank);
+  Flash(1);
+  ExpectInForce(1);
+  EXPECT_EQ(t().table_status(), Status::kOk);
+  EXPECT_EQ(t().active_crc(), core::Crc32Words(MakeTable(1).data(), kTableWords));
+  Flash(2);
+  ExpectInForce(2);
+}
+
+TEST_F(Transaction, Commands_OutOfOrder_AreRefused) {
+  const Words words = MakeTable(1);
+  EXPECT_EQ(Do(reg::kCheck, words), Status::kWrongOrder);
+  EXPECT_EQ(Do(reg::kSave, words), Status::kWrongOrder);
+  EXPECT_EQ(t().WriteStaged(0, 2, words.data()), Status::kWrongOrder);
+  EXPECT_EQ(Do(0x12345678, words), Status::kOutOfRange);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  EXPECT_EQ(Do(reg::kCheck, words), Status::kWrongOrder) << "nothing staged";
+  Stage(words);
+  EXPECT_EQ(Do(reg::kSave, words), Status::kWrongOrder) << "not checked";
+  ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+  ASSERT_EQ(t().WriteStaged(7, 1, words.data()), Status::kOk);
+  EXPECT_EQ(t().state(), TransactionState::kLoading) << "a write after the check voids the check";
+  EXPECT_EQ(Do(reg::kSave, words), Status::kWrongOrder);
+}
+
+TEST_F(Transaction, WrongTables_AreRefused_AndNothingIsStored) {
+  const Words other = MakeTable(1, 0x99999999);
+  EXPECT_EQ(Do(reg::kOpen, other), Status::kWrongSchema);
+  Words longer = MakeTable(1);
+  longer.push_back(0);
+  EXPECT_EQ(Do(reg::kOpen, longer), Status::kWrongSize);
+
+  Words words = MakeTable(1);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  words[100] ^= 1;
+  EXPECT_EQ(Do(reg::kCheck, words), Status::kBadCrc);
+
+  Words unphysical = MakeTable(1);
+  unphysical[5] = test::kBadPhysics;
+  ASSERT_EQ(Do(reg::kOpen, unphysical), Status::kOk);
+  Stage(unphysical);
+  EXPECT_EQ(Do(reg::kCheck, unphysical), Status::kUnphysical);
+  EXPECT_EQ(drive_.flash.operations(), 0);
+}
+
+TEST_F(Transaction, Save_WhileAnAxisIsEnabled_IsRefusedBeforeAnythingIsStored) {
+  Flash(1);
+  const int operations = drive_.flash.operations();
+  const Words words = MakeTable(2);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+  drive_.application.enabled = true;
+  EXPECT_EQ(Do(reg::kSave, words), Status::kAxisEnabled);
+  EXPECT_EQ(drive_.flash.operations(), operations);
+  ExpectInForce(1);
+  drive_.application.enabled = false;
+  EXPECT_EQ(Do(reg::kSave, words), Status::kOk) << "the stage is still there";
+  Run();
+  ExpectInForce(2);
+}
+
+TEST_F(Transaction, AxisEnabledDuringTheSave_IsWaitedFor) {
+  Flash(1);
+  drive_.application.enable_on_save = true;
+  const Words words = MakeTable(2);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+  ASSERT_EQ(Do(reg::kSave, words), Status::kOk);
+  Run();
+  EXPECT_EQ(t().state(), TransactionState::kCommitting);
+  EXPECT_EQ(drive_.active, MakeTable(1)) << "the old table stays in force";
+  EXPECT_EQ(Do(reg::kOpen, words), Status::kBusy);
+  EXPECT_EQ(t().WriteStaged(0, 1, words.data()), Status::kBusy);
+  drive_.application.enabled = false;
+  Run();
+  EXPECT_EQ(t().state(), TransactionState::kActive);
+  ExpectInForce(2);
+}
+
+TEST_F(Transaction, AxisThatStaysEnabled_TakesTheStoredRecordBack) {
+  Flash(1);
+  drive_.application.enable_on_save = true;
+  const Words words = MakeTable(2);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+  ASSERT_EQ(Do(reg::kSave, words), Status::kOk);
+  Run();
+  now_ms_ += link::TableTransaction::kStageTimeout_ms;
+  Run();
+  EXPECT_EQ(t().state(), TransactionState::kFailed);
+  EXPECT_EQ(t().status(), Status::kAxisEnabled);
+  ExpectInForce(1);
+}
+
+TEST_F(Transaction, AdoptionInSlices_IsCalledUntilItIsDone_AtPowerUpToo) {
+  drive_.application.busy = 5;
+  Flash(1);
+  ExpectInForce(1);
+  Words staged(kTableWords), active(kTableWords);
+  test::FakeApplication application;
+  application.busy = 3;
+  table::TableStore store(drive_.flash.storage(), kSchema, kTableWords);
+  link::TableTransaction next(application.Functions(), store, kSchema, staged.data(), active.data(), kTableWords);
+  EXPECT_EQ(next.Boot(), Status::kBusy);
+  EXPECT_EQ(next.Command(Make(reg::kOpen, MakeTable(2))), Status::kBusy);
+  for (int i = 0; i < 10; ++i) next.Step(0);
+  EXPECT_EQ(next.table_status(), Status::kOk);
+  EXPECT_EQ(next.state(), TransactionState::kIdle);
+  EXPECT_EQ(active, MakeTable(1));
+}
+
+TEST_F(Transaction, StoredTableThatTheApplicationRefuses_LeavesTheDefaultsActive) {
+  Words unphysical = MakeTable(1);
+  unphysical[5] = test::kBadPhysics;
+  ASSERT_EQ(drive_.store.Save(unphysical.data()), Status::kOk);
+  while (drive_.store.Step() == Status::kBusy) {
+  }
+  const Words defaults(kTableWords, 4711);
+  Words staged(kTableWords), active = defaults;
+  table::TableStore store(drive_.flash.storage(), kSchema, kTableWords);
+  link::TableTransaction next(drive_.application.Functions(), store, kSchema, staged.data(), active.data(),
+                              kTableWords);
+  EXPECT_EQ(next.Boot(), Status::kUnphysical);
+  EXPECT_EQ(next.table_status(), Status::kUnphysical);
+  EXPECT_EQ(active, defaults);
+  EXPECT_EQ(drive_.application.adoptions, 0);
+}
+
+TEST_F(Transaction, CommandRepeated_HasNoSecondEffect) {
+  const Words words = MakeTable(1);
+  const TableCommand open = Make(reg::kOpen, words);
+  ASSERT_EQ(t().Command(open), Status::kOk);
+  Stage(words);
+  EXPECT_EQ(t().Command(open), Status::kOk);
+  EXPECT_EQ(t().state(), TransactionState::kLoading) << "the stage must survive the repeated open";
+  TableCommand forged = open;
+  forged.command = reg::kCheck;
+  EXPECT_EQ(t().Command(forged), Status::kWrongOrder) << "a used number with other content";
+  ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+  const TableCommand save = Make(reg::kSave, words);
+  ASSERT_EQ(t().Command(save), Status::kOk);
+  EXPECT_EQ(t().Command(save), Status::kOk) << "while committing";
+  Run();
+  EXPECT_EQ(t().Command(save), Status::kOk) << "after it";
+  EXPECT_EQ(t().state(), TransactionState::kActive);
+  EXPECT_EQ(drive_.application.adoptions, 1);
+  TableCommand zero = open;
+  zero.sequence = 0;
+  EXPECT_EQ(t().Command(zero), Status::kWrongOrder);
+}
+
+TEST_F(Transaction, AbandonedStage_IsDropped) {
+  const Words words = MakeTable(1);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  t().Step(link::TableTransaction::kStageTimeout_ms - 1);
+  EXPECT_EQ(t().state(), TransactionState::kLoading);
+  t().Step(link::TableTransaction::kStageTimeout_ms);
+  EXPECT_EQ(t().state(), TransactionState::kIdle);
+  EXPECT_EQ(t().status(), Status::kTimeout);
+  EXPECT_EQ(Do(reg::kCheck, words), Status::kWrongOrder);
+}
+
+TEST_F(Transaction, NewOpen_DropsTheStage) {
+  const Words words = MakeTable(1);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  EXPECT_EQ(drive_.staged, Words(kTableWords));
+}
+
+TEST_F(Transaction, StorageFault_FailsAndKeepsTheOldTable) {
+  Flash(1);
+  const Words words = MakeTable(2);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+  drive_.flash.FailOperation(drive_.flash.operations() + 2);
+  ASSERT_EQ(Do(reg::kSave, words), Status::kOk);
+  Run();
+  EXPECT_EQ(t().state(), TransactionState::kFailed);
+  EXPECT_EQ(t().status(), Status::kStorageFault);
+  ExpectInForce(1);
+}
+
+TEST_F(Transaction, PowerCutAtAnyOperation_BootsTheOldOrTheNewTable) {
+  Flash(1);
+  const int operations = drive_.flash.operations();
+  for (int cut = 0; cut < operations; ++cut) {
+    test::NorFlash flash = drive_.flash;
+    flash.PowerUp();
+    flash.CutAt({cut, 3});
+    {
+      table::TableStore store(flash.storage(), kSchema, kTableWords);
+      Words staged(kTableWords), active(kTableWords);
+      test::FakeApplication application;
+      link::TableTransaction first(application.Functions(), store, kSchema, staged.data(), active.data(), kTableWords);
+      ASSERT_EQ(first.Boot(), Status::kOk);
+      const Words words = MakeTable(2);
+      ASSERT_EQ(first.Command(Make(reg::kOpen, words)), Status::kOk);
+      ASSERT_EQ(first.WriteStaged(0, kTableWords, words.data()), Status::kOk);
+      ASSERT_EQ(first.Command(Make(reg::kCheck, words)), Status::kOk);
+      ASSERT_EQ(first.Command(Make(reg::kSave, words)), Status::kOk);
+      for (int i = 0; i < 1000 && !flash.dead(); ++i) first.Step(0);
+    }
+    flash.PowerUp();
+    table::TableStore store(flash.storage(), kSchema, kTableWords);
+    Words staged(kTableWords), active(kTableWords);
+    test::FakeApplication application;
+    link::TableTransaction second(application.Functions(), store, kSchema, staged.data(), active.data(), kTableWords);
+    ASSERT_EQ(second.Boot(), Status::kOk);
+    EXPECT_TRUE(active == MakeTable(1) || active == MakeTable(2)) << cut;
+    EXPECT_EQ(application.adopted, active);
+  }
+}
+
+}  // namespace

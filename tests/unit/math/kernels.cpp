@@ -1,0 +1,31 @@
+// math - every float kernel of lib in one object, to see what it links; computes nothing.
+#include "armcal/estimator/estimator.hpp"
+#include "armcal/feedforward/feed_forward.hpp"
+#include "armcal/filter/forgetting_filter.hpp"
+#include "armcal/filter/kalman_filter.hpp"
+#include "tests/unit/estimator/two_link_model.hpp"
+
+namespace armcal {
+
+using Model = test::TwoLink;
+template class signal::SignalPath<2, 8>;
+template class filter::KalmanFilter<Model>;
+template class filter::ForgettingFilter<Model>;
+template class feedforward::FeedForward<Model>;
+template class estimator::Estimator<Model, filter::KalmanFilter<Model>>;
+template class estimator::Estimator<Model, filter::ForgettingFilter<Model>>;
+template core::Status estimator::BuildImage<Model>(const estimator::Table<Model>&, std::uint32_t,
+                                                   estimator::ImageWork<Model>&, estimator::Image<Model>&);
+template void estimator::ReadBodies<Model, float>(const estimator::RigidPrior<Model, float>&, const float*, float*);
+
+void Elementary(const float* x, float* y) {
+  math::SinCosBlock<6>(x, y, y + 6);
+  y[12] = math::Exp(x[0]);
+  y[13] = math::Log(x[0]);
+  y[14] = math::Tanh(x[0]);
+  y[15] = math::Cbrt(x[0]);
+  y[16] = math::Pow(x[0], x[1]);
+  y[17] = math::Divide(x[0], x[1]);
+}
+
+}  // namespace armcal

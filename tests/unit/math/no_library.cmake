@@ -1,0 +1,12 @@
+# Fails if OBJECT needs a symbol that lib must not need.
+execute_process(COMMAND ${NM} -u ${OBJECT} OUTPUT_VARIABLE undefined RESULT_VARIABLE failed)
+if(failed)
+  message(FATAL_ERROR "nm failed on ${OBJECT}")
+endif()
+string(REGEX MATCHALL "[A-Za-z_][A-Za-z0-9_.]*\n" symbols "${undefined}")
+foreach(symbol ${symbols})
+  string(STRIP "${symbol}" symbol)
+  if(NOT symbol MATCHES "^(U|memcpy|memset|_GLOBAL_OFFSET_TABLE_)$")
+    message(SEND_ERROR "lib kernels must not need '${symbol}'")
+  endif()
+endforeach()

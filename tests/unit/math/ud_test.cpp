@@ -1,0 +1,142 @@
+// math - the packed kernels against dense Eigen algebra in double; knows no filter.
+#include "armcal/math/ud.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cstring>
+#include <random>
+
+#include "armcal/math/givens.hpp"
+
+namespace armcal::math {
+namespace {
+
+constexpr int n = 9;
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+Matrix Dense(const double* ud) {
+  Matrix u = Matrix::Identity(n, n), d = Matrix::Zero(n, n);
+  for (int j = 0; j < n; ++j) {
+    d(j, j) = ud[UdIndex(j, j)];
+    for (int i = 0; i < j; ++i) u(i, j) = ud[UdIndex(i, j)];
+  }
+  return u * d * u.transpose();
+}
+
+struct Ud : testing::Test {
+  std::mt19937 random{7};
+  std::normal_distribution<double> normal;
+  double ud[UdSize(n)];
+  Vector Random(int size) {
+    return Vector::NullaryExpr(size, [&] { return normal(random); });
+  }
+  Matrix Start() {
+    Matrix w = Matrix::NullaryExpr(n, 14, [&] { return normal(random); });
+    Eigen::Matrix<double, -1, -1, Eigen::RowMajor> rows = w;
+    UdFromSquareRoot<n, 14>(rows.data(), ud);
+    return w * w.transpose();
+  }
+};
+
+TEST_F(Ud, FromSquareRoot_GivesTheProductAndOrthogonalRows) {
+  Matrix w = Matrix::NullaryExpr(n, 14, [&] { return normal(random); });
+  Eigen::Matrix<double, -1, -1, Eigen::RowMajor> rows = w;
+  UdFromSquareRoot<n, 14>(rows.data(), ud);
+  EXPECT_LT((Dense(ud) - w * w.transpose()).norm(), 1e-12);
+  const Matrix gram = rows * rows.transpose();
+  for (int j = 0; j < n; ++j) EXPECT_NEAR(gram(j, j), ud[UdIndex(j, j)], 1e-12);
+  EXPECT_LT((gram - Matrix(gram.diagonal().asDiagonal())).norm(), 1e-12);
+}
+
+TEST_F(Ud, FromSquareRoot_OfDependentRows_GivesZeroDAndTheSameProduct) {
+  Matrix w = Matrix::NullaryExpr(n, 14, [&] { return normal(random); });
+  w.row(3) = 2 * w.row(5) - w.row(8);
+  Eigen::Matrix<double, -1, -1, Eigen::RowMajor> rows = w;
+  UdFromSquareRoot<n, 14>(rows.data(), ud);
+  EXPECT_EQ(ud[UdIndex(3, 3)], 0.0);
+  EXPECT_LT((Dense(ud) - w * w.transpose()).norm(), 1e-12);
+}
+
+TEST_F(Ud, Measure_IsTheKalmanUpdate) {
+  const Matrix p = Start();
+  const Vector h = Random(n);
+  double f[n], gain[n];
+  UdProject<n>(ud, h.data(), f);
+  EXPECT_NEAR(UdQuadratic<n>(ud, f), h.dot(p * h), 1e-11);
+  const double s = UdMeasure<n>(ud, f, 0.3, gain);
+  const double expected_s = h.dot(p * h) + 0.3;
+  EXPECT_NEAR(s, expected_s, 1e-11);
+  EXPECT_LT((Eigen::Map<Vector>(gain, n) - p * h / expected_s).norm(), 1e-12);
+  EXPECT_LT((Dense(ud) - (p - p * h * h.transpose() * p / expected_s)).norm(), 1e-11);
+}
+
+TEST_F(Ud, Measure_OfAZeroRow_LeavesEveryBit) {
+  Start();
+  double before[UdSize(n)], gain[n], f[n] = {};
+  std::memcpy(before, ud, sizeof ud);
+  UdMeasure<n>(ud, f, 1.0, gain);
+  EXPECT_EQ(std::memcmp(before, ud, sizeof ud), 0);
+  for (const double g : gain) EXPECT_EQ(g, 0.0);
+}
+
+TEST_F(Ud, Add_IsTheRankOneSum) {
+  const Matrix p = Start();
+  Vector a = Random(n);
+  a(4) = 0;
+  Vector copy = a;
+  UdAdd<n>(ud, 0.7, copy.data());
+  EXPECT_LT((Dense(ud) - (p + 0.7 * a * a.transpose())).norm(), 1e-11);
+}
+
+TEST_F(Ud, Add_ToAZeroMatrix_GivesTheVectorsSquare) {
+  for (double& u : ud) u = 0;
+  Vector a = Random(n), copy = a;
+  UdAdd<n>(ud, 2.0, copy.data());
+  EXPECT_LT((Dense(ud) - 2 * a * a.transpose()).norm(), 1e-12);
+}
+
+TEST_F(Ud, DiagonalScaleAndSolve_AgreeWithDenseAlgebra) {
+  const Matrix p = Start();
+  double diagonal[n];
+  UdDiagonal<n>(ud, diagonal);
+  for (int i = 0; i < n; ++i) EXPECT_NEAR(diagonal[i], p(i, i), 1e-11);
+  Vector s = Random(n).cwiseAbs(), inverse = s.cwiseInverse();
+  UdScale<n>(ud, s.data(), inverse.data());
+  EXPECT_LT((Dense(ud) - s.asDiagonal() * p * s.asDiagonal()).norm(), 1e-10);
+  Matrix u = Matrix::Identity(n, n);
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < j; ++i) u(i, j) = ud[UdIndex(i, j)];
+  Vector b = Random(n), x = b;
+  UdSolveUpper<n>(ud, x.data());
+  EXPECT_LT((u * x - b).norm(), 1e-9);
+}
+
+TEST_F(Ud, GivensRows_GiveTheCholeskyFactorOfTheNormalMatrix) {
+  constexpr double kFloor = 1e-9;
+  Matrix r = Matrix::Zero(n, n + 1);
+  Vector d = Vector::Constant(n, kFloor);
+  Matrix data = Matrix::NullaryExpr(40, n + 1, [&] { return normal(random); });
+  double rss = 0;
+  for (int row = 0; row < data.rows(); ++row) {
+    Vector x = data.row(row);
+    double weight = 1;
+    for (int j = 0; j < n; ++j) {
+      Vector stored = r.row(j).tail(n - j);
+      weight = GivensRow(d(j), stored.data(), x(j), x.data() + j + 1, n - j, weight);
+      r.row(j).tail(n - j) = stored;
+    }
+    rss += weight * x(n) * x(n);
+  }
+  Matrix unit = r.leftCols(n) + Matrix::Identity(n, n);
+  Matrix information = data.leftCols(n).transpose() * data.leftCols(n) + kFloor * Matrix::Identity(n, n);
+  EXPECT_LT((unit.transpose() * d.asDiagonal() * unit - information).norm(), 1e-10);
+  const Vector solution = unit.triangularView<Eigen::Upper>().solve(r.col(n));
+  const Vector expected = data.leftCols(n).householderQr().solve(data.col(n));
+  EXPECT_LT((solution - expected).norm(), 1e-8);
+  EXPECT_NEAR(rss, (data.col(n) - data.leftCols(n) * expected).squaredNorm(), 1e-7);
+}
+
+}  // namespace
+}  // namespace armcal::math

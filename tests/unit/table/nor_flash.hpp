@@ -1,0 +1,114 @@
+// table - a NOR flash that can be cut off at any instant; knows no record.
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "armcal/port/storage.hpp"
+
+namespace armcal::test {
+
+struct Geometry {
+  std::uint32_t sectors, sector_bytes, unit;
+  std::uint8_t erased;
+};
+
+// Where the power fails: in which operation (program or erase, counted from 0), and how many of its bytes are done by
+// then. The byte at the cut has some of its bits done.
+struct Cut {
+  int operation;
+  std::uint32_t bytes;
+};
+
+class NorFlash {
+ public:
+  explicit NorFlash(const Geometry& g)
+      : geometry_(g), cells_(g.sectors * g.sector_bytes, g.erased), written_(cells_.size() / g.unit, false) {}
+
+  port::Storage storage() {
+    return {this, geometry_.sectors, geometry_.sector_bytes, geometry_.unit, geometry_.erased, &Read, &Program, &Erase};
+  }
+
+  void CutAt(Cut cut) { cut_ = cut; }
+  void PowerUp() {
+    dead_ = false;
+    cut_ = {-1, 0};
+    operations_ = 0;
+  }
+  // Planted faults.
+  void FailOperation(int operation) { failing_ = operation; }   // answers kStorageFault, does nothing
+  void SkipOperation(int operation) { skipping_ = operation; }  // answers kOk, does nothing
+
+  std::vector<std::uint8_t>& cells() { return cells_; }
+  int operations() const { return operations_; }
+  int erases(std::uint32_t sector) const { return sector < erases_.size() ? erases_[sector] : 0; }
+  bool dead() const { return dead_; }
+  bool misused() const { return misused_; }                               // a unit programmed twice, or not aligned
+  const std::vector<std::uint32_t>& lengths() const { return lengths_; }  // bytes of each operation
+
+ private:
+  static core::Status Read(void* self, std::uint32_t address, std::uint8_t* bytes, std::uint32_t count) {
+    auto& f = *static_cast<NorFlash*>(self);
+    if (f.dead_ || address + count > f.cells_.size()) return core::Status::kStorageFault;
+    for (std::uint32_t i = 0; i < count; ++i) bytes[i] = f.cells_[address + i];
+    return core::Status::kOk;
+  }
+
+  static core::Status Program(void* self, std::uint32_t address, const std::uint8_t* bytes, std::uint32_t count) {
+    auto& f = *static_cast<NorFlash*>(self);
+    const std::uint32_t unit = f.geometry_.unit;
+    if (address % unit != 0 || count % unit != 0 || count > 64) f.misused_ = true;
+    for (std::uint32_t u = address / unit; u < (address + count) / unit; ++u) {
+      f.misused_ = f.misused_ || f.written_[u];
+    }
+    return f.Operate(address, count, [&](std::uint32_t i) {
+      f.written_[(address + i) / unit] = true;
+      const std::uint8_t cell = f.cells_[address + i];
+      return static_cast<std::uint8_t>(f.geometry_.erased == 0xFF ? cell & bytes[i] : cell | bytes[i]);
+    });
+  }
+
+  static core::Status Erase(void* self, std::uint32_t sector) {
+    auto& f = *static_cast<NorFlash*>(self);
+    const std::uint32_t base = sector * f.geometry_.sector_bytes;
+    if (f.erases_.size() <= sector) f.erases_.resize(sector + 1, 0);
+    ++f.erases_[sector];
+    return f.Operate(base, f.geometry_.sector_bytes, [&](std::uint32_t i) {
+      f.written_[(base + i) / f.geometry_.unit] = false;
+      return f.geometry_.erased;
+    });
+  }
+
+  template <class NewValue>
+  core::Status Operate(std::uint32_t base, std::uint32_t count, NewValue new_value) {
+    if (dead_) return core::Status::kStorageFault;
+    const int operation = operations_++;
+    lengths_.push_back(count);
+    if (operation == failing_) return core::Status::kStorageFault;
+    if (operation == skipping_) return core::Status::kOk;
+    const bool cut = operation == cut_.operation;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::uint8_t old = cells_[base + i];
+      if (cut && i > cut_.bytes) break;
+      const std::uint8_t wanted = new_value(i);
+      const auto done = static_cast<std::uint8_t>(random_());
+      cells_[base + i] = cut && i == cut_.bytes ? static_cast<std::uint8_t>((wanted & done) | (old & ~done)) : wanted;
+    }
+    dead_ = cut;
+    return cut ? core::Status::kStorageFault : core::Status::kOk;
+  }
+
+  Geometry geometry_;
+  std::vector<std::uint8_t> cells_;
+  std::vector<bool> written_;
+  std::vector<int> erases_;
+  std::vector<std::uint32_t> lengths_;
+  std::mt19937 random_{7};
+  Cut cut_{-1, 0};
+  int failing_ = -1, skipping_ = -1;
+  int operations_ = 0;
+  bool dead_ = false, misused_ = false;
+};
+
+}  // namespace armcal::test

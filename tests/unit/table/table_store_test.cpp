@@ -1,0 +1,211 @@
+// table - what the store answers and keeps: blank, corrupt, other schema, faults, wear, bit rot.
+#include "armcal/table/table_store.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "tests/unit/table/nor_flash.hpp"
+
+namespace {
+
+using namespace armcal;
+using core::Status;
+using table::SlotState;
+using table::TableStore;
+using test::NorFlash;
+
+constexpr std::uint32_t kSchema = 0xABCD1234, kOther = 0x55550000;
+constexpr std::uint32_t kWords = 50;
+const test::Geometry kNor{2, 512, 8, 0xFF};
+
+using Words = std::vector<std::uint16_t>;
+
+Words Table(int number, std::uint32_t count = kWords) {
+  Words words(count);
+  for (std::size_t i = 0; i < words.size(); ++i) words[i] = static_cast<std::uint16_t>(1000 * number + 7 * i);
+  return words;
+}
+
+Status Finish(TableStore& store) {
+  Status status;
+  int steps = 0;
+  while ((status = store.Step()) == Status::kBusy && ++steps < 10000) {
+  }
+  return status;
+}
+
+Status SaveAll(TableStore& store, const Words& words) {
+  const Status begun = store.Save(words.data());
+  return core::IsOk(begun) ? Finish(store) : begun;
+}
+
+// A fresh power-up: what is loaded; empty unless kOk.
+Words Boot(NorFlash& flash, Status expected = Status::kOk, std::uint32_t schema = kSchema) {
+  TableStore store(flash.storage(), schema, kWords);
+  Words words(kWords);
+  EXPECT_EQ(store.Load(words.data()), expected);
+  return expected == Status::kOk ? words : Words{};
+}
+
+void Prepare(NorFlash& flash, int number, std::uint32_t schema = kSchema) {
+  TableStore store(flash.storage(), schema, kWords);
+  Words old(kWords);
+  static_cast<void>(store.Load(old.data()));
+  ASSERT_EQ(SaveAll(store, Table(number)), Status::kOk);
+}
+
+TEST(Store, OnBlankStorage_SaysBlank_NotCorrupt) {
+  for (const std::uint8_t erased : {std::uint8_t{0xFF}, std::uint8_t{0x00}}) {
+    NorFlash flash({2, 512, 4, erased});
+    Boot(flash, Status::kBlank);
+  }
+}
+
+TEST(Store, AfterASave_LoadsItAtTheNextPowerUp) {
+  NorFlash flash(kNor);
+  Prepare(flash, 1);
+  EXPECT_EQ(Boot(flash), Table(1));
+  Prepare(flash, 2);
+  EXPECT_EQ(Boot(flash), Table(2));
+  EXPECT_FALSE(flash.misused());
+}
+
+TEST(Store, DuringASave_DoesOneStorageOperationAStep) {
+  NorFlash flash(kNor);
+  TableStore store(flash.storage(), kSchema, kWords);
+  Words words = Table(1);
+  ASSERT_EQ(store.Save(words.data()), Status::kOk);
+  EXPECT_EQ(store.Save(words.data()), Status::kBusy);
+  for (int before = flash.operations(); store.Step() == Status::kBusy; before = flash.operations())
+    EXPECT_LE(flash.operations() - before, 1);
+}
+
+TEST(Store, OfManySaves_ErasesOnceASaveAndAlternates) {
+  NorFlash flash(kNor);
+  TableStore store(flash.storage(), kSchema, kWords);
+  Words words(kWords);
+  ASSERT_EQ(store.Load(words.data()), Status::kBlank);
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_EQ(SaveAll(store, Table(i)), Status::kOk);
+    ASSERT_EQ(flash.erases(0) + flash.erases(1), i + 1);
+    ASSERT_LE(std::abs(flash.erases(0) - flash.erases(1)), 1);
+  }
+  EXPECT_EQ(store.sequence(), 1000u);
+  EXPECT_FALSE(flash.misused());
+}
+
+TEST(Store, WithARecordOfAnotherSchema_KeepsItUntilTheNewOneIsSaved) {
+  for (const int saves : {1, 2, 3}) {  // the newest lies in slot 0, 1, 0
+    NorFlash flash(kNor);
+    for (int i = 1; i <= saves; ++i) Prepare(flash, i, kOther);
+    TableStore store(flash.storage(), kSchema, kWords);
+    Words words(kWords);
+    EXPECT_EQ(store.Load(words.data()), Status::kWrongSchema);
+    ASSERT_EQ(SaveAll(store, Table(9)), Status::kOk);
+    EXPECT_EQ(Boot(flash), Table(9));
+    EXPECT_EQ(Boot(flash, Status::kOk, kOther), Table(saves)) << "the newest table of the other schema must survive";
+  }
+}
+
+TEST(Store, WithBothSlotsSpoilt_SaysCorrupt_AndStillSaves) {
+  NorFlash flash(kNor);
+  Prepare(flash, 1);
+  Prepare(flash, 2);
+  flash.cells()[30] ^= 1;
+  flash.cells()[512 + 30] ^= 1;
+  Boot(flash, Status::kCorrupt);
+  Prepare(flash, 3);
+  EXPECT_EQ(Boot(flash), Table(3));
+}
+
+TEST(Store, AfterAnySingleBitError_NeverHandsOutAWrongTable) {
+  NorFlash flash(kNor);
+  Prepare(flash, 1);
+  Prepare(flash, 2);  // slot 1 is in force
+  const std::uint32_t record = table::RecordBytes(kWords, 8);
+  const std::uint32_t body = table::BodyBytes(kWords), commit = table::CommitOffset(kWords, 8);
+  for (std::uint32_t bit = 0; bit < 8 * record; ++bit) {
+    std::uint8_t& cell = flash.cells()[512 + bit / 8];
+    cell ^= static_cast<std::uint8_t>(1u << (bit % 8));
+    TableStore store(flash.storage(), kSchema, kWords);
+    Words words(kWords);
+    ASSERT_EQ(store.Load(words.data()), Status::kOk);
+    const bool padding = (bit / 8 >= body && bit / 8 < commit) || bit / 8 >= commit + 4;
+    EXPECT_EQ(words, Table(padding ? 2 : 1)) << "bit " << bit;
+    if (!padding) {
+      EXPECT_EQ(store.slot_state(1), SlotState::kCorrupt) << "bit " << bit;
+    }
+    cell ^= static_cast<std::uint8_t>(1u << (bit % 8));
+  }
+}
+
+TEST(Store, WhenAnyOperationFailsOrDoesNothing_KeepsTheTableInForce) {
+  int operations = 0;
+  {
+    NorFlash flash(kNor);
+    Prepare(flash, 1);
+    operations = flash.operations();
+  }
+  for (const bool silent : {false, true}) {
+    for (int failing = 0; failing < operations; ++failing) {
+      NorFlash flash(kNor);
+      Prepare(flash, 1);
+      Prepare(flash, 2);
+      TableStore store(flash.storage(), kSchema, kWords);
+      Words words(kWords);
+      ASSERT_EQ(store.Load(words.data()), Status::kOk);
+      const int operation = flash.operations() + failing;
+      silent ? flash.SkipOperation(operation) : flash.FailOperation(operation);
+      EXPECT_EQ(SaveAll(store, Table(3)), Status::kStorageFault) << failing << (silent ? " silent" : "");
+      EXPECT_EQ(Boot(flash), Table(2));
+      EXPECT_EQ(SaveAll(store, Table(4)), Status::kOk) << "a passing fault must not stay";
+      EXPECT_EQ(Boot(flash), Table(4));
+    }
+  }
+}
+
+TEST(Store, Revoked_IsAsBeforeTheSave) {
+  NorFlash flash(kNor);
+  Prepare(flash, 1);
+  TableStore store(flash.storage(), kSchema, kWords);
+  Words words(kWords);
+  ASSERT_EQ(store.Load(words.data()), Status::kOk);
+  EXPECT_EQ(store.Revoke(), Status::kWrongOrder);
+  ASSERT_EQ(SaveAll(store, Table(2)), Status::kOk);
+  ASSERT_EQ(store.Revoke(), Status::kOk);
+  EXPECT_EQ(Finish(store), Status::kOk);
+  EXPECT_EQ(store.sequence(), 1u);
+  EXPECT_EQ(Boot(flash), Table(1));
+}
+
+TEST(Store, WithAWrappedSequence_TakesTheNewerOne) {
+  NorFlash flash(kNor);
+  Prepare(flash, 1);
+  // The record in slot 0 is made one of sequence 0xFFFFFFFF, checksum and all.
+  std::uint8_t* record = flash.cells().data();
+  core::PutBytes32(record + 16, 0xFFFFFFFFu);
+  const std::uint32_t covered = table::kHeaderBytes + 2 * kWords;
+  std::uint32_t crc = 0xFFFFFFFFu;
+  for (std::uint32_t i = 0; i < covered; ++i) {
+    crc ^= record[i];
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1u) ? (crc >> 1) ^ 0xEDB88320u : crc >> 1;
+  }
+  core::PutBytes32(record + covered, ~crc);
+  EXPECT_EQ(Boot(flash), Table(1));
+  Prepare(flash, 2);  // gets sequence 0
+  EXPECT_EQ(Boot(flash), Table(2));
+}
+
+TEST(Store, OnStorageThatIsTooSmallOrOdd_RefusesToSave) {
+  for (const test::Geometry g : {test::Geometry{2, 64, 8, 0xFF}, test::Geometry{1, 512, 8, 0xFF},
+                                 test::Geometry{2, 512, 128, 0xFF}, test::Geometry{2, 512, 3, 0xFF}}) {
+    NorFlash flash(g);
+    TableStore store(flash.storage(), kSchema, kWords);
+    Words words = Table(1);
+    EXPECT_EQ(store.Load(words.data()), Status::kWrongSize);
+    EXPECT_EQ(store.Save(words.data()), Status::kWrongSize);
+  }
+}
+
+}  // namespace

@@ -1,0 +1,83 @@
+# Language level, warnings and floating-point rules of every target; one place.
+option(ARMCAL_SANITIZE "address and undefined-behaviour sanitizers (host)" OFF)
+
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+add_library(armcal_rules INTERFACE)
+# Contraction would make host and target differ in the last bit; fast-math would remove the NaN checks.
+target_compile_options(armcal_rules INTERFACE -Wall -Wextra -Wpedantic -Werror -Wshadow -ffp-contract=off -fno-fast-math
+                       -fno-math-errno)
+target_include_directories(armcal_rules INTERFACE ${PROJECT_SOURCE_DIR}/lib)
+
+# What every room of lib asks of the code that includes it: on the target a double is an accident.
+add_library(armcal_lib_rules INTERFACE)
+target_link_libraries(armcal_lib_rules INTERFACE armcal_rules)
+target_compile_options(armcal_lib_rules INTERFACE -Wconversion -Wno-sign-conversion -Wdouble-promotion)
+
+# Host-side code computes in double. g++ 12 reports -Wrestrict inside its own string concatenation (GCC bug 105651).
+add_library(armcal_host_rules INTERFACE)
+target_link_libraries(armcal_host_rules INTERFACE armcal_rules)
+target_compile_options(armcal_host_rules INTERFACE -Wno-restrict)
+target_include_directories(armcal_host_rules INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_features(armcal_host_rules INTERFACE cxx_std_20)
+
+if(ARMCAL_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
+  # GCC's manual: with sanitizers -Wmaybe-uninitialized reports what is not there.
+  target_compile_options(armcal_rules INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=all -O1
+                         -Wno-maybe-uninitialized)
+  target_link_options(armcal_rules INTERFACE -fsanitize=address,undefined)
+endif()
+
+# armcal_library(NAME [SOURCES ...] [LIBS ...]): a room of lib. C++17, no exceptions, no RTTI. Without sources: headers only.
+function(armcal_library name)
+  cmake_parse_arguments(A "" "" "SOURCES;LIBS" ${ARGN})
+  if(A_SOURCES)
+    add_library(${name} STATIC ${A_SOURCES})
+    target_link_libraries(${name} PUBLIC armcal_lib_rules ${A_LIBS})
+    target_compile_options(${name} PRIVATE -fno-exceptions -fno-rtti -fno-threadsafe-statics)
+    target_compile_features(${name} PUBLIC cxx_std_17)
+  else()
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE armcal_lib_rules ${A_LIBS})
+    target_compile_features(${name} INTERFACE cxx_std_17)
+  endif()
+endfunction()
+
+# armcal_host_library(NAME SOURCES ... [LIBS ...]): a room of codegen/src or host_sim. C++20; includes from the top folder.
+function(armcal_host_library name)
+  cmake_parse_arguments(A "" "" "SOURCES;LIBS" ${ARGN})
+  add_library(${name} STATIC ${A_SOURCES})
+  target_link_libraries(${name} PUBLIC armcal_host_rules ${A_LIBS})
+endfunction()
+
+# The test executables labelled fast: what the sanitizer build makes.
+add_custom_target(fast_tests)
+
+# armcal_test(NAME SOURCES ... [LIBS ...] [LABELS fast|all|long]): one GoogleTest executable, one CTest entry.
+function(armcal_test name)
+  cmake_parse_arguments(A "" "LABELS;TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${A_SOURCES})
+  target_link_libraries(${name} PRIVATE armcal_host_rules ${A_LIBS} GTest::gtest_main)
+  add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  if(NOT A_LABELS)
+    set(A_LABELS fast)
+  endif()
+  if(NOT A_TIMEOUT)
+    set(A_TIMEOUT 300)
+  endif()
+  set_tests_properties(${name} PROPERTIES LABELS ${A_LABELS} TIMEOUT ${A_TIMEOUT})
+  if(A_LABELS STREQUAL fast)
+    add_dependencies(fast_tests ${name})
+  endif()
+endfunction()
+
+# add every subfolder that has a CMakeLists.txt
+function(armcal_add_rooms)
+  file(GLOB rooms CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/*/CMakeLists.txt)
+  foreach(room ${rooms})
+    get_filename_component(room ${room} DIRECTORY)
+    add_subdirectory(${room})
+  endforeach()
+endfunction()

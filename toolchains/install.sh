@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# toolchains - installs what armcal is built with, from Debian's own packages (Debian 12).
+#   toolchains/install.sh host    compiler, libraries and tests of the PC side
+#   toolchains/install.sh cross   compiler of the Cortex-M images
+# Does nothing when all is there. Needs root or sudo only when something is missing.
+set -euo pipefail
+
+host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
+  libeigen3-dev liborocos-kdl-dev libmodbus-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev zlib1g-dev
+  libgtest-dev googletest mbpoll)
+cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib)
+
+case "${1:-}" in
+  host) wanted=("${host_packages[@]}") ;;
+  cross) wanted=("${cross_packages[@]}") ;;
+  *) sed -n '2,5p' "$0" >&2; exit 2 ;;
+esac
+
+missing=()
+for package in "${wanted[@]}"; do
+  state=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
+  [[ $state == installed ]] || missing+=("$package")
+done
+[[ ${#missing[@]} -gt 0 ]] || exit 0
+
+as_root=()
+if [[ $EUID -ne 0 ]]; then
+  command -v sudo >/dev/null || { echo "install.sh: needs root to install: ${missing[*]}" >&2; exit 1; }
+  as_root=(sudo)
+fi
+
+echo "installing ${missing[*]}"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+apt() { "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -y -qq -o DPkg::Lock::Timeout=300 "$@" >"$log" 2>&1; }
+{ apt update && apt install --no-install-recommends "${missing[@]}"; } || { cat "$log" >&2; exit 1; }

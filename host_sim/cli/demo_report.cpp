@@ -99,8 +99,7 @@ std::string DemoText(const nlohmann::ordered_json& r) {
       "\nfound by armcal:    {}\nin the simulation:  {}  (read after the verdict was written)\n", Verdict(r), Truth(r));
   out += fmt::format("brought to the drive: {}; table CRC {}, read back {}\n\n", r["path"].get<std::string>(),
                      r["table_crc"].get<std::string>(), r["readback_ok"].get<bool>() ? "equal" : "DIFFERENT");
-  out += ErrorTable(r).caption + "\n" + report::Text(ErrorTable(r)) + "\n" + TrackingTable(r).caption + "\n" +
-         report::Text(TrackingTable(r));
+  out += report::Text(ErrorTable(r)) + "\n" + report::Text(TrackingTable(r));
   return out;
 }
 
@@ -114,16 +113,16 @@ void WriteDemoPage(const std::string& path, const nlohmann::ordered_json& r, con
   page.Section("Error before and after");
   page.Add(ErrorTable(r));
   report::Bars bars;
-  bars.text.title = "on the drive, held-out motion";
+  bars.text.title = "on the drive, held-out motion: torque error over the floor of the plant";
   bars.text.x_label = "joint";
-  bars.text.y_label = "RMS torque error / N m";
-  bars.series = {"CAD table", "identified", "with the effect", "floor of the plant"};
+  bars.text.y_label = "times the floor";
+  bars.series = {"CAD table", "identified", "with the effect"};
   bars.value.resize(bars.series.size());
-  const char* const keys[] = {"drive_cad", "drive_before", "drive_after", "plant_floor"};
+  const char* const keys[] = {"drive_cad", "drive_before", "drive_after"};
   for (int j = 0; j < static_cast<int>(r["before"].size()); ++j) {
     bars.categories.push_back(std::to_string(j + 1));
-    for (int k = 0; k < 4; ++k)
-      bars.value[k].push_back(r.contains(keys[k]) ? r[keys[k]][j].get<double>() : std::nan(""));
+    for (int k = 0; k < 3; ++k)
+      bars.value[k].push_back(r[keys[k]][j].get<double>() / r["plant_floor"][j].get<double>());
   }
   page.Add(bars,
            "Measured torque minus the committed model's torque at the measured state, computed on the drive and read "

@@ -2,6 +2,7 @@
 #include "host_sim/cli/diagnosis_report.hpp"
 
 #include <fmt/core.h>
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -67,9 +68,20 @@ report::Series Binned(const std::string& name, const VectorXd& x, const VectorXd
   return s;
 }
 
+// Residual of joint j where it moves, a gap elsewhere.
+std::vector<double> Moving(const calibration::Dataset& d, const Eigen::MatrixXd& residual, int j) {
+  std::vector<double> out(static_cast<std::size_t>(d.samples()));
+  for (int k = 0; k < d.samples(); ++k) out[static_cast<std::size_t>(k)] = d.used(k, j) ? residual(k, j) : std::nan("");
+  return out;
+}
+
 std::vector<double> Values(const VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
 }  // namespace
+
+bool AnyConfirmed(const diagnosis::Finding& f) {
+  return std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed; });
+}
 
 std::string JointName(const Term& t) {
   if (t.joints.size() == 1) return std::to_string(t.joints[0] + 1);
@@ -80,7 +92,7 @@ std::string JointName(const Term& t) {
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   const auto& f = *v.finding;
   nlohmann::ordered_json j;
-  j["verdict"] = f.terms.empty() ? "none" : "effect";
+  j["verdict"] = AnyConfirmed(f) ? "effect" : "none";
   j["joint_base"] = 1;
   j["terms"] = nlohmann::ordered_json::array();
   for (const Term& t : f.terms) {
@@ -127,7 +139,9 @@ std::string DiagnosisText(const DiagnosisView& v) {
     for (int j = 0; j < v.model->joints(); ++j) out += fmt::format(" {:.2g}", v.finding->smallest[j]);
     return out + "\n";
   }
-  out = "verdict: effect\n";
+  out = AnyConfirmed(*v.finding)
+            ? "verdict: effect\n"
+            : "verdict: none. What the training logs suggested did not hold on the held-out log:\n";
   for (const Term& t : v.finding->terms) {
     out += fmt::format("  {}, joint {}{}: {}\n", t.record->name, JointName(t),
                        t.confirmed ? "" : " (NOT CONFIRMED on the held-out log)", t.record->title);
@@ -192,9 +206,10 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
          Binned("what remains", x, v.held_out->after.col(j), test.moving.col(j))}};
     page.Add(dependence, "Held-out log, moving samples.");
     report::Plot time{{fmt::format("residual of joint {} over time", j + 1), "time / s", "torque / N m"},
-                      {{"before", Values(test.s.t), Values(v.held_out->before.col(j)), report::Style::kLine},
-                       {"after", Values(test.s.t), Values(v.held_out->after.col(j)), report::Style::kLine}}};
-    page.Add(time, "Held-out log, all samples; at standstill friction holds any torque up to its breakaway level.");
+                      {{"before", Values(test.s.t), Moving(test, v.held_out->before, j), report::Style::kLine},
+                       {"after", Values(test.s.t), Moving(test, v.held_out->after, j), report::Style::kLine}}};
+    page.Add(time,
+             "Held-out log, where the joint moves; at standstill friction holds any torque up to its breakaway level.");
   }
 }
 
@@ -216,14 +231,13 @@ std::string RobotFileWithTerms(const codegen::Model& model, const diagnosis::Fin
     for (const int j : t.joints) joints += fmt::format("{}{}", joints.empty() ? "" : ", ", j + 1);
     if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
     std::string mean, nonlinear;
-    const auto key = [&](const std::string& name) { return "\"" + name + "\""; };
     for (std::size_t c = 0; c < t.columns.size(); ++c) {
-      mean += fmt::format("{}{} = {:.9e}", mean.empty() ? "" : ", ", key(t.columns[c].name), t.amplitude[c]);
+      mean += fmt::format("{}{} = {:.9e}", mean.empty() ? "" : ", ", t.columns[c].key, t.amplitude[c]);
       text +=
           fmt::format("# {} = {:.5g} +- {:.2g} {}\n", t.columns[c].name, t.amplitude[c], t.sd[c], t.columns[c].unit);
     }
     for (std::size_t k = 0; k < t.eta.size(); ++k)
-      nonlinear += fmt::format("{}{} = {:.9e}", nonlinear.empty() ? "" : ", ", key(t.unknowns[k].name), t.eta[k]);
+      nonlinear += fmt::format("{}{} = {:.9e}", nonlinear.empty() ? "" : ", ", t.unknowns[k].key, t.eta[k]);
     text += "mean = { " + mean + " }\n";
     if (!nonlinear.empty()) text += "nonlinear = { " + nonlinear + " }\n";
   }

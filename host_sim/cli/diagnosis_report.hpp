@@ -42,6 +42,9 @@ struct DiagnosisRun {
 // (diagnose.cpp)
 std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options);
 
+// At least one term held on the held-out log.
+bool AnyConfirmed(const diagnosis::Finding& finding);
+
 // "3", "5-6", "all", "flange": how a report names the joints of a term.
 std::string JointName(const diagnosis::Term& term);
 

@@ -59,7 +59,7 @@ void PrintHeldOut(const HeldOutError& e, const std::string& name) {
                       fmt::format("{:.2f}", 100 * e.relative[j])});
     if (e.band_Hz > 0) t.rows.back().push_back(fmt::format("{:.2f}", 100 * e.relative_band[j]));
   }
-  fmt::print("held out: {}\n{}", name, report::Text(t));
+  fmt::print("{}", report::Text(t));
 }
 
 std::vector<double> ToList(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }

@@ -95,7 +95,9 @@ class Selector {
     return std::any_of(terms.begin(), terms.end(), [&](const Chosen* t) {
       const auto& like = t->candidate->record().confusable_with;
       const bool confusable = std::find(like.begin(), like.end(), c.record().name) != like.end();
-      return t->candidate == &c || (confusable && t->candidate->joints() == c.joints());
+      // another frequency of the same kind is another term
+      return (t->candidate == &c && c.record().search.how != "spectral") ||
+             (confusable && t->candidate->joints() == c.joints());
     });
   }
   bool Accept(const Metric& white, const std::vector<Ranked>& ranked, std::size_t k, Chosen& out) {

@@ -171,6 +171,7 @@ Diagnosis::Work::Estimate Diagnosis::Work::Solve(const std::vector<const Chosen*
           e.size() ? std::max(1e-12, std::sqrt(e.squaredNorm() / static_cast<double>(e.size()))) : declared.sigma[j];
       out.innovation[j] = FitNoise(rows.index[j], e).innovation;
     }
+    if (terms.empty()) out.x = declared.x, out.sigma = declared.sigma;  // `before` and `after` are then the same fit
     estimate = out;
   }
   return out;

@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "host_sim/drive/drive.hpp"
-#include "selected_model.hpp"
+#include <selected_model.hpp>
 
 namespace {
 

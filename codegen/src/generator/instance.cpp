@@ -151,7 +151,7 @@ std::vector<std::vector<int>> JointSets(const EffectRecord& record, int n) {
 }
 
 EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
-                           const ModelQuantities& quantities) {
+                           const ModelQuantities& quantities, int ordinal) {
   const std::size_t expected = record.scope == "joint" ? 1 : (record.scope == "pair" ? 2 : 0);
   if (joints.size() != expected)
     throw io::InputError(record.path + ": scope: \"" + record.scope + "\" takes " + std::to_string(expected) +
@@ -159,12 +159,14 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
   EffectInstance out;
   out.record = &record;
   out.joints = joints;
-  const std::string prefix = record.friction_law ? "" : record.name + ".", suffix = Suffix(joints);
+  const std::string number = ordinal > 1 ? "_" + std::to_string(ordinal) : "";
+  const std::string prefix = record.friction_law ? "" : record.name + number + ".", suffix = Suffix(joints);
   Names names(g, record, robot, joints, quantities);
   for (const NonlinearParameter& p : record.nonlinear) {
     const std::string where = record.path + ": nonlinear " + p.name;
     EffectUnknown u{prefix + p.name + suffix,
                     p.unit,
+                    p.name,
                     ConstantValue(g, p.lower, robot, joints, where),
                     ConstantValue(g, p.upper, robot, joints, where),
                     ConstantValue(g, p.initial, robot, joints, where),
@@ -179,6 +181,7 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
     for (const std::string& index : p.index.empty() ? one : p.index) {
       EffectColumn c;
       c.name = prefix + p.name + (index.empty() ? "" : index) + (index.empty() || suffix.empty() ? "" : "_") + suffix;
+      c.key = p.name + index;
       c.unit = p.unit;
       c.sd = ConstantValue(g, p.sd, robot, joints, record.path + ": sd of " + p.name);
       c.lower = p.lower;

@@ -15,6 +15,7 @@ namespace armcal::codegen {
 
 struct EffectColumn {
   std::string name, unit;    // "torque_offset.To3"
+  std::string key;           // "To": what a robot file calls it inside [[effect]]
   std::map<int, Expr> rows;  // joint (0-based) -> column value in that joint's row
   double sd = 0, lower = 0, upper = 0, process_noise = 0;
   bool fixed_amplitude = false;
@@ -23,6 +24,7 @@ struct EffectColumn {
 
 struct EffectUnknown {     // a nonlinear parameter
   std::string name, unit;  // "stribeck.vs3"; also the name of its graph input
+  std::string key;         // "vs"
   double lower = 0, upper = 0, initial = 0;
   bool logarithmic = false;
 };
@@ -44,9 +46,10 @@ struct ModelQuantities {
 // Plain graph inputs named tau_rigid1.., tau_gravity1.., Y<row>_<body>_<parameter>.
 ModelQuantities QuantitiesAsInputs(Graph& graph);
 
-// Throws io::InputError naming the record where an expression does not parse or does not fit the scope.
+// Throws io::InputError naming the record where an expression does not parse or does not fit the scope. ordinal: 1 for
+// the first use of the record on these joints; a second harmonic of the same ripple is 2 and gets names of its own.
 EffectInstance Instantiate(Graph& graph, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
-                           const ModelQuantities& quantities);
+                           const ModelQuantities& quantities, int ordinal = 1);
 
 // The joint sets on which a record may be tried: each joint, each ordered pair, or the whole arm once.
 std::vector<std::vector<int>> JointSets(const EffectRecord& record, int joints);

@@ -93,13 +93,15 @@ void Model::AddEffects(const Catalogue& catalogue, const ModelQuantities& quanti
     for (const auto& set : sets) {
       // A later entry for the same effect and joints says more about the first one: its state and values, not a second
       // column.
-      std::size_t known = 0;
-      while (known < effect_.size() && (effect_[known].record != &record || effect_[known].joints != set)) ++known;
+      std::size_t known = effect_.size();
+      int ordinal = 1;
+      for (std::size_t e = 0; e < effect_.size(); ++e)
+        if (effect_[e].record == &record && effect_[e].joints == set) known = e, ++ordinal;
       if (known < effect_.size() && record.search.how != "spectral") {
         use_[known] = use;
         continue;
       }
-      effect_.push_back(Instantiate(*graph_, record, robot_, set, quantities));
+      effect_.push_back(Instantiate(*graph_, record, robot_, set, quantities, ordinal));
       use_.push_back(use);
     }
   }
@@ -166,16 +168,12 @@ void Model::MakeTable() {
     TableParameter p{
         c.name, c.unit,        c.amplitude, c.sd, c.lower, c.upper, 0, use.state, e.record->friction_law ? 1 : 2,
         joint,  e.record->name};
-    const LinearParameter* linear = nullptr;
-    for (const LinearParameter& l : e.record->linear)
-      if (c.name.find((e.record->friction_law ? "" : e.record->name + ".") + l.name) == 0) linear = &l;
-    if (e.record->friction_law && joint >= 0 && linear) {
-      const auto it = robot_.joint[joint].nominal.find(linear->name);
+    if (e.record->friction_law && joint >= 0) {
+      const auto it = robot_.joint[joint].nominal.find(c.key);
       if (it != robot_.joint[joint].nominal.end() && it->second > 0)
         p.mean = it->second, p.sd = robot_.friction_relative_sd * it->second;
     }
-    for (const std::string& key : {c.name, linear ? linear->name : c.name})
-      if (const auto it = use.mean.find(key); it != use.mean.end()) p.mean = it->second;
+    if (const auto it = use.mean.find(c.key); it != use.mean.end()) p.mean = it->second;
     if (c.fixed_amplitude) p.state = "fixed";
     if (use.state == "standby") p.mean = 0;
     p.process_noise = c.process_noise * c.sd * c.sd * robot_.sample_ticks / robot_.tick_rate_Hz;
@@ -183,10 +181,8 @@ void Model::MakeTable() {
   }
   for (std::size_t e = 0; e < effect_.size(); ++e)
     for (const EffectUnknown& u : effect_[e].unknowns) {
-      double mean = u.initial;
-      const std::string plain = u.name.substr(effect_[e].record->name.size() + 1);
-      for (const auto& [key, value] : use_[e].nonlinear)
-        if (key == u.name || key == plain) mean = value;
+      const auto it = use_[e].nonlinear.find(u.key);
+      const double mean = it != use_[e].nonlinear.end() ? it->second : u.initial;
       table_.push_back({u.name, u.unit, mean, 0, u.lower, u.upper, 0, "fixed", 2,
                         effect_[e].joints.empty() ? -1 : effect_[e].joints[0], effect_[e].record->name});
     }

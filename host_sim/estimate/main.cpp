@@ -1,4 +1,4 @@
-// drive - the host port: lib's own estimator on Linux, fed over Modbus from the drive's trace, or from a recorded log.
+// estimate - the host port: lib's own estimator on Linux, fed over Modbus from the drive's trace, or from a recorded log.
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -20,9 +20,9 @@
 #include "host_sim/client/trace_reader.hpp"
 #include "host_sim/io/files.hpp"
 #include "host_sim/io/input_error.hpp"
-#include "selected_model.hpp"
+#include <selected_model.hpp>
 
-namespace armcal::drive {
+namespace armcal::estimate {
 namespace {
 
 using Model = generated::SelectedModel;
@@ -231,14 +231,14 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace armcal::drive
+}  // namespace armcal::estimate
 
 int main(int argc, char** argv) {
   const auto fail = [](const std::exception& e, int code) {
     return std::fprintf(stderr, "armcal estimate: %s\n", e.what()), code;
   };
   try {
-    return armcal::drive::Main(argc, argv);
+    return armcal::estimate::Main(argc, argv);
   } catch (const armcal::client::LinkError& e) {
     return fail(e, 3);
   } catch (const armcal::client::RefusedError& e) {

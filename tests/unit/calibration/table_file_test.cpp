@@ -1,0 +1,158 @@
+// calibration tests - the table file: text, words and names keep every value; foreign ones are refused.
+#include <gtest/gtest.h>
+
+#include "armcal/estimator/image.hpp"
+#include "codegen/generated/er20_like/model.hpp"
+#include "host_sim/calibration/table_file.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+#include "tests/unit/io/temporary_folder.hpp"
+
+namespace armcal::calibration {
+namespace {
+
+using io::test::ErrorOf;
+using io::test::TemporaryFolder;
+
+const codegen::Model& Er20() {
+  static const codegen::Model model(codegen::ReadRobot("codegen/robots/er20_like.toml"), tests::Records());
+  return model;
+}
+
+TableFile Changed() {
+  TableFile t = DefaultTable(Er20());
+  t.note = "for a test";
+  t.bumpless = true, t.blend_ms = 250;
+  t.forgetting[1] = 0.9995;
+  t.joint[2] = {1.25, 0.03, 900, 1.02};
+  t.row[70].mean = 12.345678, t.row[70].sd = 1.5, t.row[70].process_noise = 1e-7;
+  t.row[70].state = "considered", t.row[70].group = 3;
+  t.row[71].posterior_sd = 0.25, t.row[71].from_prior = true, t.row[71].free_mean = 7.5;
+  return t;
+}
+
+void ExpectSame(const TableFile& a, const TableFile& b, double relative) {
+  EXPECT_EQ(a.schema, b.schema);
+  EXPECT_EQ(a.bumpless, b.bumpless);
+  EXPECT_EQ(a.blend_ms, b.blend_ms);
+  for (int g = 0; g < 4; ++g) EXPECT_NEAR(a.forgetting[g], b.forgetting[g], relative);
+  ASSERT_EQ(a.joint.size(), b.joint.size());
+  for (std::size_t j = 0; j < a.joint.size(); ++j) {
+    EXPECT_NEAR(a.joint[j].sigma_Nm, b.joint[j].sigma_Nm, relative * a.joint[j].sigma_Nm);
+    EXPECT_NEAR(a.joint[j].v_min_radps, b.joint[j].v_min_radps, relative * a.joint[j].v_min_radps);
+    EXPECT_NEAR(a.joint[j].torque_limit_Nm, b.joint[j].torque_limit_Nm, relative * a.joint[j].torque_limit_Nm);
+    EXPECT_NEAR(a.joint[j].torque_scale, b.joint[j].torque_scale, relative);
+  }
+  ASSERT_EQ(a.row.size(), b.row.size());
+  for (std::size_t k = 0; k < a.row.size(); ++k) {
+    EXPECT_EQ(a.row[k].name, b.row[k].name);
+    EXPECT_EQ(a.row[k].unit, b.row[k].unit);
+    EXPECT_EQ(a.row[k].state, b.row[k].state) << a.row[k].name;
+    EXPECT_EQ(a.row[k].group, b.row[k].group) << a.row[k].name;
+    EXPECT_NEAR(a.row[k].mean, b.row[k].mean, relative * std::abs(a.row[k].mean)) << a.row[k].name;
+    EXPECT_NEAR(a.row[k].sd, b.row[k].sd, relative * a.row[k].sd) << a.row[k].name;
+    EXPECT_NEAR(a.row[k].process_noise, b.row[k].process_noise, relative * a.row[k].process_noise);
+  }
+}
+
+TEST(TableFile, WrittenAndRead_IsTheSameTable) {
+  const TemporaryFolder folder;
+  const TableFile t = Changed();
+  WriteTable(folder / "t.toml", t);
+  const TableFile read = ReadTable(folder / "t.toml");
+  ExpectSame(t, read, 1e-8);  // nine digits are written
+  EXPECT_EQ(read.robot, "er20_like");
+  EXPECT_EQ(read.note, "for a test");
+  EXPECT_TRUE(read.row[71].from_prior);
+  EXPECT_DOUBLE_EQ(read.row[71].free_mean, 7.5);
+  EXPECT_EQ(EncodeTable(read), EncodeTable(t));  // nine digits name a float exactly
+}
+
+TEST(TableFile, EncodedAndDecoded_IsTheSameTableInFloat) {
+  const TableFile t = Changed();
+  const auto words = EncodeTable(t);
+  const TableFile back = DecodeTable(words, DefaultTable(Er20()));
+  ExpectSame(t, back, 1e-7);  // half a unit of float's last place is 6e-8
+  EXPECT_EQ(EncodeTable(back), words);
+}
+
+TEST(TableFile, TheDefaultWords_AreThoseOfTheGeneratedModel) {
+  using Table = estimator::Table<generated::Er20Like>;
+  std::vector<std::uint16_t> expected(Table::kWords);
+  model::Encode(estimator::DefaultTable<generated::Er20Like>(), expected.data());
+  EXPECT_EQ(EncodeTable(DefaultTable(Er20())), expected);
+}
+
+TEST(TableFile, TheHostsWords_AreWhatTheFirmwareDecodes) {
+  const TableFile t = Changed();
+  const auto words = EncodeTable(t);
+  estimator::Table<generated::Er20Like> decoded;
+  ASSERT_EQ(model::Decode(words.data(), generated::Er20Like::kSchema, decoded), core::Status::kOk);
+  EXPECT_EQ(decoded.parameter[70].mean, 12.345678f);
+  EXPECT_EQ(decoded.parameter[70].state, model::ParameterState::kConsidered);
+  EXPECT_EQ(decoded.parameter[70].group, 3);
+  EXPECT_EQ(decoded.joint[2].torque_scale, 1.02f);
+  EXPECT_EQ(decoded.flags, model::kFlagBumpless);
+  EXPECT_EQ(decoded.blend_ms, 250u);
+}
+
+TEST(TableFile, AnotherSchemaOrSize_IsRefused) {
+  auto words = EncodeTable(DefaultTable(Er20()));
+  words.pop_back();
+  EXPECT_NE(ErrorOf([&] { (void)DecodeTable(words, DefaultTable(Er20())); }), "");
+  words = EncodeTable(DefaultTable(Er20()));
+  words[1] ^= 1;
+  EXPECT_NE(ErrorOf([&] { (void)DecodeTable(words, DefaultTable(Er20())); }), "");
+}
+
+TEST(TableFile, CarriedOver_ByNameIntoAnotherLayout) {
+  const TableFile from = Changed();
+  TableFile to = DefaultTable(Er20());
+  std::rotate(to.row.begin() + 66, to.row.begin() + 70, to.row.end());  // another order
+  TableRow added = to.row.back();
+  added.name = "stribeck.dFs2", added.mean = 4.5;
+  to.row.push_back(added);
+  EXPECT_EQ(CarryOver(from, to), std::vector<std::string>{"stribeck.dFs2"});
+  for (const TableRow& r : to.row) {
+    const auto same =
+        std::find_if(from.row.begin(), from.row.end(), [&](const TableRow& f) { return f.name == r.name; });
+    EXPECT_EQ(r.mean, same == from.row.end() ? 4.5 : same->mean) << r.name;
+  }
+  EXPECT_EQ(to.joint[2].torque_limit_Nm, 900);
+}
+
+TEST(TableFile, BadFiles_AreRefusedNamingFileAndKey) {
+  const TemporaryFolder folder;
+  WriteTable(folder / "good.toml", DefaultTable(Er20()));
+  std::ifstream in(folder / "good.toml");
+  const std::string good((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  struct Case {
+    std::string text, key;
+  };
+  const std::vector<Case> cases{{with("schema = ", "schema = -"), "schema"},
+                                {with("schema = ", "schema = 9999999"), "schema"},
+                                {with("sigma_Nm = ", "sigma_Nm = -"), "sigma_Nm"},
+                                {with("state = \"estimated\"", "state = \"guessed\""), "state"},
+                                {with("group = 0", "group = 4"), "group"},
+                                {with("blend_ms = ", "blend_s = "), "blend_s"},
+                                {with("forgetting = [", "forgetting = [1.0, "), "forgetting"},
+                                {with("mean = ", "mean = \"heavy\" #"), "mean"},
+                                {"robot = \"er20_like\"\nschema = 1\nforgetting = [1.0, 1.0, 1.0, 1.0]\n", "parameter"},
+                                {"this is = = no TOML", ""}};
+  for (const Case& c : cases) {
+    const auto path = folder.Write("bad.toml", c.text);
+    const std::string error = ErrorOf([&] { (void)ReadTable(path); });
+    EXPECT_NE(error.find("bad.toml"), std::string::npos) << c.key << ": " << error;
+    EXPECT_NE(error.find(c.key), std::string::npos) << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+  }
+  EXPECT_NE(ErrorOf([&] { (void)ReadTable(folder / "absent.toml"); }).find("absent.toml"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace armcal::calibration

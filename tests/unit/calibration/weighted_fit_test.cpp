@@ -1,0 +1,212 @@
+// calibration tests - the weighted fit and its read-out against KDL's torque and a textbook Bayes update.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+#include "host_sim/calibration/map_readout.hpp"
+#include "host_sim/calibration/table_file.hpp"
+#include "host_sim/io/input_error.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::calibration {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using tests::SyntheticArm;
+
+codegen::Robot Er20() { return codegen::ReadRobot("codegen/robots/er20_like.toml"); }
+
+// Largest error in standard deviations, and the share of parameters within two.
+struct Honesty {
+  double worst = 0, within_two = 0;
+  Honesty(const Fit& fit, const VectorXd& truth) {
+    int inside = 0;
+    for (const int c : fit.active) {
+      const double distance = std::abs(fit.x[c] - truth[c]) / fit.sd[c];
+      worst = std::max(worst, distance);
+      inside += distance < 2;
+    }
+    within_two = static_cast<double>(inside) / static_cast<double>(fit.active.size());
+  }
+};
+
+TEST(WeightedFit, KdlTorque_GivesTheTrueParametersWithinTheirDeviations) {
+  for (const std::uint64_t seed : {1u, 2u}) {
+    SyntheticArm arm(Er20(), seed);
+    const Dataset d = arm.Run(20, 100 + seed);
+    const Fit fit = WeightedFit(arm.model(), {&d});
+    const Honesty h(fit, arm.truth());
+    EXPECT_LT(h.worst, 4) << "seed " << seed;          // 58 Gaussian errors pass 4 sd once in 270 runs
+    EXPECT_GT(h.within_two, 0.85) << "seed " << seed;  // 95 % expected; errors are correlated
+    for (int j = 0; j < 6; ++j) EXPECT_NEAR(fit.sigma[j] / arm.noise_Nm(j), 1, 0.06) << j;  // 1 / sqrt(2 x 2400) x 4
+  }
+}
+
+TEST(WeightedFit, ATorqueThatTheModelLacks_IsNotWithinTheDeviations) {
+  SyntheticArm arm(Er20(), 1);
+  const Dataset d =
+      arm.Run(20, 101, [](const tests::State& s) { return s.joint == 3 ? 0.5 * s.qd * std::abs(s.qd) : 0; });
+  EXPECT_GT(Honesty(WeightedFit(arm.model(), {&d}), arm.truth()).worst, 4);
+}
+
+TEST(WeightedFit, TwoLogs_AreWorthMoreThanOne) {
+  SyntheticArm arm(Er20(), 3);
+  const Dataset a = arm.Run(10, 1), b = arm.Run(10, 2);
+  const Fit one = WeightedFit(arm.model(), {&a}), both = WeightedFit(arm.model(), {&a, &b});
+  EXPECT_EQ(both.information.rows.sum(), a.used.sum() + b.used.sum());
+  EXPECT_LT(Honesty(both, arm.truth()).worst, 4);
+  int better = 0;
+  for (const int c : one.active) better += both.sd[c] < one.sd[c];
+  EXPECT_GT(better, 0.9 * static_cast<double>(one.active.size()));
+}
+
+TEST(WeightedFit, AJointThatStandsStill_LeavesItsFrictionToThePrior) {
+  SyntheticArm arm(Er20(), 4);
+  const Dataset d = arm.Run(20, 5, {}, 0.5, {5});
+  const Fit fit = WeightedFit(arm.model(), {&d});
+  const std::vector<int> hardly = HardlyDetermined(arm.model(), fit);
+  for (int c = 0; c < arm.model().front(); ++c) {
+    if (arm.model().table()[arm.model().table_index(c)].state != "estimated") continue;
+    const std::string name = arm.model().column_name(c);
+    const bool still = name == "Fc6" || name == "Fv6";
+    EXPECT_EQ(fit.ratio(c) > kFromPrior, still) << name << " " << fit.ratio(c);
+    EXPECT_EQ(std::count(hardly.begin(), hardly.end(), c), still ? 1 : 0) << name;
+  }
+}
+
+TEST(WeightedFit, HeldColumns_StayAtThePrior) {
+  SyntheticArm arm(Er20(), 4);
+  const Dataset d = arm.Run(10, 5);
+  const Fit fit = WeightedFit(arm.model(), {&d}, {0, 3});
+  for (const int c : {0, 3}) {
+    EXPECT_EQ(fit.x[c], MakePrior(arm.model()).mean[c]);
+    EXPECT_EQ(fit.sd[c], 0);
+  }
+}
+
+// Prior of the standard parameters (m, m c, I about the origin, rotor), through differences of the parallel-axis rule.
+MatrixXd StandardCovariance(const codegen::Model& model, const VectorXd& mean) {
+  MatrixXd P = MatrixXd::Zero(mean.size(), mean.size());
+  constexpr double kStep = 1e-6;
+  for (int j = 0; j < model.joints(); ++j) {
+    const VectorXd centre = ToCentre(mean.segment(11 * j, 10));
+    MatrixXd spread = MatrixXd::Zero(11, 11);
+    for (int k = 0; k < 10; ++k) {
+      VectorXd up = centre, down = centre;
+      up[k] += kStep, down[k] -= kStep;
+      spread.col(k).head(10) = (ToOrigin(up) - ToOrigin(down)) / (2 * kStep) * model.table()[11 * j + k].sd;
+    }
+    spread(10, 10) = model.table()[11 * j + 10].sd;
+    P.block(11 * j, 11 * j, 11, 11) = spread * spread.transpose();
+  }
+  return P;
+}
+
+TEST(ReadOut, OfBaseParameters_IsTheBayesUpdateOfTheStandardOnes) {
+  codegen::Robot robot = Er20();
+  for (auto& j : robot.joint) j.motor.torque_constant_tolerance = 0;  // gains make it nonlinear: not this test's matter
+  SyntheticArm arm(robot, 7);
+  const codegen::Model& model = arm.model();
+  const Dataset d = arm.Run(0.8, 8);  // 100 samples: an update small enough to be written out
+  const int n = 6, bodies = 66;
+  std::vector<int> friction;
+  for (int c = 0; c < model.front(); ++c)
+    if (model.table()[model.table_index(c)].state == "estimated") friction.push_back(c);
+  const int size = bodies + static_cast<int>(friction.size());
+
+  // Columns of each body straight from its file frame, never through the base map.
+  MatrixXd A = MatrixXd::Zero(d.samples() * n, size);
+  std::vector<MatrixXd> block;
+  for (int b = 0; b < n; ++b) {
+    model.BodyColumns(d.s, b, block);
+    for (int j = 0; j < n; ++j) A.block(d.samples() * j, 11 * b, d.samples(), 10) = block[j];
+    A.block(d.samples() * b, 11 * b + 10, d.samples(), 1) = d.s.qdd.col(b);
+  }
+  for (std::size_t f = 0; f < friction.size(); ++f) {
+    const int j = model.column_joint(friction[f]);
+    const bool coulomb = model.column_name(friction[f])[1] == 'c';
+    for (int k = 0; k < d.samples(); ++k)
+      A(d.samples() * j + k, bodies + static_cast<int>(f)) = coulomb ? (d.s.qd(k, j) > 0 ? 1 : -1) : d.s.qd(k, j);
+  }
+  VectorXd y(d.samples() * n), weight(n), phi0(size), R(d.samples() * n);
+  phi0.head(bodies) = BodyMean(model);
+  MatrixXd P0 = MatrixXd::Zero(size, size);
+  P0.topLeftCorner(bodies, bodies) = StandardCovariance(model, phi0.head(bodies));
+  for (std::size_t f = 0; f < friction.size(); ++f) {
+    const auto& p = model.table()[model.table_index(friction[f])];
+    phi0[bodies + static_cast<int>(f)] = p.mean;
+    P0(bodies + static_cast<int>(f), bodies + static_cast<int>(f)) = p.sd * p.sd;
+  }
+  for (int j = 0; j < n; ++j) {
+    weight[j] = 1 / (arm.noise_Nm(j) * arm.noise_Nm(j));
+    for (int k = 0; k < d.samples(); ++k) {
+      const int row = d.samples() * j + k;
+      y[row] = d.tau(k, j), R[row] = 1 / weight[j];
+      if (!d.used(k, j)) A.row(row).setZero(), y[row] = 0;
+    }
+  }
+  // phi = phi0 + P0 A' (A P0 A' + R)^-1 (y - A phi0)
+  MatrixXd S = A * P0 * A.transpose();
+  S.diagonal() += R;
+  const VectorXd phi = phi0 + P0 * A.transpose() * S.ldlt().solve(y - A * phi0);
+
+  const Prior prior = MakePrior(model);
+  const Information info = Accumulate(model, d, prior.mean.head(model.columns()), {});
+  const VectorXd x = SolveWithPrior(info, weight, prior, prior.active, nullptr);
+  const VectorXd read = ReadOutBodies(model, x.segment(model.front(), model.rigid()));
+  for (int k = 0; k < bodies; ++k)  // both are exact; what is left is round-off of two very different routes
+    EXPECT_NEAR(read[k], phi[k], 1e-5 * std::sqrt(P0(k, k)) + 1e-9) << model.table()[k].name;
+  for (std::size_t f = 0; f < friction.size(); ++f)
+    EXPECT_NEAR(x[friction[f]], phi[bodies + static_cast<int>(f)], 1e-6 * std::abs(phi0[bodies + static_cast<int>(f)]));
+}
+
+TEST(ReadOutPhysical, GivesBodiesThatExistAndAConsistentEstimate) {
+  int bayes_physical = 0, bayes_not = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SyntheticArm arm(Er20(), seed);
+    const codegen::Model& model = arm.model();
+    const Dataset d = arm.Run(10, 200 + seed);
+    const Fit fit = WeightedFit(model, {&d});
+    const PhysicalReadOut out = ReadOutPhysical(model, fit);
+    EXPECT_TRUE(out.converged) << seed;
+    EXPECT_TRUE(IsPhysical(out.bodies)) << seed;
+    const VectorXd base = model.base_map() * out.bodies;
+    EXPECT_LT((base - out.x.segment(model.front(), model.rigid())).norm(), 1e-9 * base.norm()) << seed;
+    double worst = 0;
+    for (const int c : fit.active) worst = std::max(worst, std::abs(out.x[c] - fit.x[c]) / fit.sd[c]);
+    const bool physical = IsPhysical(ReadOutBodies(model, fit.x.segment(model.front(), model.rigid())));
+    (physical ? bayes_physical : bayes_not)++;
+    std::printf("seed %d: Bayes solution %s, largest move %.3f sd\n", static_cast<int>(seed),
+                physical ? "physical" : "not physical", worst);
+    // The read-out's prior is Gaussian in the centre, the fit's in m c: they differ by second order.
+    if (physical) EXPECT_LT(worst, 1) << seed;
+  }
+  EXPECT_GT(bayes_physical + bayes_not, 0);
+}
+
+TEST(ReadOutPhysical, DataThatPullABodyOutOfTheCone_StillGiveBodiesThatExist) {
+  SyntheticArm arm(Er20(), 2);
+  Dataset d = arm.Run(10, 9);
+  d.tau.col(5) -= 0.05 * d.s.qdd.col(5);  // the last link's inertia about its own axis becomes negative
+  const Fit fit = WeightedFit(arm.model(), {&d});
+  EXPECT_FALSE(IsPhysical(ReadOutBodies(arm.model(), fit.x.segment(arm.model().front(), arm.model().rigid()))));
+  EXPECT_TRUE(IsPhysical(ReadOutPhysical(arm.model(), fit).bodies));
+}
+
+TEST(ReadOutPhysical, APriorThatCannotExist_IsRefusedByName) {
+  codegen::Robot robot = Er20();
+  SyntheticArm arm(robot, 1);
+  const Dataset d = arm.Run(2, 1);
+  robot.joint[2].link.inertia_kgm2 = {0.1, 0, 0, 0.1, 0, 0.5};  // a plate cannot have more than 0.2
+  const codegen::Model model(robot, tests::Records());
+  try {
+    (void)ReadOutPhysical(model, WeightedFit(model, {&d}));
+    FAIL() << "accepted";
+  } catch (const io::InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("joint[3].link"), std::string::npos) << e.what();
+  }
+}
+
+}  // namespace
+}  // namespace armcal::calibration

@@ -1,0 +1,156 @@
+// diagnosis tests - effects written in other forms than the records, on KDL's torque: named, placed, or none found.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "host_sim/diagnosis/diagnose.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::diagnosis {
+namespace {
+
+using calibration::Dataset;
+using tests::Effect;
+using tests::State;
+using tests::SyntheticArm;
+
+double Sign(double v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
+
+// Joints count from 1 here, as in a report. Sizes: two to four times one sample's noise (0.18 and 0.11 N m).
+Effect RationalStribeck(int joint, double excess_Nm) {
+  return [=](const State& s) {
+    return s.joint == joint - 1 ? excess_Nm / (1 + std::pow(s.qd / 0.25, 2)) * Sign(s.qd) : 0;
+  };
+}
+Effect Asymmetry(int joint, double difference_Nm) {
+  return [=](const State& s) { return s.joint == joint - 1 ? difference_Nm * std::abs(Sign(s.qd)) : 0; };
+}
+Effect Ripple(int joint, double amplitude_Nm, double per_rad) {
+  return [=](const State& s) {
+    const double a = per_rad * s.q + 0.4;
+    return s.joint == joint - 1 ? amplitude_Nm * (std::cos(a) + 0.2 * std::sin(2 * a)) : 0;
+  };
+}
+Effect LoadFriction(int joint, double mu) {
+  return [=](const State& s) {
+    return s.joint == joint - 1 ? mu * (std::sqrt(s.tau_rigid * s.tau_rigid + 1) - 1) * Sign(s.qd) : 0;
+  };
+}
+
+codegen::Robot TwoLink() { return codegen::ReadRobot("codegen/robots/two_link.toml"); }
+
+struct Case {
+  SyntheticArm arm;
+  Dataset train, test;
+  std::unique_ptr<Diagnosis> diagnosis;
+
+  Case(const Effect& effect, std::uint64_t seed)
+      : arm(TwoLink(), seed), train(arm.Run(20, 10 * seed, effect)), test(arm.Run(20, 10 * seed + 1, effect)) {
+    diagnosis = std::make_unique<Diagnosis>(arm.model(), tests::Records(), std::vector<const Dataset*>{&train});
+  }
+  const Finding& finding() const { return diagnosis->finding(); }
+  std::string Said() const {
+    std::string s;
+    for (const Term& t : finding().terms) {
+      s += t.record->name;
+      for (const int j : t.joints) s += " " + std::to_string(j + 1);
+      for (const std::string& also : t.also_fits) s += " or " + also;
+      s += "; ";
+    }
+    return s;
+  }
+  // The first term is of this kind, or says that it cannot be told from it.
+  bool Names(const std::string& kind, int joint) const {
+    if (finding().terms.empty()) return false;
+    const Term& t = finding().terms[0];
+    const bool named = t.record->name == kind || std::count(t.also_fits.begin(), t.also_fits.end(), kind) > 0;
+    return named && t.joints == std::vector<int>{joint - 1};
+  }
+  // RMS per joint where it moves, on the held-out log.
+  double After(int joint) {
+    const HeldOut held_out = diagnosis->Judge(test);
+    return calibration::Rms(test, held_out.after, true)[joint - 1];
+  }
+};
+
+TEST(Diagnosis, RationalStribeck_IsNamedAtItsJoint) {
+  Case c(RationalStribeck(2, 0.4), 1);
+  EXPECT_TRUE(c.Names("stribeck", 2)) << c.Said();
+  EXPECT_LT(c.After(2), 1.10 * c.arm.noise_Nm(1));
+  EXPECT_TRUE(c.finding().terms[0].confirmed);
+}
+
+TEST(Diagnosis, CoulombLevelsThatDiffer_AreNamedAtTheirJoint) {
+  Case c(Asymmetry(2, 0.2), 2);
+  EXPECT_TRUE(c.Names("coulomb_asymmetry", 2)) << c.Said();
+  EXPECT_LT(c.After(2), 1.10 * c.arm.noise_Nm(1));
+  EXPECT_NEAR(c.finding().terms[0].amplitude[0], 0.2, 4 * c.finding().terms[0].sd[0]);
+}
+
+TEST(Diagnosis, RippleOfUnknownFrequency_IsNamedWithItsFrequency) {
+  Case c(Ripple(1, 0.4, 37.3), 3);
+  EXPECT_TRUE(c.Names("torque_ripple", 1)) << c.Said();
+  EXPECT_NEAR(c.finding().terms[0].eta[0], 37.3, 0.05);
+  EXPECT_LT(c.After(1), 1.10 * c.arm.noise_Nm(0));
+}
+
+TEST(Diagnosis, FrictionThatGrowsWithTheLoad_IsNamedAtItsJoint) {
+  Case c(LoadFriction(1, 0.06), 4);
+  EXPECT_TRUE(c.Names("load_friction", 1)) << c.Said();
+  EXPECT_LT(c.After(1), 1.10 * c.arm.noise_Nm(0));
+}
+
+TEST(Diagnosis, OrdinaryParameterError_IsNoEffect) {
+  for (const std::uint64_t seed : {5u, 6u}) {
+    Case c({}, seed);
+    EXPECT_TRUE(c.finding().terms.empty()) << "seed " << seed << ": " << c.Said();
+    const HeldOut held_out = c.diagnosis->Judge(c.test);
+    EXPECT_EQ(held_out.before, held_out.after);
+    for (int j = 0; j < 2; ++j) {  // what would have been seen is far below the noise, and not nothing
+      EXPECT_GT(c.finding().smallest[j], 0);
+      EXPECT_LT(c.finding().smallest[j], 0.5 * c.arm.noise_Nm(j));
+    }
+  }
+}
+
+TEST(Diagnosis, Terms_AreTheSameWhicheverLogIsHeldOut) {
+  Case a(RationalStribeck(2, 0.4), 1), b(RationalStribeck(2, 0.4), 1);
+  (void)a.diagnosis->Judge(a.test);
+  (void)b.diagnosis->Judge(b.arm.Run(10, 77, RationalStribeck(2, 0.4), 0.3));
+  ASSERT_EQ(a.finding().terms.size(), b.finding().terms.size());
+  for (std::size_t k = 0; k < a.finding().terms.size(); ++k) {
+    const Term &x = a.finding().terms[k], &y = b.finding().terms[k];
+    EXPECT_EQ(x.record->name, y.record->name);
+    EXPECT_EQ(x.joints, y.joints);
+    EXPECT_EQ(x.eta, y.eta);
+    EXPECT_EQ(x.amplitude, y.amplitude);
+    EXPECT_EQ(x.also_fits, y.also_fits);
+  }
+}
+
+TEST(Diagnosis, ATermThatTheHeldOutLogRefutes_StaysUnconfirmedAndOutOfThePrediction) {
+  Case c(Ripple(1, 0.4, 37.3), 3);
+  ASSERT_FALSE(c.finding().terms.empty());
+  const Dataset sound = c.arm.Run(20, 99);  // the same arm with the ripple gone
+  const HeldOut held_out = c.diagnosis->Judge(sound);
+  for (const Term& t : c.finding().terms) EXPECT_FALSE(t.confirmed) << t.record->name;
+  EXPECT_LT((held_out.after - held_out.before).cwiseAbs().maxCoeff(), 0.05 * c.arm.noise_Nm(0));
+}
+
+TEST(Diagnosis, TermTorque_IsTheEffectBeyondWhatTheDeclaredModelTookUp) {
+  Case c(Ripple(1, 0.4, 37.3), 3);
+  const auto torque = c.diagnosis->TermTorque(c.test);
+  ASSERT_FALSE(torque.empty());
+  double error = 0, size = 0;
+  for (int k = 0; k < c.test.samples(); ++k) {
+    const double truth = Ripple(1, 0.4, 37.3)({0, c.test.s.q(k, 0), c.test.s.qd(k, 0), 0});
+    double found = 0;
+    for (const auto& t : torque) found += t(k, 0);
+    error += std::pow(found - truth, 2), size += truth * truth;
+  }
+  EXPECT_LT(error, 0.1 * size);  // the second harmonic, 4 % of the square, may or may not be a term of its own
+}
+
+}  // namespace
+}  // namespace armcal::diagnosis

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # tests - builds armcal and runs its tests; sets up whatever it needs.
-#   tests/run.sh [fast]   host build, unit and property tests
-#   tests/run.sh all      + end-to-end tests, the fast tests under sanitizers, both Cortex-M images
+#   tests/run.sh fast   host build, unit and property tests
+#   tests/run.sh [all]    + end-to-end tests, the fast tests under sanitizers, both Cortex-M images
 #   tests/run.sh long     + the long tests
 # The last line is "N passed, M failed"; a CTest test, a build and a check count one each.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-scope=${1:-fast}
+scope=${1:-all}
 case $scope in
   fast) labels='^fast$' ;;
   all) labels='^(fast|all)$' ;;

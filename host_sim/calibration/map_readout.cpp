@@ -77,6 +77,9 @@ class Problem {
       const Eigen::LLT<Matrix4d> factor(PseudoInertia(bodies.segment(11 * j, 10)));
       if (factor.info() != Eigen::Success || bodies[11 * j] <= 0) return INFINITY;
       cost -= 0.5 * eps * 2 * Matrix4d(factor.matrixL()).diagonal().array().log().sum();
+      if (sd_[11 * j + 10] <= 0) continue;  // a rotor that is known, or not there
+      if (bodies[11 * j + 10] <= 0) return INFINITY;
+      cost -= 0.5 * eps * std::log(bodies[11 * j + 10]);
     }
     return cost;
   }
@@ -98,6 +101,11 @@ class Problem {
       for (int a = 0; a < 10; ++a) {
         gt[11 * j + a] -= 0.5 * eps * product[a].trace();
         for (int b = 0; b < 10; ++b) ht(11 * j + a, 11 * j + b) += 0.5 * eps * (product[a] * product[b]).trace();
+      }
+      const int rotor = 11 * j + 10;
+      if (sd_[rotor] > 0) {
+        gt[rotor] -= 0.5 * eps / bodies[rotor];
+        ht(rotor, rotor) += 0.5 * eps / (bodies[rotor] * bodies[rotor]);
       }
     }
     gradient.resize(free());

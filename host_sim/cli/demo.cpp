@@ -25,6 +25,13 @@ struct Options {
 
 ordered_json ReadJson(const std::string& path) { return ordered_json::parse(io::ReadWholeFile(path)); }
 
+// Whether a confirmed term can be part of a committed model at all.
+bool Flashable(const diagnosis::Finding& finding) {
+  for (const diagnosis::Term& t : finding.terms)
+    if (t.confirmed && t.record->on_target) return true;
+  return false;
+}
+
 class Demo {
  public:
   explicit Demo(const Options& o) : o_(o), tool_(fs::read_symlink("/proc/self/exe").string()) {
@@ -79,7 +86,9 @@ class Demo {
             File("table_after.toml"), "--json", File("identify_after.json")},
            "identify_after.txt");
       if (result["model"]["by_table"].get<bool>()) {
-        path = "the effect was compiled in and on standby; a table switched it on";
+        path = Flashable(run->diagnosis->finding())
+                   ? "the effect was compiled in and on standby; a table switched it on"
+                   : "the effect belongs to one run; the table stays without it";
       } else {
         Stage("generate the new model, build the drive with it, restart it");
         BuildDrive(final_robot);

@@ -18,19 +18,15 @@ Progress::~Progress() {
 }
 
 void Progress::Set(double done) {
-  int percent = static_cast<int>(100 * std::clamp(done, 0.0, 1.0) + 1e-9);
-  if (!terminal_) percent -= percent % 10;
+  if (!terminal_) return;
+  const int percent = static_cast<int>(100 * std::clamp(done, 0.0, 1.0) + 1e-9);
   if (percent <= shown_percent_) return;
   shown_percent_ = percent;
-  if (terminal_) {
-    constexpr int kWidth = 30;
-    const int full = percent * kWidth / 100;
-    std::fprintf(out_, "\r%s [%s%s] %3d %%\033[K", task_.c_str(),
-                 std::string(static_cast<std::size_t>(full), '#').c_str(),
-                 std::string(static_cast<std::size_t>(kWidth - full), '.').c_str(), percent);
-  } else {
-    std::fprintf(out_, "%s: %d %%\n", task_.c_str(), percent);
-  }
+  constexpr int kWidth = 30;
+  const int full = percent * kWidth / 100;
+  std::fprintf(out_, "\r%s [%s%s] %3d %%\033[K", task_.c_str(),
+               std::string(static_cast<std::size_t>(full), '#').c_str(),
+               std::string(static_cast<std::size_t>(kWidth - full), '.').c_str(), percent);
   std::fflush(out_);
 }
 

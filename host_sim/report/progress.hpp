@@ -6,7 +6,7 @@
 
 namespace armcal::report {
 
-// On a terminal one line that rewrites itself; elsewhere (a file, a log of a build server) one plain line per 10 %.
+// On a terminal one line that rewrites itself; elsewhere (a file, a pipe) nothing, so that stderr holds messages only.
 // It clears its line when it goes, so that a message never stands inside it.
 class Progress {
  public:

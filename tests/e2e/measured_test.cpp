@@ -1,4 +1,4 @@
-// end-to-end tests - public measured logs through the verbs, against published parameters and errors.
+// end-to-end tests - public measured logs through the verbs, against published parameters and a bar of our own.
 #include <cstdlib>
 
 #include "tests/e2e/tool.hpp"
@@ -17,7 +17,7 @@ fs::path Measured(const std::string& set) {
 #define SKIP_WITHOUT(folder, set) \
   if ((folder).empty()) GTEST_SKIP() << "measured logs of " << (set) << ": set ARMCAL_DATA to the folder that has them"
 
-TEST(Measured, Kr300_HeldOutError_IsThatOfThePublishedIdentification) {
+TEST(Measured, Kr300_HeldOutError_StaysWithinATenthOfItsReference) {
   const fs::path data = Measured("kuka_kr300");
   SKIP_WITHOUT(data, "kuka_kr300");
   const fs::path json = FreshFolder("kr300_identify") / "out.json";
@@ -25,7 +25,7 @@ TEST(Measured, Kr300_HeldOutError_IsThatOfThePublishedIdentification) {
                           "--train", (data / "run_A.csv.gz").string(), (data / "run_B.csv.gz").string(), "--test",
                           (data / "run_C.csv.gz").string(), "--band", "20", "--json", json.string()});
   ASSERT_EQ(o.code, 0) << o.err;
-  // Relative error below 20 Hz where the joint moves, from a careful least-squares fit of this set; a tenth is allowed.
+  // Relative error below 20 Hz where the joint moves: this project's own bar for the set, not a published figure.
   const double reference[] = {0.060, 0.058, 0.038, 0.182, 0.080, 0.136};
   const auto band = ReadJson(json).at("held_out").at("relative_moving_in_band").get<std::vector<double>>();
   ASSERT_EQ(band.size(), 6u);
@@ -49,7 +49,8 @@ TEST(Measured, Emps_GivesThePublishedParameters) {
   const std::vector<Published> published{
       {"m1R", 95.1089, 0.03}, {"Fv1", 203.5034, 0.03}, {"Fc1", 20.3935, 0.03}, {"torque_offset.To1", -3.1648, 0.05}};
   std::size_t found = 0;
-  for (const auto& column : ReadJson(json).at("columns"))
+  const nlohmann::json identified = ReadJson(json);
+  for (const auto& column : identified.at("columns"))
     for (const Published& p : published)
       if (column.at("name") == p.name) {
         ++found;

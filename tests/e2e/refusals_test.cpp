@@ -94,7 +94,7 @@ TEST_F(BadFiles, Scenarios_AreRefused) {
                              "title = \"x\"\nrobot = \"er20_like\"\ntruth_seed = 1\nnoise_seed = 1\n"
                              "[[effect]]\nkind = \"witchcraft\"\njoint = 1\n");
   ExpectOneLine(Tool({"simulate", "--scenario", bad.string(), "--port", "0", "--storage", (folder_ / "n").string()}),
-                kBadInput, "witchcraft");
+                kBadInput, "effect[1].kind");
 }
 
 class Flashing : public testing::Test {

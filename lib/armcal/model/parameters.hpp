@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "armcal/core/status.hpp"
+#include "armcal/core/words.hpp"
 #include "armcal/model/contract.hpp"
 
 namespace armcal::model {
@@ -52,24 +53,7 @@ struct ParameterTable {
   ParameterEntry parameter[p] = {};
 };
 
-namespace words {
-inline void PutU32(std::uint16_t* w, std::uint32_t v) {
-  w[0] = static_cast<std::uint16_t>(v >> 16);
-  w[1] = static_cast<std::uint16_t>(v & 0xFFFFu);
-}
-inline std::uint32_t GetU32(const std::uint16_t* w) { return (static_cast<std::uint32_t>(w[0]) << 16) | w[1]; }
-inline void PutF32(std::uint16_t* w, float v) {
-  std::uint32_t bits;
-  std::memcpy(&bits, &v, sizeof bits);
-  PutU32(w, bits);
-}
-inline float GetF32(const std::uint16_t* w) {
-  const std::uint32_t bits = GetU32(w);
-  float v;
-  std::memcpy(&v, &bits, sizeof v);
-  return v;
-}
-}  // namespace words
+namespace words = core;  // PutU32, GetF32 ...: high word first
 
 // words: [ParameterTable<n,p>::kWords], native 16-bit values (the wire and the store put the high byte first).
 template <int n, int p>

@@ -54,9 +54,8 @@ TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const Fit
   const auto& robot = model.robot();
   const double sample_s = robot.sample_ticks / robot.tick_rate_Hz;
   for (int j = 0; j < model.joints(); ++j) {
-    // residuals of a log sampled at another rate average differently
-    t.joint[j].sigma_Nm =
-        held.sigma[j] * std::sqrt(std::max(1.0, log_step_s / sample_s) * std::min(1.0, log_step_s / sample_s));
+    // white noise, averaged over another sample time
+    t.joint[j].sigma_Nm = held.sigma[j] * std::sqrt(log_step_s / sample_s);
     t.joint[j].torque_scale = 1 / (1 + bodies.x[model.columns() + j]);
   }
   for (int k = 0; k < model.body_parameters(); ++k) {

@@ -9,6 +9,7 @@
 
 #include "armcal/estimator/trace_records.hpp"
 #include "host_sim/cli/connect.hpp"
+#include "host_sim/cli/trace_log.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/client/trace_reader.hpp"
 #include "host_sim/drive/vendor_registers.hpp"
@@ -69,93 +70,6 @@ void WaitFor(client::DriveClient& drive, const char* what, Done done) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   throw client::LinkError(drive.name() + ": waited in vain for: " + what);
-}
-
-// Joint quantities from averaged motor counts and current, by the robot file's nominal constants.
-struct AxisScale {
-  MatrixXd to_joint, torque_to_joint;
-  VectorXd counts_to_rad, lsb_to_Nm, zero;
-  explicit AxisScale(const codegen::Robot& r) : counts_to_rad(r.joints()), lsb_to_Nm(r.joints()), zero(r.joints()) {
-    const int n = r.joints();
-    MatrixXd C = MatrixXd::Identity(n, n);
-    for (std::size_t k = 0; k < r.coupling.size(); ++k)
-      C(static_cast<int>(k) / n, static_cast<int>(k) % n) = r.coupling[k];
-    to_joint = C.inverse();
-    torque_to_joint = C.transpose();
-    for (int j = 0; j < n; ++j) {
-      const auto& m = r.joint[j].motor;
-      counts_to_rad[j] = 2 * std::numbers::pi / (m.counts_per_turn * m.gear_ratio);
-      lsb_to_Nm[j] = m.current_A_per_lsb * m.torque_constant_NmpA * m.gear_ratio;
-      zero[j] = m.zero_counts;
-    }
-  }
-};
-
-// Records whose whole window lies inside the played part.
-io::Log RawLog(const client::TraceRecords& r, const codegen::Robot& robot, const Player& player,
-               std::uint32_t& first_tick) {
-  const int n = robot.joints();
-  const AxisScale scale(robot);
-  std::vector<std::size_t> inside;
-  for (std::size_t k = 0; k < r.count(); ++k)
-    if (r.ticks[k] - player.first_tick < 0x80000000u && player.last_tick - (r.ticks[k] + r.tick_step - 1) < 0x80000000u)
-      inside.push_back(k);
-  if (inside.size() < io::kMinSamples)
-    throw client::LinkError("trace: " + std::to_string(inside.size()) +
-                            " records of the trajectory, expected at least " + std::to_string(io::kMinSamples));
-  first_tick = r.ticks[inside[0]];
-  io::Log log;
-  const auto N = static_cast<Eigen::Index>(inside.size());
-  log.joints = n;
-  log.source = "trace";
-  log.t.resize(N);
-  for (MatrixXd* m : {&log.q, &log.tau, &log.temp, &log.qref, &log.tauff}) m->resize(N, n);
-  log.flags.resize(N, n);
-  VectorXd motor(n), current(n);
-  for (Eigen::Index i = 0; i < N; ++i) {
-    const std::uint16_t* w = &r.words[inside[i] * r.record_words];
-    log.t[i] = static_cast<double>(r.ticks[inside[i]] - first_tick) / robot.tick_rate_Hz;
-    for (int j = 0; j < n; ++j, w += 11) {
-      // 1/16 counts wrap at 2^32: signed, they reach +- 2^27 counts about zero, far beyond any joint's range
-      motor[j] = scale.counts_to_rad[j] * (static_cast<std::int32_t>(words::GetU32(w)) / 16.0 - scale.zero[j]);
-      current[j] = scale.lsb_to_Nm[j] * static_cast<std::int32_t>(words::GetU32(w + 2)) / 16.0;
-      log.temp(i, j) = words::GetF32(w + 4);
-      log.flags(i, j) = w[6];
-      log.qref(i, j) = words::GetF32(w + 7);
-      log.tauff(i, j) = words::GetF32(w + 9);
-    }
-    log.q.row(i) = scale.to_joint * motor;
-    log.tau.row(i) = scale.torque_to_joint * current;
-  }
-  return log;
-}
-
-// The drive's processed samples; `tauff` is the committed model's torque at the measured state. All of them, or the
-// played part.
-io::Log SampleLog(const client::TraceRecords& r, const codegen::Robot& robot, const Player& player, bool all) {
-  const int n = robot.joints();
-  io::Log log;
-  log.joints = n;
-  std::vector<std::size_t> inside;
-  for (std::size_t k = 0; k < r.count(); ++k)
-    if (all || (r.ticks[k] - player.first_tick < 0x80000000u &&
-                player.last_tick - (r.ticks[k] + robot.sample_ticks - 1) < 0x80000000u))
-      inside.push_back(k);
-  const auto N = static_cast<Eigen::Index>(inside.size());
-  log.t.resize(N);
-  for (MatrixXd* m : {&log.q, &log.qd, &log.qdd, &log.tau, &log.temp, &log.tauff}) m->resize(N, n);
-  log.flags.resize(N, n);
-  for (Eigen::Index i = 0; i < N; ++i) {
-    log.t[i] = static_cast<double>(r.ticks[inside[i]]) / robot.tick_rate_Hz;
-    const std::uint16_t* w = &r.words[inside[i] * r.record_words];
-    for (int j = 0; j < n; ++j, w += estimator::kSampleWordsPerJoint) {
-      log.q(i, j) = words::GetF32(w), log.qd(i, j) = words::GetF32(w + 2), log.qdd(i, j) = words::GetF32(w + 4);
-      log.tau(i, j) = words::GetF32(w + 6), log.temp(i, j) = words::GetF32(w + 8);
-      log.flags(i, j) = w[10];
-      log.tauff(i, j) = words::GetF32(w + 11);
-    }
-  }
-  return log;
 }
 
 // Root mean square over samples where `use` holds, per joint; the first and last half second are left out.
@@ -252,7 +166,7 @@ int Run(const Options& o) {
                     drive.name(), raw.lost + samples.lost));
 
   std::uint32_t first_tick = 0;
-  const io::Log log = RawLog(raw, robot, player, first_tick);
+  const io::Log log = RawLog(raw, robot, {player.first_tick, player.last_tick}, first_tick);
   io::WriteLog(o.out, log);
   const auto always = [](Eigen::Index, int) { return true; };
   const VectorXd tracking = RmsOf(
@@ -266,8 +180,8 @@ int Run(const Options& o) {
   const auto v_min = [&](int j) { return robot.joint[j].v_min_radps; };
   VectorXd residual;
   if (sample_reader) {
-    io::WriteLog(o.samples, SampleLog(samples, robot, player, true));
-    const io::Log played = SampleLog(samples, robot, player, false);
+    io::WriteLog(o.samples, SampleLog(samples, robot, {player.first_tick, player.last_tick}, true));
+    const io::Log played = SampleLog(samples, robot, {player.first_tick, player.last_tick}, false);
     residual = RmsOf(
         played, [&](Eigen::Index k, int j) { return played.tau(k, j) - played.tauff(k, j); },
         [&](Eigen::Index k, int j) { return std::abs(played.qd(k, j)) > v_min(j); });

@@ -1,4 +1,5 @@
-// estimate - the host port: lib's own estimator on Linux, fed over Modbus from the drive's trace, or from a recorded log.
+// estimate - the host port: lib's own estimator on Linux, fed over Modbus from the drive's trace, or from a recorded
+// log.
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -8,6 +9,7 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
+#include <selected_model.hpp>
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/estimator/image.hpp"
 #include "armcal/estimator/trace_records.hpp"
@@ -20,7 +22,6 @@
 #include "host_sim/client/trace_reader.hpp"
 #include "host_sim/io/files.hpp"
 #include "host_sim/io/input_error.hpp"
-#include <selected_model.hpp>
 
 namespace armcal::estimate {
 namespace {

@@ -96,7 +96,8 @@ void DerivePiece(const VectorXd& t, const Eigen::MatrixXd& q, const Piece& piece
   Eigen::MatrixXd smooth = OnEvenGrid(t, q);
   // A position that needs no smoothing gets none: every filter rings where friction turns and acceleration jumps.
   for (Index j = 0; j < q.cols(); ++j)
-    if (out.cutoff_Hz[j] < kHighestOfRate * rate_Hz) smooth.col(j) = ZeroPhaseLowPass(smooth.col(j), out.cutoff_Hz[j], rate_Hz);
+    if (out.cutoff_Hz[j] < kHighestOfRate * rate_Hz)
+      smooth.col(j) = ZeroPhaseLowPass(smooth.col(j), out.cutoff_Hz[j], rate_Hz);
   const QuinticSpline spline(EvenGrid(t), smooth);
   out.q.middleRows(piece.first, count) = spline.Evaluate(t, 0);
   out.qd.middleRows(piece.first, count) = spline.Evaluate(t, 1);

@@ -1,0 +1,25 @@
+// cli - trace records as logs: joint quantities from the robot file's nominal constants; knows no connection.
+#pragma once
+
+#include "codegen/src/robot/robot.hpp"
+#include "host_sim/client/trace_reader.hpp"
+#include "host_sim/io/log.hpp"
+
+namespace armcal::cli {
+
+// Ticks of the motion without its blend.
+struct PlayedTicks {
+  std::uint32_t first, last;
+};
+
+// Trace 0. Records whose whole window lies inside the played part; first_tick: of the first of them.
+// Throws client::LinkError if there are too few for a log.
+io::Log RawLog(const client::TraceRecords& records, const codegen::Robot& robot, const PlayedTicks& played,
+               std::uint32_t& first_tick);
+
+// Trace 1, the drive's processed samples; `tauff` is the committed model's torque at the measured state. All, or the
+// played part.
+io::Log SampleLog(const client::TraceRecords& records, const codegen::Robot& robot, const PlayedTicks& played,
+                  bool all);
+
+}  // namespace armcal::cli

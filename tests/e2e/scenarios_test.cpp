@@ -34,7 +34,7 @@ INSTANTIATE_TEST_SUITE_P(All, Scenario,
                                          Shipped{"temperature", {"temp_viscous"}, 5},
                                          Shipped{"cable", {"cable_pack", "position_torque"}, 6},
                                          Shipped{"cubic", {"viscous_cubic", "viscous_quadratic"}, 5}),
-                         [](const auto& info) { return std::string(info.param.scenario); });
+                         [](const auto& shipped) { return std::string(shipped.param.scenario); });
 
 }  // namespace
 }  // namespace armcal::tests

@@ -34,6 +34,11 @@ struct AxisScale {
   }
 };
 
+// A window of `ticks` ticks from `first` on lies whole in the played part; ticks wrap.
+bool Inside(std::uint32_t first, std::uint32_t ticks, const PlayedTicks& played) {
+  return first - played.first < 0x80000000u && played.last - (first + ticks - 1) < 0x80000000u;
+}
+
 }  // namespace
 
 io::Log RawLog(const client::TraceRecords& r, const codegen::Robot& robot, const PlayedTicks& played,
@@ -42,8 +47,7 @@ io::Log RawLog(const client::TraceRecords& r, const codegen::Robot& robot, const
   const AxisScale scale(robot);
   std::vector<std::size_t> inside;
   for (std::size_t k = 0; k < r.count(); ++k)
-    if (r.ticks[k] - played.first < 0x80000000u && played.last - (r.ticks[k] + r.tick_step - 1) < 0x80000000u)
-      inside.push_back(k);
+    if (Inside(r.ticks[k], r.tick_step, played)) inside.push_back(k);
   if (inside.size() < io::kMinSamples)
     throw client::LinkError("trace: " + std::to_string(inside.size()) +
                             " records of the trajectory, expected at least " + std::to_string(io::kMinSamples));
@@ -80,9 +84,7 @@ io::Log SampleLog(const client::TraceRecords& r, const codegen::Robot& robot, co
   log.joints = n;
   std::vector<std::size_t> inside;
   for (std::size_t k = 0; k < r.count(); ++k)
-    if (all ||
-        (r.ticks[k] - played.first < 0x80000000u && played.last - (r.ticks[k] + robot.sample_ticks - 1) < 0x80000000u))
-      inside.push_back(k);
+    if (all || Inside(r.ticks[k], robot.sample_ticks, played)) inside.push_back(k);
   const auto N = static_cast<Eigen::Index>(inside.size());
   log.t.resize(N);
   for (MatrixXd* m : {&log.q, &log.qd, &log.qdd, &log.tau, &log.temp, &log.tauff}) m->resize(N, n);

@@ -44,18 +44,10 @@ NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
     power *= 1 - reflection * reflection;
   }
   noise.a = a;
-  // What the coefficients really leave. The recursion's own figure is too small where a slow residual is broken into segments: an
-  // effect still inside would then look like less noise than there is.
-  double square = 0;
-  int kept = 0;
-  for (int k = 0; k < rows.size(); ++k) {
-    if (place[k] < kArOrder) continue;
-    double innovation = e[k];
-    for (int i = 0; i < kArOrder; ++i) innovation -= a[i] * e[k - 1 - i];
-    square += innovation * innovation;
-    ++kept;
-  }
-  noise.innovation = std::sqrt(std::max(square / kept, 1e-24));
+  // What the coefficients really leave. The recursion's own figure is too small where a slow residual is broken into
+  // segments: an effect still inside would then look like less noise than there is.
+  noise.innovation = 1;
+  noise.innovation = std::sqrt(std::max(Whiten(noise, rows, e).squaredNorm() / WhitenedRows(noise, rows), 1e-24));
   return noise;
 }
 

@@ -83,7 +83,12 @@ run_ctest "tests ($scope)" build/host "$labels"
 
 if [[ $scope != fast ]]; then
   step "cross packages" toolchains/install.sh cross
-  for image in cortex-m4f cortex-m7; do step "image $image" configure_and_build "$image"; done
+  for image in cortex-m4f cortex-m7; do
+    step "image $image" configure_and_build "$image" && cat "build/$image/regressor_budget.txt"
+  done
+  step "a user's project for cortex-m7" ctest --build-and-test tests/add_model/consumer build/cortex-m7/consumer \
+    --build-generator Ninja --build-options "-DARMCAL=$PWD" "-DARMCAL_TOOL=$PWD/build/host/armcal" \
+    "-DCMAKE_TOOLCHAIN_FILE=$PWD/toolchains/cortex-m7.cmake" -DCMAKE_BUILD_TYPE=Release
 
   # Under sanitizers: what bytes from outside reach and what runs on the target. The host's matrix code takes long to compile so; it
   # comes with `long`.

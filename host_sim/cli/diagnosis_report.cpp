@@ -32,6 +32,7 @@ std::vector<std::string> Signals(const Term& t) {
   const std::string joint = t.joints.empty() ? "" : std::to_string(t.joints[0] + 1);
   for (std::string s : t.record->signals) {
     if (s == "t") out.push_back("time");
+    else if (s.ends_with("[k]")) out.push_back(s.substr(0, s.size() - 3) + std::to_string(t.joints.at(1) + 1));
     else if (s.back() == ')') out.push_back(s.insert(s.size() - 1, joint));
     else out.push_back(s == "tau_rigid" ? "load" + joint : s + joint);
   }
@@ -44,6 +45,7 @@ std::pair<std::string, VectorXd> Abscissa(const DiagnosisView& v, const Term& t)
   const int j = t.joints.empty() ? v.model->joints() - 1 : t.joints[0];
   const std::string& signal = t.record->signals.empty() ? "qd" : t.record->signals[0];
   const std::string number = std::to_string(j + 1);
+  if (signal == "q[k]") return {"q" + std::to_string(t.joints.at(1) + 1) + " / rad", s.q.col(t.joints.at(1))};
   if (signal == "q") return {"q" + number + " / rad", s.q.col(j)};
   if (signal == "temp" && s.temp.cols() > j) return {"temperature " + number + " / deg C", s.temp.col(j)};
   if (signal == "t") return {"time / s", s.t};

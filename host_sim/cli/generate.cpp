@@ -12,6 +12,27 @@ struct Options {
   std::string robot, out, json;
 };
 
+// What each standby effect costs on the target: rows of the filter's triangle, table, states, and what the regressor
+// computes more than without it.
+void PrintStandby(const codegen::Model& model, const codegen::Passport& with) {
+  for (std::size_t k = 0; k < model.robot().effect.size(); ++k) {
+    const codegen::EffectUse& use = model.robot().effect[k];
+    if (use.state != "standby") continue;
+    codegen::Robot robot = model.robot();
+    robot.effect.erase(robot.effect.begin() + static_cast<std::ptrdiff_t>(k));
+    const codegen::Model without(robot, LoadCatalogue());
+    const codegen::Passport less = codegen::Emit(without).passport;
+    const int columns = model.columns() - without.columns();
+    fmt::print(
+        "standby: {}: {} columns, {} bytes of filter state, {} bytes of table, {} bytes of states, {} operations, {} "
+        "other "
+        "functions\n",
+        use.effect, columns, 4 * columns * (model.dense() + 3), 16 * (model.parameters() - without.parameters()),
+        8 * (model.states() - without.states()),
+        with.multiplications + with.additions - less.multiplications - less.additions, with.functions - less.functions);
+  }
+}
+
 int Run(const Options& o) {
   const codegen::Model model = LoadModel(o.robot);
   const codegen::GeneratedFiles files = codegen::Emit(model);
@@ -26,10 +47,10 @@ int Run(const Options& o) {
       model.parameters(), files.schema);
   fmt::print("regressor: {} multiplications, {} additions, {} divisions, {} sines and cosines, {} other functions\n",
              c.multiplications, c.additions, c.divisions, c.sincos, c.functions);
-  // What a standby column costs on the target: one row of the filter's triangle and one multiply-add a row.
-  for (const auto& p : model.table())
-    if (p.state == "standby")
-      fmt::print("standby: {} ({} bytes of filter state, {} bytes of table)\n", p.name, 4 * (model.dense() + 3), 16);
+  if (model.states() > 0)
+    fmt::print("states: {}, for the extended Kalman filter {} sensitivities more\n", model.states(),
+               model.sensitivities());
+  PrintStandby(model, c);
   fmt::print("written: {}\n", folder.string());
   WriteJson(o.json, {{"robot", model.robot().name},
                      {"schema", files.schema},

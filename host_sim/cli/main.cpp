@@ -29,6 +29,7 @@ int Main(int argc, char** argv) {
   AddFlash(app, action);
   AddVerify(app, action);
   AddDemo(app, action);
+  AddBench(app, action);
   try {
     app.parse(argc, argv);
     return action();

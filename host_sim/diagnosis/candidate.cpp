@@ -83,6 +83,17 @@ void Candidate::Evaluate(const Quantities& quantities, const std::vector<double>
   tape_->Evaluate(bindings, s.samples(), out);
 }
 
+namespace {
+// Whether the search has what this record reads: no memory from sample to sample, no quantity that it does not bind.
+bool CanBeTried(const codegen::EffectRecord& record) {
+  if (record.kind_class != "static" && record.kind_class != "run_state") return false;
+  if (record.search.how == "none" || record.search.how == "window") return false;
+  if (record.search.signal == "t") return false;  // what a run did over time says nothing about another run
+  static const std::set<std::string> bound = {"q", "qd", "qdd", "temp", "t", "tau_rigid", "tau_gravity", "Y"};
+  return std::all_of(record.inputs.begin(), record.inputs.end(), [](const auto& i) { return bound.contains(i); });
+}
+}  // namespace
+
 std::vector<std::unique_ptr<Candidate>> MakeCandidates(const codegen::Catalogue& catalogue,
                                                        const codegen::Model& model) {
   std::set<std::pair<std::string, std::vector<int>>> estimated;
@@ -92,7 +103,7 @@ std::vector<std::unique_ptr<Candidate>> MakeCandidates(const codegen::Catalogue&
         estimated.insert({e.record->name, e.joints});
   std::vector<std::unique_ptr<Candidate>> out;
   for (const auto& [name, record] : catalogue) {
-    if (record.friction_law) continue;
+    if (record.friction_law || !CanBeTried(record)) continue;
     for (const auto& joints : codegen::JointSets(record, model.joints()))
       if (!estimated.contains({name, joints}))
         out.push_back(std::make_unique<Candidate>(record, model.robot(), joints));

@@ -36,9 +36,14 @@ Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, cons
 namespace {
 
 // A signal of the candidate's own joint over its used rows.
-VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, const std::string& name) {
-  const int j = candidate.joints().empty() ? candidate.rows()[0] : candidate.joints()[0];
+// A signal of the candidate's joint j ("q") or of its other one ("q[k]") in the rows of joint j.
+VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::string name) {
+  int j = candidate.joints().empty() ? candidate.rows()[0] : candidate.joints()[0];
   const RowIndex& index = evidence.index[j];
+  if (name.ends_with("[k]")) {
+    name.resize(name.size() - 3);
+    j = candidate.joints().at(1);
+  }
   VectorXd out(index.size());
   for (int k = 0; k < index.size(); ++k) {
     const Quantities& log = evidence.logs[index.dataset[k]];

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
+
+#include <Eigen/QR>
 
 #include "codegen/src/generator/tape.hpp"
 
@@ -17,11 +20,13 @@ using Vector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 // Inputs are of order one, so are the columns; a dependent column leaves about 1e-17, a true one more than 1e-4.
 constexpr Real kIndependent = 1e-9L;
 
-Matrix RandomColumns(const Graph& graph, const std::vector<std::vector<Expr>>& row, int states) {
+Matrix RandomColumns(const Graph& graph, const BodyRows& row, const BodyRows& extra) {
   std::vector<Expr> roots;
-  for (const auto& r : row) roots.insert(roots.end(), r.begin(), r.end());
+  for (const auto& rows : {row, extra})
+    for (const auto& r : rows) roots.insert(roots.end(), r.begin(), r.end());
   const Tape tape(graph, roots);
-  const int n = static_cast<int>(row.size()), p = static_cast<int>(row[0].size());
+  const int n = static_cast<int>(row.size() + extra.size()), p = static_cast<int>(row[0].size());
+  const int states = 3 * p / n + 10;
   Matrix W(states * n, p);
   std::mt19937_64 random(1);
   for (int k = 0; k < states; ++k) {
@@ -35,7 +40,8 @@ Matrix RandomColumns(const Graph& graph, const std::vector<std::vector<Expr>>& r
 }
 
 std::vector<int> Preference(const Robot& robot) {
-  std::vector<int> order;
+  std::vector<int> order = robot.parameters.prefer;
+  const auto& omit = robot.parameters.omit;
   const int n = robot.joints();
   const auto add = [&](int j, std::initializer_list<int> kinds) {
     for (const int k : kinds) order.push_back(kBodyBlock * j + k);
@@ -47,30 +53,35 @@ std::vector<int> Preference(const Robot& robot) {
   for (int j = n - 1; j >= 0; --j) add(j, {7, 3});
   for (int j = n - 1; j >= 0; --j)
     if (robot.joint[j].kinematics.type == JointType::kRevolute) add(j, {0});
-  return order;
+  std::vector<int> once;
+  for (const int c : order)
+    if (std::count(once.begin(), once.end(), c) + std::count(omit.begin(), omit.end(), c) == 0) once.push_back(c);
+  return once;
 }
 
-// Twelve digits: far above the long double noise, so that the same file gives the same bytes everywhere.
+// Fourteen digits: far above the long double noise, so that the same file gives the same bytes everywhere.
 double Rounded(Real value) {
   if (std::abs(value) < 1e-11L) return 0;
   char text[40];
-  std::snprintf(text, sizeof text, "%.12Lg", value);
+  std::snprintf(text, sizeof text, "%.14Lg", value);
   return std::strtod(text, nullptr);
 }
 
-}  // namespace
+struct Choice {
+  std::vector<int> column;  // in the order taken
+  Matrix merge;             // [column.size() x all]: every column as a sum of the taken ones
+};
 
-BaseParameters FindBaseParameters(const Graph& graph, const std::vector<std::vector<Expr>>& row, const Robot& robot) {
-  const int p = static_cast<int>(row[0].size());
-  const Matrix W = RandomColumns(graph, row, 3 * p / robot.joints() + 10);
-  std::vector<int> chosen;
+Choice TakeIndependent(const Matrix& W, const std::vector<int>& order, bool keep_dependent) {
+  const int p = static_cast<int>(W.cols());
+  Choice out;
   std::vector<Vector> q;                  // orthonormal basis of the chosen columns
   Matrix r = Matrix::Zero(p, p);          // chosen columns in that basis (upper triangle), by column
   Matrix dependent = Matrix::Zero(p, p);  // all columns in that basis
-  for (const int c : Preference(robot)) {
+  for (const int c : order) {
     Vector v = W.col(c);
     Vector h = Vector::Zero(p);
-    for (int pass = 0; pass < 2; ++pass)  // twice is enough
+    for (int pass = 0; pass < 2 && !keep_dependent; ++pass)  // twice is enough
       for (std::size_t k = 0; k < q.size(); ++k) {
         const Real s = q[k].dot(v);
         h[k] += s;
@@ -83,25 +94,40 @@ BaseParameters FindBaseParameters(const Graph& graph, const std::vector<std::vec
     dependent.col(c) = h;
     r.col(q.size()) = h;
     q.push_back(v / v.norm());
-    chosen.push_back(c);
+    out.column.push_back(c);
   }
-  const int rank = static_cast<int>(chosen.size());
-  const Matrix coefficients =
-      r.topLeftCorner(rank, rank).template triangularView<Eigen::Upper>().solve(dependent.topRows(rank));
-  Eigen::MatrixXd merge(rank, p);
-  for (int i = 0; i < rank; ++i)
-    for (int c = 0; c < p; ++c) merge(i, c) = Rounded(coefficients(i, c));
-  std::vector<int> order(rank);
-  for (int i = 0; i < rank; ++i) order[i] = i;
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return chosen[a] < chosen[b]; });
+  const int rank = static_cast<int>(q.size());
+  out.merge = r.topLeftCorner(rank, rank).template triangularView<Eigen::Upper>().solve(dependent.topRows(rank));
+  return out;
+}
+
+}  // namespace
+
+std::vector<int> IndependentColumns(const Graph& graph, const BodyRows& row, const Robot& robot,
+                                    const BodyRows& extra) {
+  auto column = TakeIndependent(RandomColumns(graph, row, extra), Preference(robot), robot.parameters.standard).column;
+  std::sort(column.begin(), column.end());
+  return column;
+}
+
+BaseParameters FindBaseParameters(const Graph& graph, const BodyRows& row, const Robot& robot, const BodyRows& extra) {
+  const Choice choice = TakeIndependent(RandomColumns(graph, row, extra), Preference(robot), robot.parameters.standard);
+  std::vector<int> order(choice.column.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return choice.column[a] < choice.column[b]; });
   BaseParameters base;
-  Eigen::MatrixXd sorted(rank, p);
-  for (int i = 0; i < rank; ++i) {
-    base.column.push_back(chosen[order[i]]);
-    sorted.row(i) = merge.row(order[i]);
+  base.map.resize(static_cast<Eigen::Index>(order.size()), choice.merge.cols());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    base.column.push_back(choice.column[order[i]]);
+    base.map.row(static_cast<Eigen::Index>(i)) = choice.merge.row(order[i]).unaryExpr(&Rounded);
   }
-  base.map = sorted * SlideMap(robot);
+  base.map *= SlideMap(robot);
   return base;
+}
+
+Eigen::VectorXd BodiesFromBase(const BaseParameters& base, const Eigen::VectorXd& value,
+                               const Eigen::VectorXd& reference) {
+  return reference + base.map.completeOrthogonalDecomposition().solve(value - base.map * reference);
 }
 
 }  // namespace armcal::codegen

@@ -11,6 +11,11 @@
 namespace armcal::codegen {
 namespace {
 
+// Everything that a record may read.
+constexpr const char* kInputs[] = {"q",           "qd",     "qdd",       "temp",        "t",
+                                   "dt",          "flag",   "tau_rigid", "tau_gravity", "Y",
+                                   "dY/dgravity", "M[:,j]", "tau_model", "dtau_model"};
+
 std::string ExpressionText(const TomlReader& in, std::string_view key, const std::string& otherwise) {
   if (!in.Has(key)) return otherwise;
   if (in.table()[key].is_string()) return in.Text(key);
@@ -56,14 +61,40 @@ LinearParameter ReadLinear(const TomlReader& in) {
   return p;
 }
 
+RecordState ReadState(const TomlReader& in) {
+  in.AllowOnly({"name", "unit", "initial", "step", "settled"});
+  RecordState s{in.Text("name"), in.Text("unit"), ExpressionText(in, "initial", "0"), in.Text("step"),
+                in.Text("settled", "")};
+  if (s.name.empty() || s.name.find(' ') != std::string::npos) in.Fail("name", "one word");
+  return s;
+}
+
 }  // namespace
 
 EffectRecord ReadEffect(const std::filesystem::path& path) {
   const toml::table table = ParseToml(path);
   const TomlReader in(table, path.string());
-  in.AllowOnly({"name", "title", "source", "class", "scope", "inputs", "signals", "let", "linear", "nonlinear",
-                "replaces", "depends_on_estimate", "on_target", "friction_law", "generic_penalty", "search",
-                "confusable_with", "needs"});
+  in.AllowOnly({"name",
+                "title",
+                "source",
+                "class",
+                "scope",
+                "inputs",
+                "signals",
+                "let",
+                "state",
+                "linear",
+                "nonlinear",
+                "apply",
+                "replaces",
+                "adds_base",
+                "depends_on_estimate",
+                "on_target",
+                "friction_law",
+                "generic_penalty",
+                "search",
+                "confusable_with",
+                "needs"});
   EffectRecord r;
   r.path = path.string();
   std::ifstream file(path);
@@ -73,14 +104,12 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
   r.title = in.Text("title");
   r.source = in.Text("source", "");
   r.kind_class = in.Text("class");
-  MustBeOneOf(in, "class", r.kind_class, std::initializer_list<const char*>{"static", "run_state"});
+  MustBeOneOf(in, "class", r.kind_class,
+              std::initializer_list<const char*>{"static", "stateful", "run_state", "sensor"});
   r.scope = in.Text("scope");
   MustBeOneOf(in, "scope", r.scope, std::initializer_list<const char*>{"joint", "pair", "arm", "body"});
   r.inputs = in.Texts("inputs");
-  for (const std::string& input : r.inputs)
-    MustBeOneOf(
-        in, "inputs", input,
-        std::initializer_list<const char*>{"q", "qd", "qdd", "temp", "t", "flag", "tau_rigid", "tau_gravity", "Y"});
+  for (const std::string& input : r.inputs) MustBeOneOf(in, "inputs", input, kInputs);
   r.signals = in.Texts("signals");
   r.let = in.Texts("let");
   for (const TomlReader& linear : in.Tables("linear")) r.linear.push_back(ReadLinear(linear));
@@ -97,6 +126,16 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
     p.logarithmic = t.Text("scale", "linear") == "log";
     r.nonlinear.push_back(p);
   }
+  for (const TomlReader& t : in.Tables("state")) r.state.push_back(ReadState(t));
+  if (!r.state.empty() && r.kind_class == "static") in.Fail("class", "\"stateful\" where there is a [[state]]");
+  if (in.Has("apply")) {
+    const TomlReader apply = in.Table("apply");
+    apply.AllowOnly({"how", "by"});
+    r.apply = {apply.Text("how"), apply.Text("by")};
+    MustBeOneOf(apply, "how", r.apply.how, std::initializer_list<const char*>{"gain", "delay", "censor"});
+  }
+  if ((r.kind_class == "sensor") != in.Has("apply")) in.Fail("apply", "a table if, and only if, class is \"sensor\"");
+  r.adds_base = in.Texts("adds_base");
   r.replaces = in.Text("replaces", "");
   r.depends_on_estimate = in.Flag("depends_on_estimate", false);
   r.on_target = in.Flag("on_target", true);
@@ -109,7 +148,8 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
     s.AllowOnly({"how", "signal", "grid", "minimum_s"});
     r.search.how = s.Text("how");
     MustBeOneOf(s, "how", r.search.how,
-                std::initializer_list<const char*>{"linear", "profile", "spectral", "spline", "onset", "shared"});
+                std::initializer_list<const char*>{"linear", "profile", "spectral", "spline", "onset", "window",
+                                                   "shared", "none"});
     r.search.signal = s.Text("signal", "");
     r.search.grid = static_cast<int>(s.Number("grid", 10));
     r.search.minimum_s = s.Number("minimum_s", 0);

@@ -25,8 +25,21 @@ struct NonlinearParameter {
   bool logarithmic = false;
 };
 
+// What an effect carries from sample to sample.
+struct RecordState {
+  std::string name, unit;
+  std::string initial, step;  // expressions; in `step` the own name is the old value, the inputs are the new sample's
+  std::string settled;        // above zero once the start no longer matters; empty: from the first sample on
+};
+
+// A sensor record's exact form: what the measurement underwent, and which parameter says how much.
+struct Apply {
+  std::string how;  // gain | delay | censor
+  std::string by;
+};
+
 struct Search {
-  std::string how = "linear";  // linear | profile | spectral | spline | onset | shared
+  std::string how = "linear";  // linear | profile | spectral | spline | onset | window | shared | none
   std::string signal;          // spectral, spline: over which signal
   int grid = 10;               // profile: points per nonlinear parameter
   double minimum_s = 0;        // onset: shortest stretch
@@ -39,7 +52,10 @@ struct EffectRecord {
   std::vector<std::string> inputs, signals, let, confusable_with, needs;
   std::vector<LinearParameter> linear;
   std::vector<NonlinearParameter> nonlinear;
-  std::string replaces;
+  std::vector<RecordState> state;
+  Apply apply;                         // class sensor only
+  std::string replaces;                // the friction law whose place it takes on its joint
+  std::vector<std::string> adds_base;  // body parameters that it makes visible
   bool depends_on_estimate = false;
   bool on_target = true;
   bool friction_law = false;   // the robot's own friction, not a candidate

@@ -1,6 +1,7 @@
-// generator - temporaries in dependency order, all sines and cosines of one depth in one branch-free block.
+// generator - temporaries just before their first use, sines and cosines in one branch-free block before the rest.
 #include "codegen/src/generator/emit_body.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <map>
 #include <set>
@@ -9,48 +10,59 @@
 namespace armcal::codegen {
 namespace {
 
+bool IsLeaf(const Node& n) { return n.op == Op::kConstant || n.op == Op::kInput; }
+bool IsSine(const Node& n) { return n.op == Op::kSin || n.op == Op::kCos; }
+
 class Printer {
  public:
   Printer(const Graph& graph, const std::function<std::string(const std::string&)>& input, Passport& passport)
       : nodes_(graph.nodes()), graph_(graph), input_(input), passport_(passport) {}
 
   std::string Run(const std::vector<Assignment>& assignments) {
-    std::vector<int> uses(nodes_.size(), 0);
-    std::vector<char> needed(nodes_.size(), 0);
-    for (const Assignment& a : assignments) needed[a.value.id()] = 1;
-    for (int i = static_cast<int>(nodes_.size()) - 1; i >= 0; --i) {
-      if (!needed[i] || nodes_[i].op == Op::kInput) continue;
-      for (const int operand : {nodes_[i].a, nodes_[i].b})
-        if (operand >= 0) needed[operand] = 1;
+    Prepare(assignments);
+    for (int l = 1; l <= levels_; ++l) SineBlock(l);
+    std::string heading;
+    for (const Assignment& a : assignments) {
+      if (a.heading != heading && !a.heading.empty()) out_ << "    // " << a.heading << "\n";
+      heading = a.heading;
+      const std::string value = Output(a.value.id());
+      out_ << "    " << a.target << " = " << value << ";\n";
     }
-    // level: how many sine blocks must come before a node
-    std::vector<int> level(nodes_.size(), 0);
-    int levels = 0;
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (!needed[i] || nodes_[i].op == Op::kInput || nodes_[i].op == Op::kConstant) continue;
-      for (const int operand : {nodes_[i].a, nodes_[i].b})
-        if (operand >= 0) level[i] = std::max(level[i], level[operand]);
-      if (nodes_[i].op == Op::kSin || nodes_[i].op == Op::kCos) ++level[i];
-      levels = std::max(levels, level[i]);
-    }
-    for (int l = 0; l <= levels; ++l) {
-      if (l > 0) SineBlock(needed, level, l);
-      for (std::size_t i = 0; i < nodes_.size(); ++i)
-        if (needed[i] && level[i] == l) Statement(static_cast<int>(i));
-    }
-    for (const Assignment& a : assignments) out_ << "    " << a.target << " = " << Operand(a.value.id()) << ";\n";
     return out_.str();
   }
 
  private:
-  void SineBlock(const std::vector<char>& needed, const std::vector<int>& level, int l) {
+  // What is needed, how often it is read, how many registers it takes (Sethi and Ullman), and how many sine blocks must
+  // come before it.
+  void Prepare(const std::vector<Assignment>& assignments) {
+    const std::size_t count = nodes_.size();
+    uses_.assign(count, 0);
+    registers_.assign(count, 0);
+    level_.assign(count, 0);
+    for (const Assignment& a : assignments) ++uses_[a.value.id()];
+    for (int i = static_cast<int>(count) - 1; i >= 0; --i) {
+      if (!uses_[i] || IsLeaf(nodes_[i])) continue;
+      ++uses_[nodes_[i].a];
+      if (nodes_[i].b >= 0) ++uses_[nodes_[i].b];
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Node& n = nodes_[i];
+      if (!uses_[i] || IsLeaf(n)) continue;
+      const int b = n.b < 0 ? n.a : n.b;
+      registers_[i] = std::max({1, registers_[n.a], registers_[b]}) + (n.b >= 0 && registers_[n.a] == registers_[b]);
+      level_[i] = std::max(level_[n.a], level_[b]) + IsSine(n);
+      levels_ = std::max(levels_, level_[i]);
+    }
+  }
+
+  void SineBlock(int l) {
     std::map<int, int> slot;  // angle node -> place in the block
     for (std::size_t i = 0; i < nodes_.size(); ++i)
-      if (needed[i] && level[i] == l && (nodes_[i].op == Op::kSin || nodes_[i].op == Op::kCos))
-        slot.try_emplace(nodes_[i].a, 0);
+      if (uses_[i] && level_[i] == l && IsSine(nodes_[i])) slot.try_emplace(nodes_[i].a, 0);
     int count = 0;
     std::string angles;
     for (auto& [angle, place] : slot) {
+      Ensure(angle);
       place = count++;
       angles += (angles.empty() ? "" : ", ") + Operand(angle);
     }
@@ -59,83 +71,95 @@ class Printer {
          << count << "], cosine" << suffix << "[" << count << "];\n    math::SinCosBlock<" << count << ">(angle"
          << suffix << ", sine" << suffix << ", cosine" << suffix << ");\n";
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (!needed[i] || level[i] != l) continue;
-      if (nodes_[i].op != Op::kSin && nodes_[i].op != Op::kCos) continue;
+      if (!uses_[i] || level_[i] != l || !IsSine(nodes_[i])) continue;
       const bool sine = nodes_[i].op == Op::kSin;
       name_[static_cast<int>(i)] = (sine ? "sine" : "cosine") + suffix + "[" + std::to_string(slot[nodes_[i].a]) + "]";
       ++passport_.sincos;
     }
   }
 
-  void Statement(int i) {
+  // A product that only this sum reads becomes part of it: one multiply-add.
+  bool Fuses(int product) const { return nodes_[product].op == Op::kMultiply && uses_[product] == 1; }
+
+  // Text of a node's operation, its sign turned where `negative`; operands must have names.
+  std::string Formula(int i, bool negative) {
     const Node& n = nodes_[i];
-    std::string text;
-    switch (n.op) {
-      case Op::kConstant:
-      case Op::kInput:
-      case Op::kNegate:
-      case Op::kSin:
-      case Op::kCos:
-        return;
-      case Op::kAdd:
-        text = Operand(n.a) + " + " + Operand(n.b), ++passport_.additions;
-        break;
-      case Op::kSubtract:
-        text = Operand(n.a) + " - " + Operand(n.b), ++passport_.additions;
-        break;
-      case Op::kMultiply:
-        text = Operand(n.a) + " * " + Operand(n.b), ++passport_.multiplications;
-        break;
-      case Op::kDivide:
-        text = Call("Divide", n), ++passport_.divisions;
-        break;
-      case Op::kExp:
-        text = Call("Exp", n), ++passport_.functions;
-        break;
-      case Op::kLog:
-        text = Call("Log", n), ++passport_.functions;
-        break;
-      case Op::kTanh:
-        text = Call("Tanh", n), ++passport_.functions;
-        break;
-      case Op::kCbrt:
-        text = Call("Cbrt", n), ++passport_.functions;
-        break;
-      case Op::kSqrt:
-        text = Call("Sqrt", n), ++passport_.functions;
-        break;
-      case Op::kPow:
-        text = Call("Pow", n), ++passport_.functions;
-        break;
-      case Op::kAbs:
-        text = Call("Abs", n);
-        break;
-      case Op::kSign:
-        text = Call("Sign", n);
-        break;
-      case Op::kMin:
-        text = Call("Min", n);
-        break;
-      case Op::kMax:
-        text = Call("Max", n);
-        break;
+    const auto term = [&](int operand, bool minus) { return minus ? Minus(Operand(operand)) : Operand(operand); };
+    if (n.op == Op::kMultiply) {
+      ++passport_.multiplications;
+      return term(n.a, negative) + " * " + Operand(n.b);
     }
+    if (n.op == Op::kAdd || n.op == Op::kSubtract) {
+      ++passport_.additions;
+      const bool minus_b = (n.op == Op::kSubtract) != negative;
+      const int product = Fuses(n.b) ? n.b : (Fuses(n.a) ? n.a : -1);
+      if (product >= 0) {
+        ++passport_.multiplications;
+        const bool second = product == n.b;
+        return "math::MulAdd(" + term(nodes_[product].a, second ? minus_b : negative) + ", " +
+               Operand(nodes_[product].b) + ", " + (second ? term(n.a, negative) : term(n.b, minus_b)) + ")";
+      }
+      if (negative && n.op == Op::kSubtract) return Operand(n.b) + " - " + Operand(n.a);
+      return Operand(n.a) + (n.op == Op::kAdd ? " + " : " - ") + Operand(n.b);
+    }
+    static const std::map<Op, const char*> functions = {
+        {Op::kDivide, "Divide"}, {Op::kExp, "Exp"},   {Op::kLog, "Log"}, {Op::kTanh, "Tanh"},
+        {Op::kCbrt, "Cbrt"},     {Op::kSqrt, "Sqrt"}, {Op::kPow, "Pow"}, {Op::kAbs, "Abs"},
+        {Op::kSign, "Sign"},     {Op::kMin, "Min"},   {Op::kMax, "Max"}};
+    if (n.op == Op::kDivide) ++passport_.divisions;
+    else if (n.op != Op::kAbs && n.op != Op::kSign && n.op != Op::kMin && n.op != Op::kMax) ++passport_.functions;
+    return std::string("math::") + functions.at(n.op) + "(" + Operand(n.a) + (n.b >= 0 ? ", " + Operand(n.b) : "") +
+           ")";
+  }
+
+  // Makes a name for the node and, before it, for all it reads; the operand that takes more registers goes first.
+  void Ensure(int i, bool negative = false) {
+    const Node& n = nodes_[i];
+    if (IsLeaf(n) || name_.contains(i)) return;
+    if (n.op == Op::kNegate) return Ensure(n.a);
+    std::vector<int> reads;
+    for (const int operand : {n.a, n.b}) {
+      if (operand < 0) continue;
+      const bool inside =
+          (n.op == Op::kAdd || n.op == Op::kSubtract) && operand == (Fuses(n.b) ? n.b : n.a) && Fuses(operand);
+      if (inside) reads.insert(reads.end(), {nodes_[operand].a, nodes_[operand].b});
+      else reads.push_back(operand);
+    }
+    std::stable_sort(reads.begin(), reads.end(), [&](int a, int b) { return registers_[a] > registers_[b]; });
+    for (const int operand : reads) Ensure(operand);
+    const std::string text = Formula(i, negative);
     std::string name;
-    if (const auto it = graph_.names().find(i); it != graph_.names().end() && used_.insert(it->second).second)
+    if (const auto it = graph_.names().find(i);
+        !negative && it != graph_.names().end() && used_.insert(it->second).second)
       name = it->second;
     else name = "t" + std::to_string(++temporaries_);
     name_[i] = name;
     out_ << "    const T " << name << " = " << text << ";\n";
   }
 
-  std::string Call(const char* function, const Node& n) {
-    return std::string("math::") + function + "(" + Operand(n.a) + (n.b >= 0 ? ", " + Operand(n.b) : "") + ")";
+  // What an assignment's right-hand side says. A sign that only the assignment reads costs nothing: the operation is
+  // written with it.
+  std::string Output(int i) {
+    const Node& n = nodes_[i];
+    const bool turns = n.op == Op::kNegate && uses_[i] == 1 && uses_[n.a] == 1 && !name_.contains(n.a) && Turns(n.a);
+    if (turns) {
+      Ensure(n.a, true);
+      return name_.at(n.a);
+    }
+    Ensure(i);
+    return Operand(i);
   }
+  bool Turns(int i) const {
+    const Node& n = nodes_[i];
+    return n.op == Op::kMultiply || n.op == Op::kSubtract || (n.op == Op::kAdd && (Fuses(n.a) || Fuses(n.b)));
+  }
+
+  static std::string Minus(const std::string& text) { return text[0] == '-' ? text.substr(1) : "-" + text; }
   std::string Operand(int i) {
     const Node& n = nodes_[i];
     if (n.op == Op::kConstant) return "T(" + NumberText(n.value) + ")";
     if (n.op == Op::kInput) return input_(graph_.inputs()[n.a]);
-    if (n.op == Op::kNegate) return "-" + Operand(n.a);
+    if (n.op == Op::kNegate) return Minus(Operand(n.a));
     return name_.at(i);
   }
 
@@ -143,10 +167,11 @@ class Printer {
   const Graph& graph_;
   const std::function<std::string(const std::string&)>& input_;
   Passport& passport_;
+  std::vector<int> uses_, registers_, level_;
   std::ostringstream out_;
   std::map<int, std::string> name_;
   std::set<std::string> used_;
-  int temporaries_ = 0;
+  int temporaries_ = 0, levels_ = 0;
 };
 
 }  // namespace

@@ -14,9 +14,11 @@ std::string NumberText(double value);  // shortest text that reads back to the s
 struct Assignment {
   std::string target;  // "front[3]"
   Expr value;
+  std::string heading;  // a comment line before it where it differs from the one before; may be empty
 };
 
-// Statements that compute all assignments. input: C++ text of a graph input by name.
+// Statements that compute all assignments, in their order: each value just before its first use, so that few are alive
+// at a time. input: C++ text of a graph input by name.
 std::string EmitStatements(const Graph& graph, const std::vector<Assignment>& assignments,
                            const std::function<std::string(const std::string&)>& input, Passport& passport);
 

@@ -3,6 +3,7 @@
 
 #include <cctype>
 #include <charconv>
+#include <cmath>
 
 #include "host_sim/io/input_error.hpp"
 
@@ -18,6 +19,60 @@ Expr CardinalSpline(Graph& g, Expr u) {
   for (int k = 0; k < 4; ++k) {
     const Expr p = g.Binary(Op::kMax, x - static_cast<double>(k), g.Constant(0));
     sum = sum + binomial[k] / 6 * (p * p * p);
+  }
+  return sum;
+}
+
+// A name for what a function keeps: the same function of the same arguments is one state.
+std::string StateName(const char* function, const std::vector<Expr>& a, int part = 0) {
+  std::string name = function + std::string(part ? std::to_string(part) : "") + "(";
+  for (const Expr& e : a) name += (name.back() == '(' ? "#" : ", #") + std::to_string(e.id());
+  return name + ")";
+}
+
+Expr Previous(Graph& g, const std::vector<Expr>& a) {
+  return g.State(StateName("previous", a), a[0], [&](Expr) { return a[0]; });
+}
+
+Expr Lowpass(Graph& g, const std::vector<Expr>& a) {
+  const auto step = [&](Expr y) {
+    const Expr rest = g.Unary(Op::kExp, -(g.Input("dt") / a[1]));
+    return a[0] + rest * (y - a[0]);
+  };
+  return step(g.State(StateName("lowpass", a), a[0], step));
+}
+
+// y'' = w0^2 (x - y) - 2 zeta w0 y', x held: the exact solution after dt.
+Expr Lowpass2(Graph& g, const std::vector<Expr>& a) {
+  const Expr x = a[0], w0 = a[1], zeta = a[2], dt = g.Input("dt");
+  const Expr damped = w0 * g.Unary(Op::kSqrt, g.Constant(1) - zeta * zeta), angle = damped * dt;
+  const Expr decay = g.Unary(Op::kExp, -(zeta * w0 * dt));
+  const Expr c = decay * g.Unary(Op::kCos, angle), s = decay * g.Unary(Op::kSin, angle) / damped;
+  const std::string name = StateName("lowpass2", a), rate_name = StateName("lowpass2", a, 1);
+  const auto position = [&](Expr y, Expr rate) { return x + (y - x) * (c + zeta * w0 * s) + rate * s; };
+  const auto speed = [&](Expr y, Expr rate) { return rate * (c - zeta * w0 * s) - (y - x) * (w0 * w0) * s; };
+  const Expr y = g.State(name, x, [&](Expr value) {
+    const Expr rate = g.State(rate_name, g.Constant(0), [&](Expr r) { return speed(value, r); });
+    return position(value, rate);
+  });
+  return position(y, g.State(rate_name, g.Constant(0), [](Expr r) { return r; }));
+}
+
+Expr Play(Graph& g, const std::vector<Expr>& a) {
+  const Expr half = 0.5 * a[1];
+  const auto step = [&](Expr z) { return g.Binary(Op::kMin, g.Binary(Op::kMax, z, a[0] - half), a[0] + half); };
+  return step(g.State(StateName("play", a), a[0], step));
+}
+
+Expr Delay(Graph& g, const std::vector<Expr>& a, int taps) {
+  const Expr u = g.Binary(Op::kMin, g.Binary(Op::kMax, a[1] / g.Input("dt"), g.Constant(0)), g.Constant(taps));
+  Expr tap = a[0], sum = g.Constant(0);
+  for (int k = 0; k <= taps; ++k) {
+    const Expr weight =
+        g.Binary(Op::kMax, g.Constant(0), g.Constant(1) - g.Unary(Op::kAbs, u - static_cast<double>(k)));
+    sum = sum + weight * tap;
+    const Expr newer = tap;
+    if (k < taps) tap = g.State(StateName("delay", a, k + 1), a[0], [&](Expr) { return newer; });
   }
   return sum;
 }
@@ -107,9 +162,9 @@ class Parser {
     if (at_ == begin) Fail("a name");
     return text_.substr(begin, at_ - begin);
   }
-  double ConstantOf(Expr e) {
+  double ConstantOf(Expr e, const char* what) {
     const Node& n = g_.nodes()[e.id()];
-    if (n.op != Op::kConstant) Fail("a constant index and count in bspline");
+    if (n.op != Op::kConstant) Fail(what);
     return n.value;
   }
   Expr Call(const std::string& name, std::size_t begin) {
@@ -143,10 +198,22 @@ class Parser {
     }
     if (name == "bspline") {
       need(5);
-      const double i = ConstantOf(a[3]), n = ConstantOf(a[4]);
+      const char* const what = "a constant index and count in bspline";
+      const double i = ConstantOf(a[3], what), n = ConstantOf(a[4], what);
       const Expr x = g_.Binary(Op::kMin, g_.Binary(Op::kMax, a[0], a[1]), a[2]);
       const Expr u = (n - 3) * ((x - a[1]) / (a[2] - a[1]));  // n splines: n-3 intervals
       return CardinalSpline(g_, u - (i - 3));
+    }
+    if (name == "previous") return need(1), Previous(g_, a);
+    if (name == "lowpass") return need(2), Lowpass(g_, a);
+    if (name == "lowpass2") return need(3), Lowpass2(g_, a);
+    if (name == "play") return need(2), Play(g_, a);
+    if (name == "delay") {
+      need(3);
+      const double taps = ConstantOf(a[2], "a whole number of samples, 1 to 64, in delay");
+      if (taps < 1 || taps > 64 || taps != std::floor(taps)) Fail("a whole number of samples, 1 to 64, in delay");
+      a.pop_back();
+      return Delay(g_, a, static_cast<int>(taps));
     }
     at_ = begin;
     Fail("a known function instead of '" + name + "'");

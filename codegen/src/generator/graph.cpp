@@ -39,6 +39,17 @@ void Graph::Name(Expr e, const std::string& name) {
   if (nodes_[id].op != Op::kConstant && nodes_[id].op != Op::kInput) names_.try_emplace(id, name);
 }
 
+Expr Graph::State(const std::string& name, Expr initial, const std::function<Expr(Expr)>& next) {
+  for (const StateVariable& s : states_)
+    if (s.name == name) return s.value;
+  const Expr value = Input(name);
+  const std::size_t k = states_.size();
+  states_.push_back({name, value, initial, value});
+  const Expr following = next(value);  // may make states of its own, or ask for this one
+  states_[k].next = following;
+  return value;
+}
+
 Expr Graph::Negate(Expr a) {
   const Node& n = nodes_[a.id()];
   if (n.op == Op::kNegate) return {this, n.a};
@@ -109,6 +120,9 @@ Expr Graph::Binary(Op op, Expr a, Expr b) {
       if (negated(a)) return Negate(Binary(op, inner(a), b));
       if (negated(b)) return Negate(Binary(op, a, inner(b)));
       return Make(op, a.id(), b.id());
+    case Op::kMin:
+    case Op::kMax:
+      return a.id() == b.id() ? a : Make(op, a.id(), b.id());
     case Op::kPow:
       if (cb && vb == 1) return a;
       if (cb && (vb == 2 || vb == 3 || vb == 4)) {

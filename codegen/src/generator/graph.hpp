@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -56,6 +57,12 @@ class Expr {
   int id_ = -1;
 };
 
+// A value carried from one sample to the next. `value` is an input node: what `next` gave at the sample before.
+struct StateVariable {
+  std::string name;
+  Expr value, initial, next;
+};
+
 class Graph {
  public:
   Graph() = default;
@@ -68,9 +75,13 @@ class Graph {
   Expr Binary(Op op, Expr a, Expr b);
   void Name(Expr e, const std::string& name);  // a readable name for the emitted temporary; the first one stays
 
+  // The state of this name, made on first use; `next` gets its value and gives the one of the next sample.
+  Expr State(const std::string& name, Expr initial, const std::function<Expr(Expr value)>& next);
+
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::vector<std::string>& inputs() const { return inputs_; }
   const std::unordered_map<int, std::string>& names() const { return names_; }
+  const std::vector<StateVariable>& states() const { return states_; }
 
  private:
   Expr Make(Op op, int a, int b, double value = 0);
@@ -80,6 +91,7 @@ class Graph {
   std::vector<std::string> inputs_;
   std::unordered_map<int, std::string> names_;
   std::unordered_map<std::string, int> input_ids_;
+  std::vector<StateVariable> states_;
   std::unordered_map<std::string, int> known_;
 };
 

@@ -4,14 +4,13 @@
 #include <charconv>
 #include <cmath>
 
+#include "codegen/src/generator/derivative.hpp"
 #include "codegen/src/generator/expression.hpp"
 #include "codegen/src/generator/rigid_body.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::codegen {
 namespace {
-
-const char* const kBodyNames[] = {"m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"};
 
 // Constants of one joint that records may use.
 bool RobotConstant(const Joint& j, const std::string& name, double& value) {
@@ -38,6 +37,7 @@ class Names {
   int row = 0;        // the joint whose row is being written
   std::string index;  // text of the array index i
   std::map<std::string, Expr> unknowns;
+  std::map<std::string, Expr> states;  // name -> new value; in its own step the old one
 
   Scope scope() {
     const auto sgn = [this](Expr x) {
@@ -65,6 +65,7 @@ class Names {
   }
   bool Find(const std::string& name, const std::vector<std::string>& indices, Expr& value) {
     if (const auto it = unknowns.find(name); it != unknowns.end() && indices.empty()) return value = it->second, true;
+    if (const auto it = states.find(name); it != states.end() && indices.empty()) return value = it->second, true;
     if (name == "i" && indices.empty() && !index.empty()) {
       double number = 0;
       const auto [end, error] = std::from_chars(index.data(), index.data() + index.size(), number);
@@ -78,17 +79,31 @@ class Names {
       if (equals != std::string::npos && defined == name && indices.empty())
         return value = ParseExpression(g_, line.substr(equals + 1), scope(), record_.path + ": let " + name), true;
     }
-    if (name == "t" && indices.empty()) return value = g_.Input("t"), true;
+    if ((name == "t" || name == "dt") && indices.empty()) return value = g_.Input(name), true;
     if (name == "Y" && indices.size() == 2) return Body(indices, value);
+    if ((name == "M" || name == "dtau_dg") && indices.size() == 2) return TwoIndices(name, indices, value);
     int joint = 0;
     if (!JointOf(indices, joint)) return false;
-    for (const char* quantity : {"q", "qd", "qdd", "temp"})
+    for (const char* quantity : {"q", "qd", "qdd", "temp", "flag"})
       if (name == quantity) return value = g_.Input(InputName(quantity, joint)), true;
     if (name == "tau_rigid") return value = quantities_.tau_rigid(joint), true;
     if (name == "tau_gravity") return value = quantities_.tau_gravity(joint), true;
+    if (record_.kind_class == "sensor") {
+      if (name == "tau_model") return value = quantities_.tau_model(joint), true;
+      if (name == "dtau_model") return value = quantities_.dtau_model(joint), true;
+    }
     double constant = 0;
     if (RobotConstant(robot_.joint[joint], name, constant)) return value = g_.Constant(constant), true;
     return false;
+  }
+  // M[row, joint] and dtau_dg[row, x | y | z]
+  bool TwoIndices(const std::string& name, const std::vector<std::string>& indices, Expr& value) {
+    int of_row = 0, joint = 0;
+    if (!JointOf({indices[0]}, of_row)) return false;
+    if (name == "M") return JointOf({indices[1]}, joint) && (value = quantities_.mass(of_row, joint), true);
+    const auto axis = std::string("xyz").find(indices[1]);
+    if (indices[1].size() != 1 || axis == std::string::npos) return false;
+    return value = quantities_.tilt(of_row, static_cast<int>(axis)), true;
   }
   // Y[flange, mx] or Y[flange, i] with a parameter name as the array index
   bool Body(const std::vector<std::string>& indices, Expr& value) {
@@ -96,7 +111,7 @@ class Names {
     const std::string& name = indices[1] == "i" ? index : indices[1];
     if (body < 0 || body >= robot_.joints()) return false;
     for (int p = 0; p < 10; ++p)
-      if (name == kBodyNames[p]) return value = quantities_.body(row, body, p), true;
+      if (name == kBodyParameterName[p]) return value = quantities_.body(row, body, p), true;
     return false;
   }
 
@@ -128,6 +143,28 @@ std::string Suffix(const std::vector<int>& joints) {
   return s;
 }
 
+// The record's own states, in the order written: a step sees those above it as new values, itself as the old one.
+void MakeStates(Graph& g, const EffectRecord& record, const std::string& prefix, const std::string& suffix,
+                Names& names, EffectInstance& out) {
+  for (const RecordState& s : record.state) {
+    const std::string where = record.path + ": state " + s.name;
+    const Expr initial = ParseExpression(g, s.initial, names.scope(), where + ", initial");
+    for (const auto& [name, input] : names.unknowns)
+      if (Reads(initial, input))
+        throw io::InputError(where + ", initial: expected no nonlinear parameter, not " + name);
+    const std::string full = prefix + s.name + suffix;
+    const auto step = [&](Expr value) {
+      names.states[s.name] = value;
+      return ParseExpression(g, s.step, names.scope(), where + ", step");
+    };
+    names.states[s.name] = step(g.State(full, initial, step));
+    if (s.settled.empty()) continue;
+    const Expr now = ParseExpression(g, s.settled, names.scope(), where + ", settled");
+    const auto latch = [&](Expr value) { return g.Binary(Op::kMax, value, 0.5 * (g.Unary(Op::kSign, now) + 1.0)); };
+    out.settled.push_back(latch(g.State(full + " settled", g.Constant(0), latch)));
+  }
+}
+
 }  // namespace
 
 ModelQuantities QuantitiesAsInputs(Graph& graph) {
@@ -135,7 +172,11 @@ ModelQuantities QuantitiesAsInputs(Graph& graph) {
           [&graph](int j) { return graph.Input(InputName("tau_gravity", j)); },
           [&graph](int row, int body, int p) {
             return graph.Input("Y" + std::to_string(row) + "_" + std::to_string(body) + "_" + std::to_string(p));
-          }};
+          },
+          [&graph](int row, int j) { return graph.Input("M" + std::to_string(row) + "_" + std::to_string(j)); },
+          [&graph](int row, int axis) { return graph.Input("G" + std::to_string(row) + "_" + std::to_string(axis)); },
+          [&graph](int j) { return graph.Input(InputName("tau_model", j)); },
+          [&graph](int j) { return graph.Input(InputName("dtau_model", j)); }};
 }
 
 std::vector<std::vector<int>> JointSets(const EffectRecord& record, int n) {
@@ -162,6 +203,8 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
   const std::string number = ordinal > 1 ? "_" + std::to_string(ordinal) : "";
   const std::string prefix = record.friction_law ? "" : record.name + number + ".", suffix = Suffix(joints);
   Names names(g, record, robot, joints, quantities);
+  names.row = joints.empty() ? 0 : joints[0];
+  const std::size_t states_before = g.states().size();
   for (const NonlinearParameter& p : record.nonlinear) {
     const std::string where = record.path + ": nonlinear " + p.name;
     EffectUnknown u{prefix + p.name + suffix,
@@ -176,6 +219,7 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
     names.unknowns[p.name] = g.Input(u.name);
     out.unknowns.push_back(u);
   }
+  MakeStates(g, record, prefix, suffix, names, out);
   for (const LinearParameter& p : record.linear) {
     const std::vector<std::string> one{""};
     for (const std::string& index : p.index.empty() ? one : p.index) {
@@ -207,6 +251,8 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
       out.columns.push_back(std::move(c));
     }
   }
+  if (record.kind_class == "static" && g.states().size() > states_before)
+    throw io::InputError(record.path + ": class: expected \"stateful\", since an expression has memory");
   return out;
 }
 

@@ -34,16 +34,21 @@ struct EffectInstance {
   std::vector<int> joints;
   std::vector<EffectColumn> columns;
   std::vector<EffectUnknown> unknowns;
+  std::vector<Expr> settled;  // each 1 once its state no longer remembers how it started, 0 before; empty: always
 };
 
-// Quantities that are not plain inputs: model torque and body columns. Either graph inputs (host, whole logs) or
+// Quantities that are not plain inputs, all of the committed model. Either graph inputs (host, whole logs) or
 // expressions.
 struct ModelQuantities {
   std::function<Expr(int joint)> tau_rigid, tau_gravity;
   std::function<Expr(int row, int body, int parameter)> body;
+  std::function<Expr(int row, int joint)> mass;  // entry of M of (1)
+  std::function<Expr(int row, int axis)> tilt;   // torque per m/s^2 of gravity along the base frame's x, y, z
+  std::function<Expr(int joint)> tau_model, dtau_model;
 };
 
-// Plain graph inputs named tau_rigid1.., tau_gravity1.., Y<row>_<body>_<parameter>.
+// Plain graph inputs named tau_rigid1.., tau_gravity1.., tau_model1.., dtau_model1.., Y<row>_<body>_<parameter>,
+// M<row>_<joint>, G<row>_<axis>; row, body, joint, axis and parameter counted from 0.
 ModelQuantities QuantitiesAsInputs(Graph& graph);
 
 // Throws io::InputError naming the record where an expression does not parse or does not fit the scope. ordinal: 1 for

@@ -62,15 +62,28 @@ class Model {
   const std::vector<TableParameter>& table() const { return table_; }
   std::string column_name(int column) const;
   std::string column_unit(int column) const;
-  const Eigen::MatrixXd& base_map() const { return base_.map; }  // rigid x 11n
+  const std::vector<int>& base_columns() const { return base_.column; }  // body parameters, indices into 11n
+  const Eigen::MatrixXd& base_map() const { return base_.map; }          // rigid x 11n
   const std::vector<EffectInstance>& effects() const { return effect_; }
   const std::vector<EffectUnknown>& unknowns() const { return unknown_; }
   bool depends_on_estimate() const { return depends_on_estimate_; }
+  int states() const { return states_; }  // what the model carries from sample to sample
+  int sensitivities() const { return static_cast<int>(graph_->states().size()) - states_; }  // d state / d eta
+  int ready_state(int joint) const { return ready_state_[joint]; }  // 1 in it: the row may be used; -1: always
 
   // row[i]: N x columns(), torque of joint i per unit of each filter coordinate.
   // committed: columns() values (used by columns that depend on the estimate), eta: nonlinear() values.
   void Regressor(const Signals& s, std::span<const double> committed, std::span<const double> eta,
                  std::vector<Eigen::MatrixXd>& row) const;
+
+  // The same block by block, for sums over a log that no memory should hold: see Tape::ForEachBlock. States run through
+  // from the first sample; root[joint * columns() + column].
+  void ForEachBlock(const Signals& s, std::span<const double> committed, std::span<const double> eta,
+                    const Tape::Visit& visit) const;
+
+  // d tau / d eta at filter coordinates p: row[i] is N x nonlinear().
+  void Jacobian(const Signals& s, std::span<const double> committed, std::span<const double> p,
+                std::span<const double> eta, std::vector<Eigen::MatrixXd>& row) const;
 
   // Columns of one body about its file frame: out[i] is N x 10, row i.
   void BodyColumns(const Signals& s, int body, std::vector<Eigen::MatrixXd>& out) const;
@@ -79,15 +92,26 @@ class Model {
 
   const Graph& graph() const { return *graph_; }
   const std::vector<std::vector<Expr>>& rows() const { return rows_; }  // [joint][column]
+  const std::vector<std::vector<Expr>>& jacobian() const {
+    return jacobian_;
+  }  // [joint][eta]; input p<k>: coordinate k
 
  private:
+  BodyRows TiltedRows(int axis);
+  BodyRows TiltRows(const Catalogue& catalogue);
+  Expr CommittedTorque(const BodyRows& rows, int joint);
+  BodyRows AccelerationRows(int joint);
+  ModelQuantities Quantities();
+  void MakeReady();
+  void MakeJacobian();
   void AddEffects(const Catalogue& catalogue, const ModelQuantities& quantities);
   void PlaceColumns();
   void MakeTable();
   const EffectColumn& effect_column(int k) const {
     return effect_[effect_column_[k].effect].columns[effect_column_[k].column];
   }
-  std::vector<Binding> Bind(const Signals& s, std::span<const double> committed, std::span<const double> eta) const;
+  struct Bound;  // inputs bound to a log's columns
+  Bound Bind(const Signals& s, std::span<const double> committed, std::span<const double> eta, int states) const;
 
   Robot robot_;
   std::unique_ptr<Graph> graph_ = std::make_unique<Graph>();
@@ -103,7 +127,9 @@ class Model {
     int effect, column;
   };
   std::vector<ColumnOf> effect_column_;  // filter columns that are no rigid ones: [front, dense effects]
-  std::vector<std::vector<Expr>> rows_, body_rows_, gravity_rows_;
+  std::vector<std::vector<Expr>> rows_, jacobian_, body_rows_, gravity_rows_;
+  int states_ = 0;
+  std::vector<int> ready_state_;
   std::unique_ptr<Tape> regressor_tape_;
   bool depends_on_estimate_ = false;
 };

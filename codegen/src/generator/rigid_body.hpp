@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,18 +12,44 @@
 
 namespace armcal::codegen {
 
-inline constexpr int kBodyBlock =
-    11;  // m, m c (3), I about the frame origin (xx xy xz yy yz zz), rotor inertia (joint side)
+// m, m c (3), I about the frame origin (xx xy xz yy yz zz), rotor inertia (joint side)
+inline constexpr int kBodyBlock = 11;
+using BodyRows = std::vector<std::vector<Expr>>;  // [joint][kBodyBlock body + parameter]
 
 // Names "q1", "qd1", "qdd1" ... of the graph inputs of joint i (0-based).
 std::string InputName(const char* quantity, int joint);
 
-// Torque of joint i per unit of parameter p of link j: row[i][kBodyBlock j + p]; zero expressions where it has none.
-// Link frames are slid along their joint axis where that saves work (the last revolute one goes to d = 0); the returned
-// parameters are about the slid origins. With motion = false speeds and accelerations are zero (gravity only).
-std::vector<std::vector<Expr>> BodyRegressor(Graph& graph, const Robot& robot, bool motion = true);
+// Where each dot product is taken. It changes the number of operations and no value, but for the slides: those move the
+// origins that the body parameters refer to.
+struct FrameChoice {
+  // The four dot products in which a link's columns meet a joint's screw. kSpin: Izz; kInertia: the other moments and
+  // products; kForce: mass and first moments, force part; kMoment: first moments, moment part.
+  enum Part { kSpin, kInertia, kForce, kMoment, kParts };
 
-// slid parameters = S parameters about the file's link frames; 11n x 11n.
-Eigen::MatrixXd SlideMap(const Robot& robot);
+  std::vector<double> slide_m;                // link frame j is moved by this along its own z
+  std::vector<char> lumped;                   // link j's rates in one step from before its run of parallel axes
+  std::vector<std::array<int, kParts>> axes;  // [joint * n + body]: half frame (see arm_vectors.hpp)
+};
+
+// Dot products in the axes of the body itself, no lumping; slides zero.
+FrameChoice LocalFrames(const Robot& robot);
+
+// A deterministic search for the fewest multiplications and additions in the base columns (about 0.2 s for six axes);
+// remembered for the life of the program. Any thread.
+FrameChoice BestFrames(const Robot& robot);
+
+// The slides of BestFrames. Kinematics alone decide them: one arm, any gravity, parameters about the same origins.
+std::vector<double> BestSlides(const Robot& robot);
+
+// Torque of joint i per unit of parameter p of link j: row[i][kBodyBlock j + p]; zero expressions where it has none.
+// Parameters are about the slid origins. With motion = false speeds and accelerations are zero (gravity only).
+BodyRows BodyRegressor(Graph& graph, const Robot& robot, bool motion, const FrameChoice& choice);
+
+// With BestFrames; without motion there is little to save: local axes, the same slides.
+BodyRows BodyRegressor(Graph& graph, const Robot& robot, bool motion = true);
+
+// parameters about the slid origins = S parameters about the file's link frames; 11n x 11n.
+Eigen::MatrixXd SlideMap(const Robot& robot, const std::vector<double>& slide_m);
+Eigen::MatrixXd SlideMap(const Robot& robot);  // of BestSlides
 
 }  // namespace armcal::codegen

@@ -1,6 +1,7 @@
 // generator - evaluates a graph: at one point in any scalar, or over a whole log in blocks; knows no robot.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -22,24 +23,38 @@ class Tape {
   // bindings: one per graph input (Graph::inputs()); out: one pointer per root, each to `samples` values.
   void Evaluate(std::span<const Binding> bindings, int samples, std::span<double* const> out) const;
 
-  // One point. inputs: one value per graph input.
+  // The same without storing a log's worth: visit(begin, count, root) for each block of count <= kBlock samples from
+  // `begin`; root: one pointer per root to the block's values, valid during the call.
+  static constexpr int kBlock = 64;
+  using Visit = std::function<void(int begin, int count, std::span<const double* const> root)>;
+  void ForEachBlock(std::span<const Binding> bindings, int samples, const Visit& visit) const;
+
+  // One point. inputs: one value per graph input; out: one per root. scratch is kept between calls.
   template <class T>
-  std::vector<T> EvaluateAt(std::span<const T> inputs) const {
-    std::vector<T> value(step_.size());
+  void EvaluateAt(std::span<const T> inputs, std::vector<T>& scratch, std::span<T> out) const {
+    scratch.resize(step_.size());
     for (std::size_t k = 0; k < step_.size(); ++k) {
       const Node& s = step_[k];
-      if (s.op == Op::kConstant) value[k] = static_cast<T>(s.value);
-      else if (s.op == Op::kInput) value[k] = inputs[s.a];
-      else value[k] = ApplyOp<T>(s.op, value[s.a], s.b < 0 ? T(0) : value[s.b]);
+      if (s.op == Op::kConstant) scratch[k] = static_cast<T>(s.value);
+      else if (s.op == Op::kInput) scratch[k] = inputs[s.a];
+      else scratch[k] = ApplyOp<T>(s.op, scratch[s.a], s.b < 0 ? T(0) : scratch[s.b]);
     }
-    std::vector<T> out;
-    for (const int r : root_) out.push_back(value[r]);
+    for (std::size_t r = 0; r < root_.size(); ++r) out[r] = scratch[root_[r]];
+  }
+  template <class T>
+  std::vector<T> EvaluateAt(std::span<const T> inputs) const {
+    std::vector<T> scratch, out(root_.size());
+    EvaluateAt<T>(inputs, scratch, out);
     return out;
   }
 
  private:
+  void AssignLanes();
+
   std::vector<Node> step_;  // operands renumbered to steps
   std::vector<int> root_;
+  std::vector<int> lane_;  // where each step's block lies: lanes of values that nobody needs any more are used again,
+  int lanes_ = 0;          // so that a six-axis model's block stays in the nearest caches
 };
 
 }  // namespace armcal::codegen

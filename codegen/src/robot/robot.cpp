@@ -1,123 +1,66 @@
 // robot - reads a robot file; checks every number; knows no dynamics.
 #include "codegen/src/robot/robot.hpp"
 
-#include <numbers>
-
-#include "codegen/src/robot/toml_reader.hpp"
+#include "codegen/src/robot/frames.hpp"
+#include "codegen/src/robot/joint_reader.hpp"
+#include "codegen/src/robot/urdf.hpp"
 
 namespace armcal::codegen {
 namespace {
 
-double Radians(double deg) { return deg * std::numbers::pi / 180.0; }
-
-std::array<double, 3> Three(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
-
-// Fixed-axis roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll), row-major. Multiples of 90 deg are exact.
-std::array<double, 9> RotationFromRpy(const std::vector<double>& rpy_deg) {
-  const auto snap = [](double v) {
-    return std::abs(v) < 1e-15 ? 0.0 : (std::abs(std::abs(v) - 1) < 1e-15 ? std::copysign(1.0, v) : v);
-  };
-  double s[3], c[3];
-  for (int i = 0; i < 3; ++i) s[i] = snap(std::sin(Radians(rpy_deg[i]))), c[i] = snap(std::cos(Radians(rpy_deg[i])));
-  return {c[2] * c[1],
-          c[2] * s[1] * s[0] - s[2] * c[0],
-          c[2] * s[1] * c[0] + s[2] * s[0],
-          s[2] * c[1],
-          s[2] * s[1] * s[0] + c[2] * c[0],
-          s[2] * s[1] * c[0] - c[2] * s[0],
-          -s[1],
-          c[1] * s[0],
-          c[1] * c[0]};
+// {xyz_m, rpy_deg}, each may be absent.
+Eigen::Isometry3d ReadFrame(const TomlReader& in) {
+  in.AllowOnly({"xyz_m", "rpy_deg"});
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  if (in.Has("xyz_m")) T.translation() = Eigen::Vector3d(in.Numbers("xyz_m", 3).data());
+  if (in.Has("rpy_deg")) T.linear() = RollPitchYaw(Eigen::Vector3d(in.Numbers("rpy_deg", 3).data()) * kRadPerDeg);
+  return T;
 }
 
-Motor ReadMotor(const TomlReader& in, bool prismatic) {
-  Motor m;
-  const TomlReader encoder = in.Table("encoder"), motor = in.Table("motor");
-  encoder.AllowOnly({"counts_per_turn", "zero_counts"});
-  motor.AllowOnly(
-      {"gear_ratio", "current_A_per_lsb", "torque_constant_NmpA", "torque_constant_tolerance", "rotor_inertia_kgm2"});
-  m.counts_per_turn = encoder.Positive("counts_per_turn");
-  m.zero_counts = static_cast<int>(encoder.Number("zero_counts", 0));
-  m.gear_ratio = motor.Number("gear_ratio");
-  if (m.gear_ratio == 0)
-    motor.Fail("gear_ratio", prismatic ? "motor radians per metre, not zero" : "a ratio, not zero");
-  m.current_A_per_lsb = motor.Positive("current_A_per_lsb");
-  m.torque_constant_NmpA = motor.Positive("torque_constant_NmpA");
-  m.torque_constant_tolerance = motor.Number("torque_constant_tolerance", 0);
-  m.rotor_inertia_kgm2 = motor.Number("rotor_inertia_kgm2", 0);
-  if (m.rotor_inertia_kgm2 < 0) motor.Fail("rotor_inertia_kgm2", "a number not below zero");
-  return m;
+// Kinematics, bodies and limits from the URDF; one [[joint]] table per movable joint, found by its name, says the rest.
+void ReadUrdfRobot(const TomlReader& in, Robot& r, Eigen::Isometry3d& base, Eigen::Isometry3d& flange) {
+  if (in.Has("dh")) in.Fail("dh", "either dh or urdf");
+  UrdfChain chain = ReadUrdf(std::filesystem::path(in.file()).parent_path() / in.Text("urdf"));
+  base = chain.base, flange = chain.flange;
+  r.joint = std::move(chain.joint);
+  std::vector<bool> told(r.joint.size(), false);
+  for (const TomlReader& table : in.Tables("joint")) {
+    AllowDriveKeys(table);
+    const std::string name = table.Text("name");
+    std::size_t j = 0;
+    while (j < r.joint.size() && (told[j] || r.joint[j].name != name)) ++j;
+    if (j == r.joint.size()) table.Fail("name", "the name of a movable joint of the URDF, once");
+    ReadDrive(table, r.joint[j], chain.limited[j]);
+    told[j] = true;
+    if (r.has_prior && !(r.joint[j].link.mass_kg > 0))
+      table.Fail("name", "a link with mass after this joint of the URDF, or prior = \"none\"");
+  }
+  for (std::size_t j = 0; j < told.size(); ++j)
+    if (!told[j]) in.Fail("joint", "a [[joint]] table with name = \"" + r.joint[j].name + "\"");
 }
 
-Joint ReadJoint(const TomlReader& in, bool has_prior) {
-  Joint j;
-  in.AllowOnly({"name",
-                "type",
-                "alpha_deg",
-                "a_m",
-                "d_m",
-                "offset_deg",
-                "offset_m",
-                "position_limit_deg",
-                "position_limit_m",
-                "speed_limit_degps",
-                "speed_limit_mps",
-                "acceleration_limit_radps2",
-                "acceleration_limit_mps2",
-                "torque_limit_Nm",
-                "torque_limit_N",
-                "torque_noise_Nm",
-                "torque_noise_N",
-                "v_min_radps",
-                "v_min_mps",
-                "coulomb_Nm",
-                "coulomb_N",
-                "viscous_Nmsprad",
-                "viscous_Nspm",
-                "encoder",
-                "motor",
-                "link"});
-  j.name = in.Text("name");
-  const std::string type = in.Text("type");
-  if (type != "revolute" && type != "prismatic") in.Fail("type", "\"revolute\" or \"prismatic\"");
-  const bool prismatic = type == "prismatic";
-  j.kinematics.type = prismatic ? JointType::kPrismatic : JointType::kRevolute;
-  j.kinematics.alpha_rad = Radians(in.Number("alpha_deg"));
-  j.kinematics.a_m = in.Number("a_m");
-  j.kinematics.d_m = in.Number("d_m") + (prismatic ? in.Number("offset_m", 0) : 0);
-  j.kinematics.theta_rad = Radians(in.Number("offset_deg", 0));
-  const auto limits = in.Numbers(prismatic ? "position_limit_m" : "position_limit_deg", 2);
-  if (!(limits[0] < limits[1]))
-    in.Fail(prismatic ? "position_limit_m" : "position_limit_deg", "[lower, upper] with lower < upper");
-  for (int k = 0; k < 2; ++k) j.position_limit_rad[k] = prismatic ? limits[k] : Radians(limits[k]);
-  j.speed_limit_radps = prismatic ? in.Positive("speed_limit_mps") : Radians(in.Positive("speed_limit_degps"));
-  j.acceleration_limit_radps2 = in.Positive(prismatic ? "acceleration_limit_mps2" : "acceleration_limit_radps2");
-  j.torque_limit_Nm = in.Positive(prismatic ? "torque_limit_N" : "torque_limit_Nm");
-  j.torque_noise_Nm = in.Positive(prismatic ? "torque_noise_N" : "torque_noise_Nm");
-  j.v_min_radps = in.Positive(prismatic ? "v_min_mps" : "v_min_radps");
-  j.nominal["Fc"] = in.Number(prismatic ? "coulomb_N" : "coulomb_Nm", 0);
-  j.nominal["Fv"] = in.Number(prismatic ? "viscous_Nspm" : "viscous_Nmsprad", 0);
-  j.has_motor = in.Has("motor");
-  if (j.has_motor) j.motor = ReadMotor(in, prismatic);
-  if (!has_prior) return j;
-  const TomlReader link = in.Table("link");
-  link.AllowOnly({"mass_kg", "center_m", "inertia_kgm2"});
-  j.link.mass_kg = link.Positive("mass_kg");
-  j.link.center_m = Three(link.Numbers("center_m", 3));
-  const auto inertia = link.Numbers("inertia_kgm2", 6);
-  for (int k = 0; k < 6; ++k) j.link.inertia_kgm2[k] = inertia[k];
-  return j;
+std::vector<int> ReadBodyParameters(const TomlReader& in, std::string_view key, int joints) {
+  std::vector<int> out;
+  for (const std::string& name : in.Texts(key)) {
+    int found = -1;
+    for (int c = 0; c < 11 * joints; ++c)
+      if (name == kBodyParameterName[c % 11] + std::to_string(c / 11 + 1)) found = c;
+    if (found < 0) in.Fail(key, "body parameters m1, mx1 ... Ia" + std::to_string(joints) + ", not \"" + name + "\"");
+    out.push_back(found);
+  }
+  return out;
 }
 
 // Standard DH link i: Rz(theta_i) Tz(d_i) Tx(a_i) Rx(alpha_i). The joint axis of joint i is z_{i-1}; shifting the
 // frames by one gives modified DH with (alpha_{i-1}, a_{i-1}) of the row before: link i's frame is then at the axis of
-// joint i. The last row's (a_n, alpha_n) lead from the last link's frame to the flange and belong to the tool frame.
-void ConvertStandardDh(std::vector<Joint>& joints) {
+// joint i. The last row's (a_n, alpha_n) lead from the last link's frame to the flange, which is what is returned.
+Eigen::Isometry3d ConvertStandardDh(std::vector<Joint>& joints) {
   double alpha = 0, a = 0;
   for (Joint& j : joints) {
     std::swap(alpha, j.kinematics.alpha_rad);
     std::swap(a, j.kinematics.a_m);
   }
+  return ModifiedDh({JointType::kRevolute, alpha, a, 0, 0});
 }
 
 EffectUse ReadEffectUse(const TomlReader& in, int joints) {
@@ -146,9 +89,10 @@ EffectUse ReadEffectUse(const TomlReader& in, int joints) {
 Robot ReadRobot(const std::filesystem::path& path) {
   const toml::table table = ParseToml(path);
   const TomlReader in(table, path.string());
-  in.AllowOnly({"name", "title", "source", "gravity_mps2", "dh", "sign_law", "sign_width_radps", "sign_width_mps",
-                "tick_rate_Hz", "sample_ticks", "prior", "control", "joint", "effect", "coupling", "base_frame",
-                "tool_frame", "identified"});
+  in.AllowOnly(
+      {"name",           "title",        "source",       "gravity_mps2", "dh",      "sign_law",  "sign_width_radps",
+       "sign_width_mps", "tick_rate_Hz", "sample_ticks", "prior",        "control", "joint",     "effect",
+       "coupling",       "base_frame",   "tool_frame",   "identified",   "urdf",    "parameters"});
   Robot r;
   r.path = path.string();
   r.name = in.Text("name");
@@ -156,9 +100,8 @@ Robot ReadRobot(const std::filesystem::path& path) {
     in.Fail("name", "lower-case letters, digits and _");
   r.title = in.Text("title", r.name);
   r.source = in.Text("source");
-  r.gravity_mps2 = Three(in.Numbers("gravity_mps2", 3));
-  const std::string dh = in.Text("dh");
-  if (dh != "modified" && dh != "standard") in.Fail("dh", "\"modified\" or \"standard\"");
+  const auto gravity = in.Numbers("gravity_mps2", 3);
+  std::copy(gravity.begin(), gravity.end(), r.gravity_mps2.begin());
   r.sign_law = in.Text("sign_law", "sgn");
   if (r.sign_law != "sgn" && r.sign_law != "tanh") in.Fail("sign_law", "\"sgn\" or \"tanh\"");
   if (r.sign_law == "tanh")
@@ -178,15 +121,28 @@ Robot ReadRobot(const std::filesystem::path& path) {
     r.inertia_floor_ratio = prior.Number("inertia_floor_ratio", r.inertia_floor_ratio);
     r.friction_relative_sd = prior.Number("friction_relative_sd", r.friction_relative_sd);
   }
-  for (const TomlReader& joint : in.Tables("joint")) r.joint.push_back(ReadJoint(joint, r.has_prior));
+  Eigen::Isometry3d base = Eigen::Isometry3d::Identity(), flange = base;
+  if (in.Has("urdf")) {
+    ReadUrdfRobot(in, r, base, flange);
+  } else {
+    const std::string dh = in.Text("dh");
+    if (dh != "modified" && dh != "standard") in.Fail("dh", "\"modified\" or \"standard\"");
+    for (const TomlReader& joint : in.Tables("joint")) r.joint.push_back(ReadJoint(joint, r.has_prior));
+    if (dh == "standard") flange = ConvertStandardDh(r.joint);
+  }
   const int n = r.joints();
   if (n < 1 || n > 7) in.Fail("joint", "1 to 7 [[joint]] tables");
-  if (dh == "standard") ConvertStandardDh(r.joint);
   if (in.Has("coupling")) r.coupling = in.Table("coupling").Numbers("matrix", n * n);
-  if (in.Has("base_frame")) {
-    const TomlReader base = in.Table("base_frame");
-    base.AllowOnly({"xyz_m", "rpy_deg"});
-    r.base_rotation = RotationFromRpy(base.Numbers("rpy_deg", 3));
+  if (in.Has("base_frame")) base = ReadFrame(in.Table("base_frame")) * base;
+  if (in.Has("tool_frame")) flange = flange * ReadFrame(in.Table("tool_frame"));
+  r.base_xyz_m = Components(base.translation()), r.base_rotation = RowMajor(base.linear());
+  r.tool_xyz_m = Components(flange.translation()), r.tool_rotation = RowMajor(flange.linear());
+  if (in.Has("parameters")) {
+    const TomlReader set = in.Table("parameters");
+    set.AllowOnly({"set", "prefer", "omit"});
+    const std::string kind = set.Text("set", "base");
+    if (kind != "base" && kind != "standard") set.Fail("set", "\"base\" or \"standard\"");
+    r.parameters = {kind == "standard", ReadBodyParameters(set, "prefer", n), ReadBodyParameters(set, "omit", n)};
   }
   for (const TomlReader& use : in.Tables("effect")) r.effect.push_back(ReadEffectUse(use, n));
   if (in.Has("control")) {

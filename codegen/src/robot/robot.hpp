@@ -47,6 +47,11 @@ struct Joint {
   bool has_motor = false;
 };
 
+// The kinds of body parameter, in the order of a link's block of 11: m, m c, I about the frame origin, rotor inertia on
+// the joint side. A parameter's name is its kind and its link's number: "mx2".
+inline constexpr std::array<const char*, 11> kBodyParameterName = {"m",   "mx",  "my",  "mz",  "Ixx", "Ixy",
+                                                                   "Ixz", "Iyy", "Iyz", "Izz", "Ia"};
+
 struct EffectUse {
   std::string effect;
   std::vector<int> joints;                  // 0-based; empty: the record's own scope decides (arm, body)
@@ -61,6 +66,12 @@ struct Control {
   std::vector<double> kp_Nmprad, kd_Nmsprad;
 };
 
+// Which body parameters become filter coordinates; numbers 11 link + kind.
+struct ParameterSet {
+  bool standard = false;          // all that the torque depends on, instead of an independent choice
+  std::vector<int> prefer, omit;  // tried first; left out (taken as zero)
+};
+
 struct Robot {
   std::string name, title, source, path;
   std::array<double, 3> gravity_mps2{};  // base frame
@@ -73,8 +84,14 @@ struct Robot {
   std::vector<Joint> joint;
   std::vector<double> coupling;  // row-major C of q_motor = C q; empty: unit
   std::vector<EffectUse> effect;
+  ParameterSet parameters;
   Control control;
-  std::array<double, 9> base_rotation{1, 0, 0, 0, 1, 0, 0, 0, 1};  // base frame -> frame 0, applied to gravity
+  // Frame 0 seen from the base frame, in which gravity is given; the translation is seen in no torque. Rows of R.
+  std::array<double, 3> base_xyz_m{};
+  std::array<double, 9> base_rotation{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  // The tool seen from the last link's frame.
+  std::array<double, 3> tool_xyz_m{};
+  std::array<double, 9> tool_rotation{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
   int joints() const { return static_cast<int>(joint.size()); }
 };

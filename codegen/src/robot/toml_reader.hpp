@@ -2,9 +2,11 @@
 #pragma once
 
 #include <toml++/toml.h>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -93,12 +95,14 @@ class TomlReader {
     return out;
   }
   // A misspelt key is an error, not a silence.
-  void AllowOnly(std::initializer_list<std::string_view> keys) const {
+  void AllowOnly(std::span<const std::string_view> keys, std::span<const std::string_view> more = {}) const {
     for (const auto& [k, v] : table_) {
-      bool known = false;
-      for (const auto& allowed : keys) known = known || k.str() == allowed;
-      if (!known) Fail(k.str(), "no such key here");
+      const auto known = [&](auto list) { return std::find(list.begin(), list.end(), k.str()) != list.end(); };
+      if (!known(keys) && !known(more)) Fail(k.str(), "no such key here");
     }
+  }
+  void AllowOnly(std::initializer_list<std::string_view> keys) const {
+    AllowOnly(std::span(keys.begin(), keys.size()));
   }
   const toml::table& table() const { return table_; }
   const std::string& file() const { return file_; }

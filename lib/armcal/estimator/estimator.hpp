@@ -81,6 +81,7 @@ class Estimator {
     estimates_ = Estimates<Model>{};
     estimates_.generation = image.committed.generation;
     for (monitor::JointMonitor& m : monitors_) m = monitor::JointMonitor{};
+    memory_.running = false;
     stage_ = Stage::kIdle;
     read_out_due_ = true;
     signal::Settings<n> settings = {};
@@ -125,7 +126,7 @@ class Estimator {
   }
 
   std::uint32_t refused_samples() const { return ring_.refused(); }
-  std::uint32_t pending() const { return ring_.size(); }  // samples waiting for Step; context: any
+  std::uint32_t pending() const { return ring_.size(); }         // samples waiting for Step; context: any
   std::uint32_t tick_gaps() const { return path_.gap_count(); }  // restarts of the signal path; context: tick
   const Filter& filter() const { return filter_; }
 
@@ -164,7 +165,14 @@ class Estimator {
       moving_ |= static_cast<std::uint32_t>((s.flags[i] & kUpdates) == kUpdates) << i;
     }
     state.t = static_cast<float>(s.tick - adopted_tick_) / static_cast<float>(Model::kTickRate_Hz);
-    Model::Regressor(state, image_->committed.p, image_->committed.eta, rows_.front, rows_.dense);
+    // Effects with memory run from sample to sample; after a gap they start anew and their rows wait until it is
+    // forgotten.
+    state.dt = static_cast<float>(Model::kSampleTicks) / static_cast<float>(Model::kTickRate_Hz);
+    memory_.running = memory_.running && s.tick - last_tick_ == static_cast<std::uint32_t>(Model::kSampleTicks);
+    last_tick_ = s.tick;
+    feedforward::EvaluateRows(image_->committed, state, memory_, rows_);
+    for (int i = 0; i < n; ++i)
+      if (Model::kReadyState[i] >= 0 && !(memory_.now[Model::kReadyState[i]] > 0.5f)) moving_ &= ~(1u << i);
     joint_ = 0;
     stage_ = Stage::kRow;
     return true;
@@ -224,11 +232,12 @@ class Estimator {
   Filter filter_;
   typename Filter::ReadOut read_out_;
   feedforward::Rows<Model> rows_ = {};
+  feedforward::Memory<Model> memory_ = {};
   monitor::JointMonitor monitors_[n];
   Estimates<Model> estimates_;
   Item item_ = {};
   float tau_model_Nm_[n] = {};
-  std::uint32_t adopted_tick_ = 0;
+  std::uint32_t adopted_tick_ = 0, last_tick_ = 0;
   std::uint32_t moving_ = 0;
   std::uint32_t publish_every_ = 125;
   Observer observer_ = nullptr;

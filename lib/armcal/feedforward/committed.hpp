@@ -23,12 +23,34 @@ struct Committed {
   float torque_scale[n] = {};
 };
 
-// The regressor at one state; room for it belongs to whoever asks.
+// The regressor at one sample; room for it belongs to whoever asks. Starts as zero: structural zeros are never written.
 template <class Model>
 struct Rows {
-  float front[Model::kFront > 0 ? Model::kFront : 1];
-  float dense[Model::kJoints * Model::kDense];
+  float front[Model::kFront > 0 ? Model::kFront : 1] = {};
+  float dense[Model::kJoints * Model::kDense] = {};
 };
+
+// What a model's effects carry from sample to sample, for one stream of samples.
+template <class Model>
+struct Memory {
+  float now[Model::kStates > 0 ? Model::kStates : 1] = {};
+  float next[Model::kStates > 0 ? Model::kStates : 1] = {};
+  bool running = false;  // false: the next sample starts anew
+};
+
+// Evaluates the rows at x and steps the memory. A step that is not finite (a sample was not) starts it anew.
+template <class Model>
+void EvaluateRows(const Committed<Model>& committed, const model::ModelInput<float, Model::kJoints>& x,
+                  Memory<Model>& memory, Rows<Model>& rows) {
+  if constexpr (Model::kStates > 0)
+    if (!memory.running) Model::InitialState(x, committed.p, committed.eta, memory.now);
+  Model::Regressor(x, committed.p, committed.eta, memory.now, memory.next, rows.front, rows.dense);
+  memory.running = true;
+  for (int k = 0; k < Model::kStates; ++k) {
+    memory.running = memory.running && math::IsFinite(memory.next[k]);
+    memory.now[k] = memory.next[k];
+  }
+}
 
 // Committed torque of one joint. A column whose parameter is zero adds nothing, even if its value is not finite
 // (an effect in standby may read a sensor that is not there). Context: any.
@@ -47,8 +69,8 @@ float RowTorque(const float* p, const Rows<Model>& rows, int joint) {
 // Torque of all joints at a state, unclamped. Shape: tau_Nm [kJoints]. Not finite where the model is not. Context: any.
 template <class Model>
 void ModelTorque(const Committed<Model>& committed, const model::ModelInput<float, Model::kJoints>& state,
-                 Rows<Model>& rows, float* tau_Nm) {
-  Model::Regressor(state, committed.p, committed.eta, rows.front, rows.dense);
+                 Memory<Model>& memory, Rows<Model>& rows, float* tau_Nm) {
+  EvaluateRows(committed, state, memory, rows);
   for (int i = 0; i < Model::kJoints; ++i) tau_Nm[i] = RowTorque(committed.p, rows, i);
 }
 

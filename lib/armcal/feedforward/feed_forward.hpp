@@ -35,13 +35,14 @@ class FeedForward {
       state.temp[i] = temperature_degC[i];
     }
     state.t = t_s;
+    state.dt = 1.0f / static_cast<float>(Model::kTickRate_Hz);
     blended_ticks_ += blended_ticks_ < active_.blend_ticks;
     const bool blending = blended_ticks_ < active_.blend_ticks;
     const float share =
         math::Select(blending, static_cast<float>(blended_ticks_) / Positive(active_.blend_ticks), 1.0f);
     float before[n], now[n];
-    ModelTorque(previous_, state, rows_, before);
-    ModelTorque(active_, state, rows_, now);
+    ModelTorque(previous_, state, previous_memory_, rows_, before);
+    ModelTorque(active_, state, active_memory_, rows_, now);
 
     core::Status status = active_.valid ? core::Status::kOk : core::Status::kEmpty;
     const std::uint32_t fading = math::MaskOf(blending && previous_.valid);
@@ -65,7 +66,9 @@ class FeedForward {
   void Adopt() {
     if (!offered_.Refresh()) return;
     previous_ = active_;
+    previous_memory_ = active_memory_;
     active_ = offered_.latest();
+    active_memory_.running = false;
     if (!active_.bumpless) active_.blend_ticks = 0;
     blended_ticks_ = 0;
   }
@@ -79,6 +82,7 @@ class FeedForward {
 
   core::Mailbox<Committed<Model>> offered_;
   Committed<Model> active_, previous_;
+  Memory<Model> active_memory_, previous_memory_;
   Rows<Model> rows_ = {};
   std::uint32_t blended_ticks_ = 0;
   std::uint32_t clamp_count_ = 0;

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
+#include <utility>
 
 #ifdef __FAST_MATH__
 #error "armcal needs exact IEEE arithmetic: argument reduction and the NaN checks fail under -ffast-math"
@@ -40,17 +42,30 @@ T Select(bool condition, const T& yes, const T& no) {
 }
 inline bool IsFinite(float x) { return (BitsOf(x) & 0x7F800000u) != 0x7F800000u; }
 
+namespace internal {
+template <class T>  // false: a pack (pack.hpp), whose comparisons give one answer a lane
+constexpr bool kIsOne = std::is_same_v<decltype(std::declval<T>() < std::declval<T>()), bool>;
+}  // namespace internal
+
 template <class T>
 T Min(const T& a, const T& b) {
-  return b < a ? b : a;
+  if constexpr (internal::kIsOne<T>) return b < a ? b : a;
+  else return Select(b < a, b, a);
 }
 template <class T>
 T Max(const T& a, const T& b) {
-  return a < b ? b : a;
+  if constexpr (internal::kIsOne<T>) return a < b ? b : a;
+  else return Select(a < b, b, a);
+}
+inline float Sign(float x) {  // -1, 0, 1; 0 for NaN
+  const std::uint32_t magnitude = BitsOf(x) & 0x7FFFFFFFu;
+  const std::uint32_t nonzero = (magnitude + 0x7FFFFFFFu) >> 31, is_nan = (0x7F800000u - magnitude) >> 31;
+  return FloatOf((0x3F800000u | (BitsOf(x) & 0x80000000u)) & (0u - (nonzero & ~is_nan)));
 }
 template <class T>
-T Sign(const T& x) {  // -1, 0, 1; 0 for NaN
-  return T(static_cast<float>((x > T(0)) - (x < T(0))));
+T Sign(const T& x) {
+  if constexpr (internal::kIsOne<T>) return T(static_cast<float>((x > T(0)) - (x < T(0))));
+  else return Select(x > T(0), T(1), Select(x < T(0), T(-1), T(0)));
 }
 inline float Abs(float x) { return FloatOf(BitsOf(x) & 0x7FFFFFFFu); }
 template <class T>
@@ -67,7 +82,7 @@ T Sqrt(const T& x) {
 // a / b, and 0 where |b| < 1e-30 (a NaN in b stays NaN).
 template <class T>
 T Divide(const T& a, const T& b) {
-  const bool tiny = Abs(b) < T(1e-30f);
+  const auto tiny = Abs(b) < T(1e-30f);
   return Select(tiny, T(0), a / Select(tiny, T(1), b));
 }
 

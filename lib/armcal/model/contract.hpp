@@ -1,6 +1,6 @@
 // model - what a generated model must supply; knows no filter, no register and no storage.
 //
-// A generated model is a struct of constants and one static function, `struct Er20Like { ... }`:
+// A generated model is a struct of constants and static functions, `struct Er20Like { ... }`:
 //
 //   kJoints      n, rows of the regressor (one torque per joint)
 //   kFront       columns that touch ONE row only (friction, joint effects); ordered by joint:
@@ -21,13 +21,23 @@
 //   kForgetting[kForgettingGroups]  default forgetting per estimator sample of each group (float)
 //   kMapBegin[kRigid+1], kMapColumn[], kMapValue[]  base = B body, compressed rows (float)
 //
-//   template <class T> static void Regressor(const ModelInput<T, n>& x, const T* committed, const T* eta,
-//                                            T* front, T* dense);
+//   kStates      values that effects with memory carry from sample to sample (0 for most models)
+//   kSensitivities  d state / d eta, carried by the extended Kalman filter only
+//   kReadyState[i]  state that is 1 once row i's states no longer remember how they started; -1: row i is always ready
+//
+// Functions; x: ModelInput<T, n>; committed[kColumns]: the committed parameters, read only by columns that depend on
+// the estimate; eta[kNonlinear]. Straight-line, no branch, no call; float in, float out. Context: any.
+//
+//   template <class T> static void InitialState(x, committed, eta, T* state);
+//     state[kStates] at the first sample of a stretch, x being that sample. Sensitivities start at zero.
+//   template <class T> static void Regressor(x, committed, eta, const T* state, T* next, T* front, T* dense);
+//     state[kStates]: what the sample before left in `next`. next[kStates] must be another array.
 //     front[kFront]: value of each front column in its own row.
-//     dense[kJoints * kDense]: row-major. Structural zeros are written too.
-//     committed[kColumns]: the committed parameters, read only by columns that depend on the estimate.
-//     tau_i = sum_{c in front(i)} front[c] p[c] + sum_d dense[i*kDense+d] p[kFront+d].
-//     Straight-line, no branch, no call; float in, float out.
+//     dense[kJoints * kDense]: row-major. Structural zeros are NOT written: arrays start as zero and stay with one
+//     model. tau_i = sum_{c in front(i)} front[c] p[c] + sum_d dense[i*kDense+d] p[kFront+d].
+//   template <class T> static void Jacobian(x, committed, eta, const T* p, const T* state, T* next, T* jacobian);
+//     jacobian[kJoints * kNonlinear] = d tau / d eta at filter coordinates p[kColumns]; structural zeros as above.
+//     state and next have kStates + kSensitivities entries; only the sensitivities of `next` are written.
 #pragma once
 
 #include <cstdint>

@@ -46,6 +46,7 @@ struct ModelInput {
   T qdd[n];
   T temp[n];  // deg C
   T t;        // s since the committed table was adopted
+  T dt;       // s since the sample before
 };
 
 }  // namespace armcal::model

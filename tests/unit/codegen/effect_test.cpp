@@ -1,85 +1,98 @@
-// tests - each effect record's columns against a formula written by hand, and what a bad record or robot gets.
+// tests - the catalogue as a whole, and what a bad record or robot gets.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <set>
 
 #include "codegen/src/generator/model.hpp"
 #include "host_sim/io/input_error.hpp"
+#include "tests/unit/codegen/effect_run.hpp"
 
 namespace armcal::tests {
 namespace {
 
-const codegen::Catalogue& Records() {
-  static const codegen::Catalogue c = codegen::ReadCatalogue("codegen/effects");
-  return c;
+// Every kind that a report may name, and the laws of the survey.
+const char* const kKinds[] = {
+    "coulomb_asymmetry", "torque_offset",        "viscous_asymmetry",    "stribeck",           "viscous_quadratic",
+    "viscous_cubic",     "viscous_cuberoot",     "load_friction",        "load_linear",        "temp_viscous",
+    "temp_coulomb",      "time_varying_viscous", "time_varying_coulomb", "torque_drift",       "torque_ripple",
+    "meshing_friction",  "cross_ripple",         "gravity_spring",       "cable_pack",         "position_torque",
+    "position_friction", "position_viscous",     "presliding_dahl",      "presliding_lugre",   "backlash",
+    "wrist_coupling",    "coupled_friction",     "velocity_product",     "payload_step",       "rotor_inertia",
+    "base_tilt",         "belt_elasticity",      "torque_saturation",    "torque_gain_error",  "time_delay",
+    "external_contact",  "coulomb_viscous",      "friction_exponential", "friction_sech_tanh", "stribeck_basis",
+    "friction_table"};
+
+TEST(Catalogue, HasARecordForEveryKind_AndNoOther) {
+  std::set<std::string> expected(std::begin(kKinds), std::end(kKinds)), found;
+  for (const auto& [name, record] : Records()) found.insert(name);
+  EXPECT_EQ(found, expected);
 }
 
-struct State {
-  double q, qd, temp, t, tau_rigid;
-};
-
-// First column of a joint record on joint 2 of er20_like.
-double Column(const std::string& record, int column, const State& s, const std::map<std::string, double>& eta) {
-  codegen::Graph g;
-  const codegen::Robot robot = codegen::ReadRobot("codegen/robots/er20_like.toml");
-  const auto instance = codegen::Instantiate(g, Records().at(record), robot, {1}, codegen::QuantitiesAsInputs(g));
-  const codegen::Tape tape(g, {instance.columns[column].rows.at(1)});
-  std::vector<double> inputs;
-  for (const std::string& name : g.inputs()) {
-    double value = name == "q2"           ? s.q
-                   : name == "qd2"        ? s.qd
-                   : name == "temp2"      ? s.temp
-                   : name == "t"          ? s.t
-                   : name == "tau_rigid2" ? s.tau_rigid
-                                          : NAN;
-    for (const auto& [key, v] : eta)
-      if (name == record + "." + key + "2") value = v;
-    inputs.push_back(value);
-  }
-  return tape.EvaluateAt<double>(inputs)[0];
+// "M3_1" -> "M[:,j]", "qdd2" -> "qdd": the word of the closed list that stands for a graph input.
+std::string InputWord(const std::string& graph_input) {
+  const std::string word = graph_input.substr(0, graph_input.find_first_of("0123456789"));
+  return word == "M" ? "M[:,j]" : word == "G" ? "dY/dgravity" : word;
 }
 
-TEST(Effects, Columns_EqualFormulasWrittenByHand) {
-  for (const double v : {-1.3, -0.02, 0.01, 0.4, 2.0})
-    for (const double q : {-1.1, 0.2, 0.9}) {
-      const State s{q, v, 41.0, 3.0, -350.0};
-      const double sign = v > 0 ? 1 : -1;
-      EXPECT_NEAR(Column("stribeck", 0, s, {{"vs", 0.1}, {"delta", 1.5}}),
-                  std::exp(-std::pow(std::abs(v) / 0.1, 1.5)) * sign, 1e-14);
-      EXPECT_NEAR(Column("viscous_cubic", 0, s, {}), v * v * v, 1e-13);
-      EXPECT_NEAR(Column("viscous_quadratic", 0, s, {}), v * std::abs(v), 1e-14);
-      EXPECT_NEAR(Column("viscous_cuberoot", 0, s, {}), std::cbrt(v), 1e-14);
-      EXPECT_NEAR(Column("load_friction", 0, s, {}), 350 * sign, 1e-12);
-      EXPECT_NEAR(Column("temp_viscous", 0, s, {{"Tc", 25.0}}), v * std::exp(-11.0 / 25.0), 1e-14);
-      EXPECT_NEAR(Column("temp_coulomb", 0, s, {}), 1.1 * sign, 1e-14);
-      EXPECT_NEAR(Column("torque_ripple", 1, s, {{"k", 40.0}}), std::sin(40 * q), 1e-13);
-      EXPECT_NEAR(Column("meshing_friction", 0, s, {{"k", 40.0}}), std::cos(40 * q) * sign, 1e-13);
-      EXPECT_NEAR(Column("cable_pack", 1, s, {{"q0", 0.3}}), std::pow(q - 0.3, 3), 1e-14);
-      EXPECT_EQ(Column("torque_offset", 0, s, {}), 1.0);
-      EXPECT_EQ(Column("coulomb_asymmetry", 0, s, {}), 1.0);
+// What a record declares is what its expressions do: inputs, estimate, memory.
+TEST(Catalogue, EveryRecord_ReadsWhatItDeclares) {
+  const std::set<std::string> of_the_estimate = {"tau_rigid",  "tau_gravity", "tau_model",
+                                                 "dtau_model", "M[:,j]",      "dY/dgravity"};
+  for (const auto& [name, record] : Records()) {
+    EffectRun run(name, JointsFor(record));
+    std::set<std::string> read, parameters;
+    for (const auto& u : run.instance().unknowns) parameters.insert(u.name);
+    for (const auto& s : run.graph().states()) parameters.insert(s.name);
+    bool estimate = false;
+    for (const std::string& input : run.graph().inputs())
+      if (!parameters.contains(input))
+        read.insert(InputWord(input)), estimate |= of_the_estimate.contains(InputWord(input));
+    for (const std::string& input : read)
+      EXPECT_NE(std::count(record.inputs.begin(), record.inputs.end(), input), 0) << name << " reads " << input;
+    EXPECT_EQ(record.depends_on_estimate, estimate) << name;
+    if (record.kind_class != "sensor") {
+      EXPECT_EQ(record.kind_class == "stateful", !run.graph().states().empty()) << name;
     }
+  }
 }
 
-// The payload's columns are the last link's own: ten unit bodies, only while the window is open.
-TEST(Effects, PayloadStep_IsTheFlangeBodyInsideItsWindow) {
-  codegen::Graph g;
-  const codegen::Robot robot = codegen::ReadRobot("codegen/robots/er20_like.toml");
-  const auto instance =
-      codegen::Instantiate(g, Records().at("payload_step"), robot, {}, codegen::QuantitiesAsInputs(g));
-  ASSERT_EQ(instance.columns.size(), 10u);
-  const codegen::Tape tape(g, {instance.columns[2].rows.at(4)});  // my in row 5
-  for (const double t : {1.0, 5.0, 9.0}) {
-    std::vector<double> inputs;
-    for (const std::string& name : g.inputs())
-      inputs.push_back(name == "t"                    ? t
-                       : name == "payload_step.t_on"  ? 3.0
-                       : name == "payload_step.t_off" ? 7.0
-                       : name == "Y4_5_2"             ? 0.37
-                                                      : 99.0);
-    EXPECT_EQ(tape.EvaluateAt<double>(inputs)[0], t == 5.0 ? 0.37 : 0.0);
+TEST(Catalogue, EveryRecord_NamesRealThings) {
+  const std::set<std::string> needs = {"moving", "low_speed", "high_speed", "temp_span", "load_span"};
+  for (const auto& [name, record] : Records()) {
+    for (const std::string& other : record.confusable_with)
+      EXPECT_TRUE(Records().contains(other)) << name << ": " << other;
+    for (const std::string& need : record.needs) EXPECT_TRUE(needs.contains(need)) << name << ": " << need;
+    if (!record.replaces.empty()) {
+      EXPECT_TRUE(Records().at(record.replaces).friction_law) << name;
+    }
+    EXPECT_FALSE(record.title.empty() || record.source.empty() || record.signals.empty()) << name;
+    if (record.kind_class != "sensor") continue;
+    bool known = false;
+    for (const auto& p : record.linear) known |= p.name == record.apply.by;
+    for (const auto& p : record.nonlinear) known |= p.name == record.apply.by;
+    EXPECT_TRUE(known) << name << ": " << record.apply.by;
+  }
+}
+
+// Bounds, defaults and prior widths on every joint of every arm that is checked in, prismatic and wide ones too.
+TEST(Catalogue, EveryRecord_FitsEveryArm) {
+  for (const char* arm : {"er20_like", "kuka_kr300", "emps", "two_link"}) {
+    const codegen::Robot robot = codegen::ReadRobot(std::string("codegen/robots/") + arm + ".toml");
+    for (const auto& [name, record] : Records())
+      for (const auto& joints : codegen::JointSets(record, robot.joints())) {
+        codegen::Graph g;
+        const auto e = codegen::Instantiate(g, record, robot, joints, codegen::QuantitiesAsInputs(g));
+        for (const auto& c : e.columns) EXPECT_GT(c.sd, 0) << arm << " " << c.name;
+        for (const auto& u : e.unknowns) {
+          EXPECT_LT(u.lower, u.upper) << arm << " " << u.name;
+          EXPECT_TRUE(!u.logarithmic || u.lower > 0) << arm << " " << u.name;
+        }
+      }
   }
 }
 
@@ -115,6 +128,40 @@ TEST_F(BadFile, Record_IsRefusedWithFileAndKey) {
   codegen::Graph g;
   const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
   ExpectError([&] { codegen::Instantiate(g, record, robot, {0}, codegen::QuantitiesAsInputs(g)); }, "column 4");
+}
+
+// Each wrong in one way; the message names what was expected instead.
+TEST_F(BadFile, RecordWithMemoryOrSensor_IsRefusedWithItsKey) {
+  const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
+  const auto record = [](const std::string& kind, const std::string& rest, const std::string& column) {
+    return "name = \"x\"\ntitle = \"x\"\nclass = \"" + kind + "\"\nscope = \"joint\"\n" + rest +
+           "\n[[linear]]\nname = \"a\"\nunit = \"N*m\"\nrows = { j = \"" + column + "\" }\n";
+  };
+  const auto state = [](const std::string& initial, const std::string& step, const std::string& settled) {
+    return "[[nonlinear]]\nname = \"T\"\nunit = \"s\"\nlower = 1\nupper = 3\ninitial = 2\n[[state]]\nname = \"z\"\n" +
+           ("unit = \"1\"\ninitial = \"" + initial) + "\"\nstep = \"" + step + "\"\nsettled = \"" + settled + "\"\n";
+  };
+  const auto use = [&](const std::string& text) {
+    return [&, text] {
+      const auto r = codegen::ReadEffect(Write("x.toml", text));
+      codegen::Graph g;
+      codegen::Instantiate(g, r, robot, {0}, codegen::QuantitiesAsInputs(g));
+    };
+  };
+  EXPECT_NO_THROW(use(record("stateful", state("q", "z + qd*dt/T", "t - 3"), "z"))());
+  ExpectError(use(record("static", state("q", "z + qd", "t"), "z")), "class");
+  ExpectError(use(record("static", "", "previous(q)")), "stateful");
+  ExpectError(use(record("stateful", state("T", "z + qd", "t"), "z")), "initial");
+  ExpectError(use(record("stateful", state("0", "z + speed", "t"), "z")), "state z, step");
+  ExpectError(use(record("stateful", state("0", "z +", "t"), "z")), "column 4");
+  ExpectError(use(record("stateful", state("0", "z", "t +"), "z")), "settled");
+  ExpectError(use(record("stateful", "[[state]]\nname = \"z\"\nunit = \"1\"\n", "z")), "step");
+  ExpectError(use(record("static", "", "tau_model")), "tau_model");
+  ExpectError(use(record("sensor", "", "tau_model")), "apply");
+  ExpectError(use(record("static", "apply = { how = \"gain\", by = \"a\" }\n", "1")), "apply");
+  ExpectError(use(record("sensor", "apply = { how = \"guess\", by = \"a\" }\n", "1")), "gain, delay, censor");
+  ExpectError(use(record("static", "search = { how = \"luck\" }\n", "1")), "search");
+  ExpectError(use(record("dynamic", "", "1")), "class");
 }
 
 TEST_F(BadFile, Robot_IsRefusedWithFileAndKey) {

@@ -62,8 +62,9 @@ TEST(Accuracy, Forgetting_IsTheGatedQrRecursionWithinATenthOfSigma) {
 // One column of joint 2 with the wrong sign: a generator's classic fault.
 struct WrongSign : TwoLink {
   template <class T>
-  static void Regressor(const model::ModelInput<T, 2>& x, const T* committed, const T* eta, T* front, T* dense) {
-    TwoLink::Regressor(x, committed, eta, front, dense);
+  static void Regressor(const model::ModelInput<T, 2>& x, const T* committed, const T* eta, const T* state, T* next,
+                        T* front, T* dense) {
+    TwoLink::Regressor(x, committed, eta, state, next, front, dense);
     dense[kDense + 4] = -dense[kDense + 4];
   }
 };

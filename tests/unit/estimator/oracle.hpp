@@ -24,7 +24,7 @@ Matrix Regressor(const model::Sample<Model::kJoints>& s) {
   }
   std::vector<double> eta(Model::kNonlinear + 1), front(Model::kFront + 1), dense(n * Model::kDense);
   for (int e = 0; e < Model::kNonlinear; ++e) eta[e] = Model::kInfo[Model::kParameters - Model::kNonlinear + e].mean;
-  Model::template Regressor<double>(x, nullptr, eta.data(), front.data(), dense.data());
+  Model::template Regressor<double>(x, nullptr, eta.data(), nullptr, nullptr, front.data(), dense.data());
   Matrix y = Matrix::Zero(n, Model::kColumns);
   for (int j = 0; j < n; ++j) {
     for (int k = Model::kFrontBegin[j]; k < Model::kFrontBegin[j + 1]; ++k) y(j, k) = front[k];

@@ -68,8 +68,15 @@ struct TwoLink {
   static constexpr int kMapColumn[10] = {9, 10, 11, 1, 11, 2, 12, 13, 20, 21};
   static constexpr float kMapValue[10] = {1, 1, kA1* kA1, 1, kA1, 1, 1, 1, 1, 1};
 
+  static constexpr int kStates = 0;
+  static constexpr int kSensitivities = 0;
+  static constexpr int kReadyState[kJoints] = {-1, -1};
+
   template <class T>
-  static void Regressor(const model::ModelInput<T, 2>& x, const T*, const T* eta, T* front, T* dense) {
+  static void InitialState(const model::ModelInput<T, 2>&, const T*, const T*, T*) {}
+
+  template <class T>
+  static void Regressor(const model::ModelInput<T, 2>& x, const T*, const T* eta, const T*, T*, T* front, T* dense) {
     const T a1 = T(kA1), g = T(kGravity);
     const T angle[3] = {x.q[0], x.q[1], x.q[0] + x.q[1]};
     T s[3], c[3];

@@ -41,7 +41,7 @@ TEST(TwoLink, RigidColumns_AreLagrangesEquation) {
     }
     const double eta[1] = {0.1};
     double front[TwoLink::kFront], dense[2 * TwoLink::kDense];
-    TwoLink::Regressor<double>(x, nullptr, eta, front, dense);
+    TwoLink::Regressor<double>(x, nullptr, eta, nullptr, nullptr, front, dense);
 
     const long double h = 1e-5L;
     const auto at = [&](long double t, int dq, int dv, long double step_q, long double step_v) {

@@ -37,10 +37,10 @@ struct FeedForwardTest : testing::Test {
   float q[2] = {0.4f, -0.9f}, qd[2] = {0.7f, -1.1f}, qdd[2] = {2.0f, 3.0f}, temp[2] = {30, 30}, tau[2] = {-1, -1};
   Status Evaluate() { return ff->Evaluate(q, qd, qdd, temp, 0.0f, tau); }
   double Exact(const Set& c, int joint) const {
-    model::ModelInput<double, 2> x{{q[0], q[1]}, {qd[0], qd[1]}, {qdd[0], qdd[1]}, {30, 30}, 0};
+    model::ModelInput<double, 2> x{{q[0], q[1]}, {qd[0], qd[1]}, {qdd[0], qdd[1]}, {30, 30}, 0, 0};
     const double eta[1] = {c.eta[0]};
     double front[TwoLink::kFront], dense[2 * TwoLink::kDense], sum = 0;
-    TwoLink::Regressor<double>(x, nullptr, eta, front, dense);
+    TwoLink::Regressor<double>(x, nullptr, eta, nullptr, nullptr, front, dense);
     for (int k = TwoLink::kFrontBegin[joint]; k < TwoLink::kFrontBegin[joint + 1]; ++k) sum += front[k] * c.p[k];
     for (int k = 0; k < TwoLink::kDense; ++k) sum += dense[joint * TwoLink::kDense + k] * c.p[TwoLink::kFront + k];
     return sum;
@@ -137,9 +137,10 @@ TEST_F(FeedForwardTest, ModelTorque_IsTheSameSumUnclamped) {
   Set c = Example(1);
   c.limit_Nm[0] = 1.0f;
   Rows<TwoLink> rows;
+  Memory<TwoLink> memory;
   float model_tau[2];
-  const model::ModelInput<float, 2> x{{q[0], q[1]}, {qd[0], qd[1]}, {qdd[0], qdd[1]}, {30, 30}, 0};
-  ModelTorque(c, x, rows, model_tau);
+  const model::ModelInput<float, 2> x{{q[0], q[1]}, {qd[0], qd[1]}, {qdd[0], qdd[1]}, {30, 30}, 0, 0};
+  ModelTorque(c, x, memory, rows, model_tau);
   for (int i = 0; i < 2; ++i) EXPECT_NEAR(model_tau[i], Exact(c, i), 1e-5 * 50);
 }
 

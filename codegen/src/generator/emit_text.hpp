@@ -1,0 +1,48 @@
+// generator - the pieces of text that the emitted files share; knows no file.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "codegen/src/generator/emit.hpp"
+#include "codegen/src/generator/emit_body.hpp"
+
+namespace armcal::codegen {
+
+inline constexpr int kGeneratorVersion = 2;
+
+std::string TypeName(const std::string& robot);                   // er20_like -> Er20Like
+std::string Float(double value);                                  // as a float literal
+std::string List(const std::vector<std::string>& items);          // { a, b, ... } broken into lines
+std::string InputText(const Model& m, const std::string& input);  // C++ text of a graph input
+
+template <class F>
+std::string Indexed(int count, F text_of) {
+  std::vector<std::string> items;
+  for (int i = 0; i < count; ++i) items.push_back(text_of(i));
+  return List(items);
+}
+
+// The first two lines of every generated C++ file, and #pragma once.
+std::string Heading(const Model& m, const std::string& what);
+std::string CountText(const Passport& count);  // "384 multiplications, 287 additions, ..."
+
+// Motor counts and current -> joint units; the coupling's inverse and transpose, row-major.
+struct AxisText {
+  std::string axes, motor_to_joint, torque_to_joint;
+};
+AxisText Axes(const Model& m);
+
+// The emitted files and what goes into them.
+struct Functions {
+  std::string initial_state, regressor, jacobian;  // statements
+  Passport count, jacobian_count;                  // of regressor and jacobian
+};
+std::string ModelHeader(const Model& m, const Functions& f, std::uint32_t schema);
+std::string DynamicsHeader(const Model& m);   // M, V and G of (1) from the base parameters
+std::string RegistersHeader(const Model& m);  // where each estimate stands on the wire
+std::string Json(const Model& m, std::uint32_t schema, const Functions& f);
+std::string ColumnsPage(const Model& m);
+
+}  // namespace armcal::codegen

@@ -1,0 +1,22 @@
+// generator - runs a graph's states over a log; knows no robot.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "codegen/src/generator/tape.hpp"
+
+namespace armcal::codegen {
+
+// Each state's starting value with the other states' starting values put in: a function of the first sample alone.
+std::vector<Expr> InitialValues(const Graph& graph, std::size_t count);
+
+// The first `count` states over a log: [samples x count], the value that each sample starts from (what the graph's
+// state inputs stand for). bindings: one per graph input; those of the states are not read. restart[k] != 0: sample k
+// starts anew. Samples must be in order.
+Eigen::MatrixXd StatePath(const Graph& graph, std::size_t count, std::span<const Binding> bindings, int samples,
+                          std::span<const char> restart);
+
+}  // namespace armcal::codegen

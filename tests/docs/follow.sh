@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# tests - does what a page of docs says, block by block, in a copy of the tree.
+#   follow.sh PAGE FOLDER ARMCAL
+# A block whose first line is a comment with a path is that file; "sh" is run; "text" and "diff" are what the last "sh"
+# printed. FOLDER is emptied; ARMCAL stands for build/host/armcal.
+set -euo pipefail
+page=$(realpath "$1") folder=$2 armcal=$(realpath "$3") top=$PWD
+
+rm -rf "$folder"
+mkdir -p "$folder/build/host" "$folder/blocks"
+cp -r "$top"/{codegen,lib,host_sim,toolchains} "$folder"
+ln -s "$armcal" "$folder/build/host/armcal"
+cd "$folder"
+git init -q . && git add codegen && git -c user.name=test -c user.email=test commit -qm before
+
+# blocks/01.sh, blocks/02.toml, ...
+awk '/^```[a-z]/ { kind = substr($0, 4); name = sprintf("blocks/%02d.%s", ++n, kind); printf "" > name; next }
+     /^```/ { name = ""; next }
+     name { print > name }' "$page"
+
+for block in blocks/*; do
+  case $block in
+    *.sh)
+      echo "== $(basename "$page"), $block"
+      cat "$block"
+      bash -euo pipefail "$block" >out.txt 2>err.txt || { cat out.txt err.txt; echo "FAILED: $block"; exit 1; } ;;
+    *.text | *.diff)
+      diff -u "$block" out.txt || { echo "FAILED: the page shows another output (left) than its commands print (right)"; exit 1; } ;;
+    *)
+      path=$(sed -n '1s,^\(#\|//\) \([A-Za-z0-9_/.]*\).*,\2,p' "$block")
+      [[ -n $path ]] || { echo "FAILED: $block: its first line names no file"; exit 1; }
+      mkdir -p "$(dirname "$path")"
+      cp "$block" "$path" ;;
+  esac
+done

@@ -1,0 +1,156 @@
+// tests - records that read the committed model, compiled into one, against KDL: what M, gravity's slope and a payload
+// really are. And which law a joint follows.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "codegen/src/generator/model.hpp"
+#include "tests/unit/codegen/effect_run.hpp"
+#include "tests/unit/codegen/kdl_arm.hpp"
+
+namespace armcal::tests {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// A six-axis arm with one effect, at random poses.
+class WithEffect {
+ public:
+  explicit WithEffect(const codegen::EffectUse& use, const std::string& arm = "er20_like")
+      : robot_(Load(arm)), model_(Plus(robot_, use), Records()) {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> unit(-1, 1);
+    signals_.t = VectorXd::LinSpaced(kSamples, 0, 0.008 * (kSamples - 1));
+    for (auto* m : {&signals_.q, &signals_.qd, &signals_.qdd})
+      *m = MatrixXd::NullaryExpr(kSamples, 6, [&] { return 2 * unit(random); });
+    bodies_.resize(66);
+    for (int p = 0; p < 66; ++p) bodies_[p] = model_.table()[p].mean;
+  }
+  static constexpr int kSamples = 40;
+  const codegen::Robot& robot() const { return robot_; }
+  const codegen::Model& model() const { return model_; }
+  const codegen::Signals& signals() const { return signals_; }
+  const VectorXd& bodies() const { return bodies_; }
+
+  // Column by name over the log, [samples x rows].
+  MatrixXd Column(const std::string& name, const std::vector<double>& eta) const {
+    VectorXd committed = VectorXd::Zero(model_.columns());
+    committed.segment(model_.front(), model_.rigid()) = model_.base_map() * bodies_;
+    std::vector<MatrixXd> row;
+    model_.Regressor(signals_, {committed.data(), static_cast<std::size_t>(committed.size())}, eta, row);
+    MatrixXd out = MatrixXd::Zero(kSamples, 6);
+    int found = 0;
+    for (int c = 0; c < model_.columns(); ++c) {
+      if (model_.column_name(c) != name) continue;
+      ++found;
+      for (int i = 0; i < 6; ++i)
+        if (model_.column_joint(c) < 0 || model_.column_joint(c) == i) out.col(i) = row[i].col(c);
+    }
+    EXPECT_EQ(found, 1) << name;
+    return out;
+  }
+
+ private:
+  static codegen::Robot Load(const std::string& arm) {
+    codegen::Robot r = codegen::ReadRobot("codegen/robots/" + arm + ".toml");
+    r.effect.clear();
+    return r;
+  }
+  static codegen::Robot Plus(codegen::Robot r, const codegen::EffectUse& use) {
+    r.effect.push_back(use);
+    return r;
+  }
+  codegen::Robot robot_;
+  codegen::Model model_;
+  codegen::Signals signals_;
+  VectorXd bodies_;
+};
+
+codegen::EffectUse Use(const std::string& effect, const std::vector<int>& joints) {
+  codegen::EffectUse use;
+  use.effect = effect;
+  use.joints = joints;
+  return use;
+}
+
+const char* const kArms[] = {"er20_like", "puma560", "ur10"};  // all stand upright on joint 1
+const VectorXd kRest = VectorXd::Zero(6);
+
+// f1 times the torque of a payload: KDL with the payload bolted on, minus without. 1e-9 of 500 N m: fifty roundings.
+TEST(EffectsInAModel, LoadLinear_IsThePayloadsTorque_InTheFileFrame) {
+  for (const char* name : kArms) {
+    WithEffect arm(Use("load_linear", {1}), name);
+    const double mass = 12, c[] = {0.03, -0.05, 0.21};
+    VectorXd loaded = arm.bodies();
+    loaded[55] += mass;
+    for (int k = 0; k < 3; ++k) loaded[56 + k] += mass * c[k];
+    KdlArm with(arm.robot(), loaded), without(arm.robot(), arm.bodies());
+    const MatrixXd column = arm.Column("load_linear.f12", {mass, c[0], c[1], c[2]});
+    for (int k = 0; k < WithEffect::kSamples; ++k) {
+      const VectorXd q = arm.signals().q.row(k), v = arm.signals().qd.row(k), a = arm.signals().qdd.row(k);
+      EXPECT_NEAR(column(k, 1), with.Torque(q, v, a)[1] - without.Torque(q, v, a)[1], 1e-8) << name;
+    }
+  }
+}
+
+// M[r, j]: torque of row r for unit acceleration of joint j, at rest, without gravity; the rotor is part of it.
+TEST(EffectsInAModel, BeltElasticity_TakesTheMassMatrixsColumn) {
+  for (const char* name : kArms) {
+    WithEffect arm(Use("belt_elasticity", {2}), name);
+    codegen::Robot weightless = arm.robot();
+    weightless.gravity_mps2 = {};
+    KdlArm kdl(weightless, arm.bodies());
+    EffectRun filter("belt_elasticity", {2});  // with M = 1: the filter alone
+    Log log;
+    for (int k = 0; k < WithEffect::kSamples; ++k) {
+      log["qdd3"].push_back(arm.signals().qdd(k, 2));
+      log["dt"].push_back(0.008);
+      log["M0_2"].push_back(1);
+    }
+    const auto missing = filter.Column(0, 0, log, {{"w0", 150}});
+    const MatrixXd column = arm.Column("belt_elasticity.e3", {150});
+    for (int k = 0; k < WithEffect::kSamples; ++k) {
+      const VectorXd inertia = kdl.Torque(arm.signals().q.row(k), kRest, VectorXd::Unit(6, 2));
+      for (int i = 0; i < 6; ++i)
+        EXPECT_NEAR(column(k, i), inertia[i] * missing[k], 1e-8) << name << " " << k << " " << i;
+    }
+  }
+}
+
+// Torque at rest is linear in gravity; rows 2..6 see all of it through the base parameters of an upright arm.
+TEST(EffectsInAModel, BaseTilt_IsTheSlopeOfGravityTorque) {
+  for (const char* name : kArms) {
+    WithEffect arm(Use("base_tilt", {}), name);
+    for (int axis = 0; axis < 2; ++axis) {
+      codegen::Robot tilted = arm.robot();
+      tilted.gravity_mps2 = {};
+      tilted.gravity_mps2[axis] = 1;
+      KdlArm kdl(tilted, arm.bodies());
+      const MatrixXd column = arm.Column(axis ? "base_tilt.gy" : "base_tilt.gx", {});
+      for (int k = 0; k < WithEffect::kSamples; ++k) {
+        const VectorXd expected = kdl.Torque(arm.signals().q.row(k), kRest, kRest);
+        for (int i = 1; i < 6; ++i) EXPECT_NEAR(column(k, i), expected[i], 1e-9) << name << " " << k << " " << i;
+      }
+    }
+  }
+}
+
+// A law that replaces Coulomb and viscous friction leaves none of them on its joint, and all on the others.
+TEST(EffectsInAModel, ALawThatReplaces_StandsAlone) {
+  for (const auto& [name, record] : Records()) {
+    if (record.replaces.empty()) continue;
+    WithEffect arm(Use(name, {3}));
+    int fc = 0, own = 0;
+    for (const auto& p : arm.model().table()) {
+      fc += p.effect == record.replaces && p.name.rfind("Fc", 0) == 0;
+      own += p.effect == name;
+      EXPECT_FALSE(p.effect == record.replaces && p.joint == 3) << p.name;
+    }
+    EXPECT_EQ(fc, 5) << name;
+    EXPECT_GT(own, 2) << name;
+  }
+}
+
+}  // namespace
+}  // namespace armcal::tests

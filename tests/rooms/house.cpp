@@ -71,15 +71,17 @@ std::string RoomOf(const Edges& edges, const std::string& folder) {
   return best;
 }
 
-bool Allowed(const Edges& edges, const std::string& room, const std::string& folder) {
+std::string Folder(const std::string& file) { return fs::path(file).parent_path().string(); }
+
+// An edge leads to a folder, to a folder and all below it ("x/"), or to one file.
+bool Allowed(const Edges& edges, const std::string& room, const std::string& file) {
+  const std::string folder = Folder(file);
   if (RoomOf(edges, folder) == room) return true;
   const auto& may = edges.at(room);
-  return std::any_of(may.begin(), may.end(), [&folder](const std::string& other) {
-    return other.back() == '/' ? folder.rfind(other, 0) == 0 : folder == other;
+  return std::any_of(may.begin(), may.end(), [&](const std::string& other) {
+    return other.back() == '/' ? folder.rfind(other, 0) == 0 : folder == other || file == other;
   });
 }
-
-std::string Folder(const std::string& file) { return fs::path(file).parent_path().string(); }
 
 bool InHouse(const std::string& name) { return Contains(kHouse, fs::path(name).begin()->string()); }
 
@@ -100,7 +102,7 @@ std::vector<std::string> CheckIncludes(const fs::path& top, const Edges& edges, 
       if (file.rfind("armcal/", 0) == 0) file = "lib/" + file;
       if (const auto it = selected.find(file); it != selected.end()) file = it->second;
       if (!InHouse(file)) found.push_back(At(name, k, "includes \"" + file + "\", which is no path from the top"));
-      else if (!Allowed(edges, room, Folder(file))) found.push_back(At(name, k, room + " may not include " + file));
+      else if (!Allowed(edges, room, file)) found.push_back(At(name, k, room + " may not include " + file));
     }
   });
   return found;

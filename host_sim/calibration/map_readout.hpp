@@ -1,9 +1,5 @@
-// calibration - the physical read-out: standard parameters that fit the data, stay near the prior and are real bodies.
-//
-// min over t of  sum_j w_j |tau_j - Y_j x(t)|^2 + |(t - t0)/sd|^2 - eps sum_links logdet J_link(t) - eps sum log rotor,
-// eps = 1, 0.1, 0.01, t = (m, c, I about the centre, rotor) per link and the remaining columns as they are; J the 4x4
-// pseudo-inertia (Wensing, Kim, Slotine 2018). Levenberg-Marquardt; a step that leaves the cone is rejected. The prior
-// must lie inside the cone.
+// calibration - the physical read-out: standard parameters that fit the data, stay near the prior and are real bodies
+// (barrier_fit.hpp says how); knows no log.
 #pragma once
 
 #include "host_sim/calibration/weighted_fit.hpp"

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include "host_sim/calibration/table_file.hpp"
+#include "host_sim/cli/identify_method.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/io/input_error.hpp"
@@ -11,7 +12,7 @@ namespace armcal::cli {
 namespace {
 
 struct Options {
-  std::string robot, channels, table, json, test;
+  std::string robot, channels, table, json, test, method;
   std::vector<std::string> train;
   bool force = false;
   double band_Hz = 0;
@@ -43,6 +44,11 @@ void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
 }
 
 int Run(const Options& o) {
+  if (!o.method.empty()) {
+    if (!o.table.empty())
+      throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
+    return RunMethod({o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz});
+  }
   const codegen::Model model = LoadModel(o.robot);
   const LogReader read(model, o.channels);
   std::vector<calibration::Dataset> train = read.All(o.train);
@@ -104,6 +110,8 @@ void AddIdentify(CLI::App& app, Action& action) {
   verb->add_option("--train", o->train, "log(s) to fit")->required();
   verb->add_option("--test", o->test, "held-out log: its error is printed, nothing is fitted to it");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  verb->add_option("--method", o->method,
+                   "another method than the weighted fit with prior: a name of the survey's, see docs");
   verb->add_option("--table-out", o->table, "parameter table to write");
   verb->add_option(
       "--band", o->band_Hz,

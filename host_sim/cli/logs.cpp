@@ -10,10 +10,11 @@
 
 namespace armcal::cli {
 
-calibration::Dataset LogReader::One(const std::string& path) const {
-  return calibration::Prepare(model_,
-                              channels_.empty() ? io::ReadLog(path) : io::ReadLog(path, io::ReadChannelMap(channels_)));
+io::Log LogReader::Raw(const std::string& path) const {
+  return channels_.empty() ? io::ReadLog(path) : io::ReadLog(path, io::ReadChannelMap(channels_));
 }
+
+calibration::Dataset LogReader::One(const std::string& path) const { return calibration::Prepare(model_, Raw(path)); }
 
 std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>& paths) const {
   std::vector<calibration::Dataset> out;

@@ -14,6 +14,7 @@ class LogReader {
  public:
   // channels: path of a channel map, empty for our own column names.
   LogReader(const codegen::Model& model, std::string channels) : model_(model), channels_(std::move(channels)) {}
+  io::Log Raw(const std::string& path) const;
   calibration::Dataset One(const std::string& path) const;
   std::vector<calibration::Dataset> All(const std::vector<std::string>& paths) const;
 

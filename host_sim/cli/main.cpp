@@ -30,6 +30,7 @@ int Main(int argc, char** argv) {
   AddVerify(app, action);
   AddDemo(app, action);
   AddBench(app, action);
+  AddSurvey(app, action);
   try {
     app.parse(argc, argv);
     return action();

@@ -29,6 +29,7 @@ void AddFlash(CLI::App& app, Action& action);
 void AddVerify(CLI::App& app, Action& action);
 void AddDemo(CLI::App& app, Action& action);
 void AddBench(CLI::App& app, Action& action);
+void AddSurvey(CLI::App& app, Action& action);
 
 // The folder that holds codegen/ (the checkout), found from ARMCAL_HOME, the current folder or the executable's place.
 std::filesystem::path Home();

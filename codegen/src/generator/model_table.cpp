@@ -63,10 +63,12 @@ void Model::MakeTable() {
     const EffectInstance& e = effect_[effect_column_[k].effect];
     const EffectUse& use = use_[effect_column_[k].effect];
     const int joint = static_cast<int>(k) < front_ ? column_joint_[k] : -1;
+    // A record that takes the friction law's place is one, and starts from the same nominal values.
+    const bool friction = e.record->friction_law || !e.record->replaces.empty();
     TableParameter p{
-        c.name, c.unit,        c.amplitude, c.sd, c.lower, c.upper, 0, use.state, e.record->friction_law ? 1 : 2,
+        c.name, c.unit,        c.amplitude, c.sd, c.lower, c.upper, 0, use.state, friction ? 1 : 2,
         joint,  e.record->name};
-    if (e.record->friction_law && joint >= 0) {
+    if (friction && joint >= 0) {
       const auto it = robot_.joint[joint].nominal.find(c.key);
       if (it != robot_.joint[joint].nominal.end() && it->second > 0)
         p.mean = it->second, p.sd = robot_.friction_relative_sd * it->second;

@@ -1,0 +1,123 @@
+// calibration methods - IDIM-IV, (17): instruments from a simulation of the estimate, so noise in q does not bias; knows no
+// truth.
+//
+// (17) phi = (Z'K)^-1 Z'tau with Z = K along the simulated motion. Here weighted by 1 / sigma^2 and, where there is a
+// prior, z = z0 + (Z'WK + P^-1)^-1 Z'W (tau - K z0), which also has a solution for standard parameters. The survey's
+// sentence stands that the simulation takes the real one's reference and control law: Problem::closed_loop, at the
+// current estimate, never a true one. Nonlinear laws: K and Z hold d tau / d eta, too, and (17) is the step.
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <cmath>
+
+#include "host_sim/calibration/methods/better_methods.hpp"
+#include "host_sim/calibration/methods/linearised.hpp"
+#include "host_sim/io/input_error.hpp"
+
+namespace armcal::calibration {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kIterations = 8;     // three are usual
+constexpr double kSettled = 0.02;  // largest change of a coordinate in its standard deviations
+constexpr double kUnseen = 1e-9;   // singular value, relative, of directions that (17) cannot see
+
+// Logs with their signals replaced by the simulated ones at z; false where the simulated arm runs away.
+bool Simulate(const Problem& problem, const VectorXd& z, std::vector<Dataset>& simulated) {
+  simulated.clear();
+  for (const Dataset* log : problem.train) {
+    Dataset copy = *log;
+    copy.s = problem.closed_loop(*log, z);
+    copy.s.temp = log->s.temp;
+    if (!copy.s.q.allFinite() || !copy.s.qd.allFinite() || !copy.s.qdd.allFinite()) return false;
+    simulated.push_back(std::move(copy));
+  }
+  return true;
+}
+
+Problem With(const Problem& problem, const std::vector<Dataset>& simulated) {
+  Problem other = problem;
+  other.train.clear();
+  for (const Dataset& log : simulated) other.train.push_back(&log);
+  return other;
+}
+
+// The step from z, and the covariance of the estimate behind it.
+VectorXd Step(const Problem& problem, const VectorXd& z, const Linearised& K, const Linearised& Z,
+              MatrixXd& covariance) {
+  MatrixXd L;
+  if (problem.covariance.size() > 0) {
+    L = PriorFactor(problem);
+  } else {  // free coordinates, columns of unit norm
+    const std::vector<int> free = FreeCoordinates(problem);
+    L = MatrixXd::Zero(z.size(), static_cast<Eigen::Index>(free.size()));
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      const double norm = Z.A.col(free[i]).norm();
+      L(free[i], static_cast<Eigen::Index>(i)) = norm > 0 ? 1 / norm : 0;
+    }
+  }
+  const MatrixXd ZL = Z.A * L;
+  MatrixXd M = ZL.transpose() * (K.A * L);
+  const VectorXd target = K.residual + K.A * (z - problem.start);  // tau - K z0, whitened
+  const VectorXd right = ZL.transpose() * target;
+  const MatrixXd spread = ZL.transpose() * ZL;
+  MatrixXd inverse;
+  if (problem.covariance.size() > 0) {
+    M.diagonal().array() += 1;
+    inverse = M.partialPivLu().inverse();
+    // w errs by M^-1 (Z' noise + prior): covariance M^-1 (Z'Z + 1) M^-T.
+    const MatrixXd middle = spread + MatrixXd::Identity(M.rows(), M.cols());
+    covariance = L * (inverse * middle * inverse.transpose()) * L.transpose();
+  } else {
+    const Eigen::BDCSVD<MatrixXd> svd(M, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const VectorXd s = svd.singularValues();
+    VectorXd reciprocal(s.size());
+    for (Eigen::Index k = 0; k < s.size(); ++k) reciprocal[k] = s[k] > kUnseen * s[0] ? 1 / s[k] : 0;
+    inverse = svd.matrixV() * reciprocal.asDiagonal() * svd.matrixU().transpose();
+    covariance = L * (inverse * spread * inverse.transpose()) * L.transpose();
+  }
+  return problem.start + L * (inverse * right);
+}
+
+}  // namespace
+
+Solution InstrumentalVariable(const Problem& problem) {
+  const double began = CpuSeconds();
+  if (!problem.closed_loop)
+    throw io::InputError("method instrumental_variable: expected a control law in the robot file and a log with qref");
+  Solution solution;
+  // The first instrument is the start's: least squares may be so biased that its arm cannot be simulated.
+  VectorXd z = problem.start;
+  ClampEta(problem, z);
+  Linearised measured;
+  solution.converged = false;
+  std::vector<Dataset> simulated;
+  for (; solution.iterations < kIterations && !solution.converged && !Stopped(problem); ++solution.iterations) {
+    if (!Simulate(problem, z, simulated)) {
+      solution.remark =
+          "the simulated arm of estimate " + std::to_string(solution.iterations) + " runs away; that estimate stands";
+      break;
+    }
+    const Problem instrument = With(problem, simulated);
+    measured = Linearise(problem, z);
+    VectorXd next = Step(problem, z, measured, Linearise(instrument, z), solution.covariance);
+    ClampEta(problem, next);
+    double change = 0;
+    for (Eigen::Index c = 0; c < z.size(); ++c)
+      if (solution.covariance(c, c) > 0)
+        change = std::max(change, std::abs(next[c] - z[c]) / std::sqrt(solution.covariance(c, c)));
+    solution.converged = change < kSettled;
+    z = next;
+    if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / kIterations, change);
+  }
+  solution.z = z;
+  if (!solution.converged && solution.remark.empty())
+    solution.remark = "still moving after " + std::to_string(solution.iterations) + " simulations";
+  solution.memory_bytes = 4 * static_cast<std::size_t>(measured.A.size()) * sizeof(double);
+  Finish(problem, began, solution);
+  return solution;
+}
+
+}  // namespace armcal::calibration

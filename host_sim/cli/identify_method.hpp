@@ -1,0 +1,21 @@
+// cli - armcal identify --method; knows no other way to identify.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host_sim/cli/verb.hpp"
+
+namespace armcal::cli {
+
+struct MethodOptions {
+  std::string robot, method, channels, test, json;
+  std::vector<std::string> train;
+  double band_Hz = 0;
+};
+
+// kOk, or kPartial where the method says that it did not converge. Throws io::InputError: unknown method, or a log that
+// lacks what the method needs.
+int RunMethod(const MethodOptions& options);
+
+}  // namespace armcal::cli

@@ -1,0 +1,136 @@
+// survey - the loop over draws.
+#include "host_sim/survey/draws.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/survey/platform.hpp"
+
+namespace armcal::survey {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kSlow_s = 1;       // a method whose solve takes longer is slow
+constexpr double kSurveyStart = 1;  // qs in rad/s where the survey's own filters start, which it does not print
+// Standard deviations of DrawStribeck's draws, relative to what is believed before.
+constexpr double kLogSpeed = 0.4, kBreakaway = 0.46;
+constexpr std::uint64_t kStride = 1000003;  // between the seeds of one run and the next
+
+std::uint64_t SeedOf(std::uint64_t seed, int draw, int purpose) {
+  return seed * kStride + static_cast<std::uint64_t>(draw) * 16 + static_cast<std::uint64_t>(purpose);
+}
+
+// The survey's recursions know no CAD; what they start from is their own.
+bool KnowsNothing(const std::string& method) { return method == "extended_kalman" || method == "forgetting"; }
+
+calibration::Problem ProblemFor(const std::string& method, const codegen::Model& prior, const calibration::Dataset& log,
+                                const DrawSettings& draws, const VectorXd& sigma) {
+  calibration::Problem p = WithPrior(prior, {&log}, RelativeDeviation(draws.prior));
+  p.sigma_Nm = sigma;
+  p.seed = draws.seed;
+  if (draws.random_truth)  // as wide as the draw: Fs / Fc in 1.1 .. 1.5 and qs in 0.05 .. 0.2 rad/s
+    for (int i = 0; i < p.start.size(); ++i) {
+      const bool eta = i >= prior.columns();
+      if (!eta && (prior.is_rigid(i) || prior.table()[prior.table_index(i)].effect != "stribeck")) continue;
+      p.covariance(i, i) = std::pow((eta ? kLogSpeed : kBreakaway) * p.start[i], 2);
+      p.lower[i] = 0.3 * p.start[i], p.upper[i] = 3 * p.start[i];
+    }
+  if (KnowsNothing(method))
+    for (int k = 0; k < prior.nonlinear(); ++k) {
+      const int i = prior.columns() + k;
+      p.start[i] = kSurveyStart;
+      p.lower[i] = 1e-3, p.upper[i] = 1e3;
+    }
+  return p;
+}
+
+double Growth(double without, double with) { return (with - without) / without; }
+
+struct Place {
+  const calibration::Method* method;
+  Outcome outcome;
+  double seconds = 0;
+  bool over = false;
+};
+
+// Both solves of one method on one draw.
+void RunOne(const Settings& settings, const DrawSettings& draws, const Truth& truth, const codegen::Model& prior,
+            const calibration::Dataset& clean, const calibration::Dataset& noisy, Place& place) {
+  Outcome& out = place.outcome;
+  const VectorXd bodies = calibration::BodyMean(prior);
+  std::optional<Score> score[2];
+  for (int with_noise = 0; with_noise < 2; ++with_noise) {
+    const calibration::Dataset& log = with_noise ? noisy : clean;
+    const VectorXd sigma = truth.sigma_Nm * (with_noise ? 1 : draws.clean_sigma);
+    calibration::Problem problem = ProblemFor(place.method->name, prior, log, draws, sigma);
+    problem.stop = settings.stop;
+    Attempt attempt = Try(*place.method, problem);
+    if (!attempt.solution) {
+      out.why = attempt.why;
+      place.over = true;
+      return;
+    }
+    place.seconds = std::max(place.seconds, attempt.solution->seconds);
+    if (!attempt.solution->z.allFinite()) {
+      ++out.failed;
+      if (out.why.empty()) out.why = attempt.solution->remark;
+      continue;
+    }
+    score[with_noise] = Judge(truth, settings.levels, log.tau, *attempt.solution, bodies);
+    (with_noise ? out.noisy : out.clean).push_back(*score[with_noise]);
+    calibration::Solution& first = with_noise ? out.first_noisy : out.first;
+    if (first.z.size() == 0) first = *std::move(attempt.solution);
+  }
+  if (!score[0] || !score[1]) return;
+  out.delta.push_back(Growth(score[0]->J_e, score[1]->J_e));
+  out.delta_true.push_back(Growth(score[0]->J_true, score[1]->J_true));
+}
+
+}  // namespace
+
+bool Settings::Wants(const std::string& table) const {
+  return tables.empty() || std::find(tables.begin(), tables.end(), table) != tables.end();
+}
+
+std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck) {
+  const excitation::Fourier& train = law == Law::kStribeck ? motions.nonlinear.series : motions.linear.series;
+  return std::make_unique<Truth>(
+      codegen::Model(Variant(settings.robot, law, Bodies::kStandard, stribeck), settings.records), Sampled(train),
+      Sampled(motions.other));
+}
+
+std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, const DrawSettings& draws,
+                              const std::vector<std::string>& methods, std::vector<std::string>& missing) {
+  std::vector<Place> places;
+  for (const std::string& name : methods)
+    if (const calibration::Method* method = Find(name, missing))
+      places.push_back({method, {method->name, method->title, method->equation, {}, {}, {}, {}, {}, {}, 0, ""}});
+
+  const int joints = settings.robot.joints();
+  std::unique_ptr<Truth> truth = MakeTruth(settings, motions, draws.law, SetStribeck(joints));
+  for (int d = 0; d < draws.draws && !settings.Stopped(); ++d) {
+    // What CAD says about friction's Stribeck part is centred on the set values, or, for drawn truths, on their range.
+    Stribeck believed = SetStribeck(joints);
+    if (draws.random_truth) {
+      truth = MakeTruth(settings, motions, draws.law, DrawStribeck(joints, SeedOf(draws.seed, d, 3)));
+      believed.fs_over_fc.setConstant(1.25);
+    }
+    const codegen::Robot cad = Variant(settings.robot, draws.law, Bodies::kStandard, believed);
+    const codegen::Model prior(DrawPrior(cad, draws.prior, SeedOf(draws.seed, d, 1)), settings.records);
+    const calibration::Dataset clean = Measured(truth->train, truth->tau);
+    const calibration::Dataset noisy =
+        Measured(truth->train, truth->tau + Noise(truth->train.samples(), truth->sigma_Nm, SeedOf(draws.seed, d, 2)));
+    for (Place& place : places) {
+      if (place.over || (d >= draws.slow_draws && place.seconds > kSlow_s)) continue;
+      RunOne(settings, draws, *truth, prior, clean, noisy, place);
+    }
+    settings.progress(LawName(draws.law) + ", " + PriorName(draws.prior), (d + 1.0) / draws.draws);
+  }
+  std::vector<Outcome> out;
+  for (Place& place : places) out.push_back(std::move(place.outcome));
+  return out;
+}
+
+}  // namespace armcal::survey

@@ -1,0 +1,68 @@
+// survey - methods over draws: fresh prior, fresh noise, fresh truth where asked, with and without noise; knows no
+// table.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "host_sim/survey/data_files.hpp"
+#include "host_sim/survey/draw.hpp"
+#include "host_sim/survey/trajectories.hpp"
+#include "host_sim/survey/trial.hpp"
+
+namespace armcal::survey {
+
+struct Settings {
+  codegen::Robot robot;        // its CAD and friction are the set parameters phi_s
+  codegen::Catalogue records;  // as read; Records() is applied by the survey
+  Levels levels;
+  Printed printed;
+  std::string home;      // the folder of codegen/ and host_sim/: channel maps and robots of measured logs
+  std::string measured;  // folder of measured logs; empty: Table 12 on real machines is left out
+  int draws = 200;       // of a method that answers within a second
+  int slow_draws = 2;    // of any other
+  std::uint64_t seed = 1;
+  double search_s = 25;             // of each trajectory search
+  std::vector<std::string> tables;  // "5" .. "12", "figures"; empty: all
+  const std::atomic<bool>* stop = nullptr;
+  std::function<void(const std::string& what, double share)> progress = [](const std::string&, double) {};
+
+  bool Wants(const std::string& table) const;
+  bool Stopped() const { return stop && *stop; }
+};
+
+// The trajectories that all tables share.
+struct Motions {
+  ExcitedBy linear, nonlinear;
+  excitation::Fourier other;  // nothing is fitted to it
+};
+
+struct DrawSettings {
+  Law law = Law::kCoulombViscous;
+  PriorError prior;
+  bool random_truth = false;  // qs and Fs / Fc of (4) drawn, too
+  int draws = 20, slow_draws = 2;
+  std::uint64_t seed = 1;
+  double clean_sigma = 1;  // of Table 7's sigma, told to a method for noise-free data
+};
+
+// One method over the draws; entry d of clean and noisy belongs to the same prior.
+struct Outcome {
+  std::string name, title, equation;
+  std::vector<Score> clean, noisy;
+  std::vector<double> delta, delta_true;     // Delta J_e; against noise-free torque of the other motion
+  calibration::Solution first, first_noisy;  // of draw 1, for Tables 5 and 6
+  int failed = 0;                            // solves that gave no finite parameters
+  std::string why;                           // the first failure, or why the method refused
+};
+
+// The Truth of the first draw (all draws, unless random_truth).
+std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck);
+
+// Methods that do not exist go to `missing`. A method whose solves take over a second gets `slow_draws`.
+std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, const DrawSettings& draws,
+                              const std::vector<std::string>& methods, std::vector<std::string>& missing);
+
+}  // namespace armcal::survey

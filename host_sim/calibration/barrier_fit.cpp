@@ -17,14 +17,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-Matrix4d PseudoInertia(const VectorXd& b) {
-  Matrix4d J;
-  const double half = 0.5 * (b[4] + b[7] + b[9]);
-  J << half - b[4], -b[5], -b[6], b[1], -b[5], half - b[7], -b[8], b[2], -b[6], -b[8], half - b[9], b[3], b[1], b[2],
-      b[3], b[0];
-  return J;
-}
-
 // y = [bodies about origins, x]: the data's part in y is linear-quadratic where it is in x, and d y / d t is block
 // diagonal. t = [bodies about centres, x]; x's rigid places are unused in both. u: free entries of t in prior units.
 class TableFit {
@@ -89,7 +81,7 @@ class TableFit {
     double cost = 0;
     for (int i = 0; i < free(); ++i) cost += 0.5 * weight_[free_[i]] * u[i] * u[i];
     for (int j = 0; j < n_; ++j) {
-      const Eigen::LLT<Matrix4d> factor(PseudoInertia(bodies.segment(11 * j, 10)));
+      const Eigen::LLT<Matrix4d> factor(PseudoInertia(&bodies[11 * j]));
       if (factor.info() != Eigen::Success || bodies[11 * j] <= 0) return INFINITY;
       cost -= 0.5 * eps * 2 * Matrix4d(factor.matrixL()).diagonal().array().log().sum();
       if (scale_[11 * j + 10] <= 0) continue;  // a rotor that is known, or not there
@@ -124,9 +116,9 @@ class TableFit {
     }
     for (int j = 0; j < n_; ++j) ht.middleCols(11 * j, 10) = (ht.middleCols(11 * j, 10) * J[j]).eval();
     for (int j = 0; j < n_; ++j) {
-      const Matrix4d inverse = PseudoInertia(bodies.segment(11 * j, 10)).inverse();
+      const Matrix4d inverse = PseudoInertia(&bodies[11 * j]).inverse();
       Matrix4d product[10];  // J^-1 dJ/dt_a
-      for (int a = 0; a < 10; ++a) product[a] = inverse * PseudoInertia(J[j].col(a));
+      for (int a = 0; a < 10; ++a) product[a] = inverse * PseudoInertia(J[j].col(a).data());
       for (int a = 0; a < 10; ++a) {
         gt[11 * j + a] -= 0.5 * eps * product[a].trace();
         for (int b = 0; b < 10; ++b)

@@ -7,7 +7,7 @@
 #include <memory>
 #include <numbers>
 
-#include "codegen/src/generator/derivative.hpp"
+#include "codegen/src/generator/dynamics.hpp"
 #include "host_sim/io/input_error.hpp"
 #include "host_sim/io/quintic_spline.hpp"
 
@@ -32,32 +32,11 @@ const codegen::Model& Checked(const codegen::Model& model) {
 
 // M (upper triangle, by column), V and G of (1), from base parameters as inputs.
 std::vector<Expr> DynamicsRoots(codegen::Graph& g, const codegen::Model& model) {
-  const int n = model.joints();
-  codegen::Robot weightless = model.robot();
-  weightless.gravity_mps2 = {};
-  const auto torque = [&](const codegen::BodyRows& rows, int i) {
-    Expr sum = g.Constant(0);
-    for (int d = 0; d < model.rigid(); ++d)
-      sum = sum + rows[i][model.base_columns()[d]] * g.Input("base" + std::to_string(d));
-    return sum;
-  };
-  const auto at = [&](codegen::BodyRows rows, const char* quantity, int unit) {
-    std::unordered_map<int, Expr> by;
-    for (int j = 0; j < n; ++j) by.emplace(g.Input(codegen::InputName(quantity, j)).id(), g.Constant(j == unit));
-    for (auto& row : rows)
-      for (Expr& e : row) e = codegen::Substitute(e, by);
-    return rows;
-  };
-  const codegen::BodyRows moving = codegen::BodyRegressor(g, weightless);
-  const codegen::BodyRows steady = at(moving, "qdd", -1), still = at(moving, "qd", -1);
-  const codegen::BodyRows resting = codegen::BodyRegressor(g, model.robot(), false);
+  const codegen::Dynamics d = codegen::MakeDynamics(g, model.robot(), model.base_columns());
   std::vector<Expr> roots;
-  for (int j = 0; j < n; ++j) {
-    const codegen::BodyRows column = at(still, "qdd", j);
-    for (int i = 0; i <= j; ++i) roots.push_back(torque(column, i));
-  }
-  for (int i = 0; i < n; ++i) roots.push_back(torque(steady, i));
-  for (int i = 0; i < n; ++i) roots.push_back(torque(resting, i));
+  for (const auto& column : d.mass) roots.insert(roots.end(), column.begin(), column.end());
+  roots.insert(roots.end(), d.velocity.begin(), d.velocity.end());
+  roots.insert(roots.end(), d.gravity.begin(), d.gravity.end());
   return roots;
 }
 

@@ -99,17 +99,18 @@ VectorXd ReadOutBodies(const codegen::Model& model, const VectorXd& base) {
   return phi0 + P0 * B.transpose() * (B * P0 * B.transpose()).ldlt().solve(base - B * phi0);
 }
 
+Eigen::Matrix4d PseudoInertia(const double* b) {
+  const double half = 0.5 * (b[4] + b[7] + b[9]);
+  Eigen::Matrix4d J;
+  J << half - b[4], -b[5], -b[6], b[1], -b[5], half - b[7], -b[8], b[2], -b[6], -b[8], half - b[9], b[3], b[1], b[2],
+      b[3], b[0];
+  return J;
+}
+
 bool IsPhysical(const VectorXd& bodies) {
   for (int j = 0; j < bodies.size() / 11; ++j) {
-    const VectorXd b = bodies.segment(11 * j, 10);
-    Eigen::Matrix3d I;
-    I << b[4], b[5], b[6], b[5], b[7], b[8], b[6], b[8], b[9];
-    Eigen::Matrix4d J;
-    J.topLeftCorner<3, 3>() = 0.5 * I.trace() * Eigen::Matrix3d::Identity() - I;
-    J.topRightCorner<3, 1>() = b.segment<3>(1);
-    J.bottomLeftCorner<1, 3>() = b.segment<3>(1).transpose();
-    J(3, 3) = b[0];
-    if (Eigen::LLT<Eigen::Matrix4d>(J).info() != Eigen::Success || bodies[11 * j + 10] < 0) return false;
+    const Eigen::LLT<Eigen::Matrix4d> factor(PseudoInertia(&bodies[11 * j]));
+    if (factor.info() != Eigen::Success || bodies[11 * j + 10] < 0) return false;
   }
   return true;
 }

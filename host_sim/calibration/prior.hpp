@@ -33,6 +33,9 @@ Eigen::VectorXd BodyMean(const codegen::Model& model);
 // Standard parameters from base ones: phi = phi0 + G (b - B phi0), G = P0 B' (B P0 B')^-1.
 Eigen::VectorXd ReadOutBodies(const codegen::Model& model, const Eigen::VectorXd& base);
 
+// [[tr(I)/2 E - I, mc], [mc', m]] of a body about its link origin; body: its 10 values.
+Eigen::Matrix4d PseudoInertia(const double* body);
+
 // Every link's pseudo-inertia is positive definite.
 bool IsPhysical(const Eigen::VectorXd& bodies);
 

@@ -1,29 +1,11 @@
 // generator - the text of dynamics.hpp (M, V and G of (1)) and registers.hpp.
 #include <sstream>
 
-#include "codegen/src/generator/derivative.hpp"
+#include "codegen/src/generator/dynamics.hpp"
 #include "codegen/src/generator/emit_text.hpp"
 
 namespace armcal::codegen {
 namespace {
-
-using Rows = std::vector<std::vector<Expr>>;
-
-// Torque of joint i: base parameters times their columns.
-Expr Torque(Graph& g, const Model& m, const Rows& rows, int i) {
-  Expr sum = g.Constant(0);
-  for (int d = 0; d < m.rigid(); ++d) sum = sum + rows[i][m.base_columns()[d]] * g.Input("base" + std::to_string(d));
-  return sum;
-}
-
-// The rows with one quantity of every joint at given values.
-Rows At(Graph& g, Rows rows, int joints, const char* quantity, const std::function<double(int)>& value) {
-  std::unordered_map<int, Expr> at;
-  for (int j = 0; j < joints; ++j) at.emplace(g.Input(InputName(quantity, j)).id(), g.Constant(value(j)));
-  for (auto& row : rows)
-    for (Expr& e : row) e = Substitute(e, at);
-  return rows;
-}
 
 std::string Function(const Model& m, Graph& g, const char* comment, const char* head,
                      const std::vector<Assignment>& assignments) {
@@ -42,22 +24,19 @@ std::string Function(const Model& m, Graph& g, const char* comment, const char* 
 
 std::string DynamicsHeader(const Model& m) {
   const int n = m.joints();
-  Robot weightless = m.robot();
-  weightless.gravity_mps2 = {};
   Graph g;
-  const auto zero = [](int) { return 0.0; };
-  const Rows moving = BodyRegressor(g, weightless), resting = BodyRegressor(g, m.robot(), false);
-  const Rows steady = At(g, moving, n, "qdd", zero), still = At(g, moving, n, "qd", zero);
+  const Dynamics dynamics = MakeDynamics(g, m.robot(), m.base_columns());
+  const auto entry = [](const char* array, int index) {
+    return std::string(array) + "[" + std::to_string(index) + "]";
+  };
   std::vector<Assignment> mass, velocity, gravity;
   for (int j = 0; j < n; ++j) {
-    const Rows column = At(g, still, n, "qdd", [j](int k) { return k == j ? 1.0 : 0.0; });
     for (int i = 0; i <= j; ++i) {
-      const Expr entry = Torque(g, m, column, i);
-      mass.push_back({"M[" + std::to_string(i * n + j) + "]", entry, ""});
-      if (i != j) mass.push_back({"M[" + std::to_string(j * n + i) + "]", entry, ""});
+      mass.push_back({entry("M", i * n + j), dynamics.mass[j][i], ""});
+      if (i != j) mass.push_back({entry("M", j * n + i), dynamics.mass[j][i], ""});
     }
-    velocity.push_back({"V[" + std::to_string(j) + "]", Torque(g, m, steady, j), ""});
-    gravity.push_back({"G[" + std::to_string(j) + "]", Torque(g, m, resting, j), ""});
+    velocity.push_back({entry("V", j), dynamics.velocity[j], ""});
+    gravity.push_back({entry("G", j), dynamics.gravity[j], ""});
   }
   const std::string type = TypeName(m.robot().name);
   const std::string x = "([[maybe_unused]] const model::ModelInput<T, kJoints>& x, [[maybe_unused]] const T* base, T* ";

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "codegen/src/generator/derivative.hpp"
+#include "codegen/src/generator/dynamics.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::codegen {
@@ -66,24 +67,7 @@ BodyRows Model::TiltRows(const Catalogue& catalogue) {
 // effects are placed, so the committed base parameters are named by their base number here and renumbered when emitted.
 Expr Model::CommittedTorque(const BodyRows& rows, int joint) {
   depends_on_estimate_ = true;
-  Expr sum = graph_->Constant(0);
-  for (int d = 0; d < rigid_; ++d) sum = sum + rows[joint][base_.column[d]] * graph_->Input("base" + std::to_string(d));
-  return sum;
-}
-
-// Torque per unit acceleration of one joint at rest without gravity: a column of M of (1).
-BodyRows Model::AccelerationRows(int joint) {
-  Robot weightless = robot_;
-  weightless.gravity_mps2 = {};
-  std::unordered_map<int, Expr> at;
-  for (int j = 0; j < joints(); ++j) {
-    at.emplace(graph_->Input(InputName("qd", j)).id(), graph_->Constant(0));
-    at.emplace(graph_->Input(InputName("qdd", j)).id(), graph_->Constant(j == joint));
-  }
-  auto rows = BodyRegressor(*graph_, weightless);
-  for (auto& row : rows)
-    for (Expr& e : row) e = Substitute(e, at);
-  return rows;
+  return BaseTorque(*graph_, rows, base_.column, joint);
 }
 
 ModelQuantities Model::Quantities() {
@@ -99,7 +83,7 @@ ModelQuantities Model::Quantities() {
               sum = sum + S(kBodyBlock * body + k, kBodyBlock * body + p) * body_rows_[row][kBodyBlock * body + k];
             return sum;
           },
-          [this](int row, int j) { return CommittedTorque(AccelerationRows(j), row); },
+          [this](int row, int j) { return CommittedTorque(AccelerationRows(*graph_, robot_, j), row); },
           [this](int row, int axis) { return CommittedTorque(TiltedRows(axis), row); }, not_here, not_here};
 }
 
@@ -148,10 +132,11 @@ void Model::MakeReady() {
   ready_state_.assign(joints(), -1);
   for (int i = 0; i < joints(); ++i) {
     Expr all;  // stays empty where nothing needs to settle
-    for (const EffectInstance& e : effect_)
-      for (const EffectColumn& c : e.columns)
-        if (c.rows.contains(i))
-          for (const Expr settled : e.settled) all = all.graph() ? graph_->Binary(Op::kMin, all, settled) : settled;
+    for (const EffectInstance& e : effect_) {
+      const auto touches = [i](const EffectColumn& c) { return c.rows.contains(i); };
+      if (!std::any_of(e.columns.begin(), e.columns.end(), touches)) continue;
+      for (const Expr settled : e.settled) all = all.graph() ? graph_->Binary(Op::kMin, all, settled) : settled;
+    }
     if (!all.graph()) continue;
     ready_state_[i] = static_cast<int>(graph_->states().size());
     graph_->State("ready" + std::to_string(i + 1), graph_->Constant(0), [&](Expr) { return all; });

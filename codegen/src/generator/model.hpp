@@ -100,7 +100,6 @@ class Model {
   BodyRows TiltedRows(int axis);
   BodyRows TiltRows(const Catalogue& catalogue);
   Expr CommittedTorque(const BodyRows& rows, int joint);
-  BodyRows AccelerationRows(int joint);
   ModelQuantities Quantities();
   void MakeReady();
   void MakeJacobian();

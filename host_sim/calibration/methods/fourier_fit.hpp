@@ -1,5 +1,5 @@
-// calibration methods - periodic motion as a Fourier series: position without noise, derivatives without differentiation; knows
-// no method.
+// calibration methods - periodic motion as a Fourier series: position without noise, derivatives without
+// differentiation; knows no method.
 #pragma once
 
 #include "host_sim/calibration/dataset.hpp"

@@ -1,5 +1,5 @@
-// calibration methods - IDIM-IV, (17): instruments from a simulation of the estimate, so noise in q does not bias; knows no
-// truth.
+// calibration methods - IDIM-IV, (17): instruments from a simulation of the estimate, so noise in q does not bias;
+// knows no truth.
 //
 // (17) phi = (Z'K)^-1 Z'tau with Z = K along the simulated motion. Here weighted by 1 / sigma^2 and, where there is a
 // prior, z = z0 + (Z'WK + P^-1)^-1 Z'W (tau - K z0), which also has a solution for standard parameters. The survey's
@@ -7,11 +7,10 @@
 // current estimate, never a true one. Nonlinear laws: K and Z hold d tau / d eta, too, and (17) is the step.
 #include <Eigen/LU>
 #include <Eigen/SVD>
-#include <cmath>
 
 #include "host_sim/calibration/methods/better_methods.hpp"
 #include "host_sim/calibration/methods/linearised.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "host_sim/calibration/methods/simulated_logs.hpp"
 
 namespace armcal::calibration {
 
@@ -20,29 +19,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kIterations = 8;     // three are usual
-constexpr double kSettled = 0.02;  // largest change of a coordinate in its standard deviations
-constexpr double kUnseen = 1e-9;   // singular value, relative, of directions that (17) cannot see
-
-// Logs with their signals replaced by the simulated ones at z; false where the simulated arm runs away.
-bool Simulate(const Problem& problem, const VectorXd& z, std::vector<Dataset>& simulated) {
-  simulated.clear();
-  for (const Dataset* log : problem.train) {
-    Dataset copy = *log;
-    copy.s = problem.closed_loop(*log, z);
-    copy.s.temp = log->s.temp;
-    if (!copy.s.q.allFinite() || !copy.s.qd.allFinite() || !copy.s.qdd.allFinite()) return false;
-    simulated.push_back(std::move(copy));
-  }
-  return true;
-}
-
-Problem With(const Problem& problem, const std::vector<Dataset>& simulated) {
-  Problem other = problem;
-  other.train.clear();
-  for (const Dataset& log : simulated) other.train.push_back(&log);
-  return other;
-}
+constexpr int kIterations = 8;    // three are usual
+constexpr double kUnseen = 1e-9;  // singular value, relative, of directions that (17) cannot see
 
 // The step from z, and the covariance of the estimate behind it.
 VectorXd Step(const Problem& problem, const VectorXd& z, const Linearised& K, const Linearised& Z,
@@ -85,8 +63,7 @@ VectorXd Step(const Problem& problem, const VectorXd& z, const Linearised& K, co
 
 Solution InstrumentalVariable(const Problem& problem) {
   const double began = CpuSeconds();
-  if (!problem.closed_loop)
-    throw io::InputError("method instrumental_variable: expected a control law in the robot file and a log with qref");
+  RequireLoop(problem, "instrumental_variable");
   Solution solution;
   // The first instrument is the start's: least squares may be so biased that its arm cannot be simulated.
   VectorXd z = problem.start;
@@ -95,20 +72,16 @@ Solution InstrumentalVariable(const Problem& problem) {
   solution.converged = false;
   std::vector<Dataset> simulated;
   for (; solution.iterations < kIterations && !solution.converged && !Stopped(problem); ++solution.iterations) {
-    if (!Simulate(problem, z, simulated)) {
+    if (!SimulateLogs(problem, z, simulated)) {
       solution.remark =
           "the simulated arm of estimate " + std::to_string(solution.iterations) + " runs away; that estimate stands";
       break;
     }
-    const Problem instrument = With(problem, simulated);
     measured = Linearise(problem, z);
-    VectorXd next = Step(problem, z, measured, Linearise(instrument, z), solution.covariance);
+    VectorXd next = Step(problem, z, measured, Linearise(Along(problem, simulated), z), solution.covariance);
     ClampEta(problem, next);
-    double change = 0;
-    for (Eigen::Index c = 0; c < z.size(); ++c)
-      if (solution.covariance(c, c) > 0)
-        change = std::max(change, std::abs(next[c] - z[c]) / std::sqrt(solution.covariance(c, c)));
-    solution.converged = change < kSettled;
+    const double change = LargestChange(z, next, solution.covariance);
+    solution.converged = change < kSettledChange;
     z = next;
     if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / kIterations, change);
   }

@@ -1,4 +1,5 @@
-// calibration methods - the model about an estimate, its regularised solution and the read-out of bodies; knows no method.
+// calibration methods - the model about an estimate, its regularised solution and the read-out of bodies; knows no
+// method.
 #include "host_sim/calibration/methods/linearised.hpp"
 
 #include <time.h>

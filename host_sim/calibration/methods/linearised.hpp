@@ -1,5 +1,5 @@
-// calibration methods - what gradient-like methods share: the model about an estimate, its regularised solution, the read-out;
-// knows no single method.
+// calibration methods - what gradient-like methods share: the model about an estimate, its regularised solution, the
+// read-out; knows no single method.
 #pragma once
 
 #include "host_sim/calibration/method.hpp"

@@ -1,5 +1,5 @@
-// calibration methods - the survey's parallel decimation: torque and every column through one low-pass, then every m-th row;
-// knows no method.
+// calibration methods - the survey's parallel decimation: torque and every column through one low-pass, then every m-th
+// row; knows no method.
 #pragma once
 
 #include "host_sim/calibration/methods/linearised.hpp"

@@ -19,14 +19,6 @@ namespace {
 
 constexpr int kHalvings = 20;  // of the way back to the start: to a millionth of it
 
-Matrix4d PseudoInertia(const double* b) {
-  const double half = 0.5 * (b[4] + b[7] + b[9]);
-  Matrix4d J;
-  J << half - b[4], -b[5], -b[6], b[1], -b[5], half - b[7], -b[8], b[2], -b[6], -b[8], half - b[9], b[3], b[1], b[2],
-      b[3], b[0];
-  return J;
-}
-
 }  // namespace
 
 SearchSpace::SearchSpace(const Problem& problem, const char* method) : model_(*problem.model), start_(problem.start) {

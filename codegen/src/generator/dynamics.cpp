@@ -1,0 +1,52 @@
+// generator - M, V and G from the body rows at chosen speeds and accelerations.
+#include "codegen/src/generator/dynamics.hpp"
+
+#include "codegen/src/generator/derivative.hpp"
+
+namespace armcal::codegen {
+namespace {
+
+// The rows with one quantity of every joint at zero, of joint `unit` at one (-1: of none).
+BodyRows At(Graph& g, BodyRows rows, const char* quantity, int unit) {
+  std::unordered_map<int, Expr> at;
+  for (int j = 0; j < static_cast<int>(rows.size()); ++j)
+    at.emplace(g.Input(InputName(quantity, j)).id(), g.Constant(j == unit));
+  for (auto& row : rows)
+    for (Expr& e : row) e = Substitute(e, at);
+  return rows;
+}
+
+Robot Weightless(Robot robot) {
+  robot.gravity_mps2 = {};
+  return robot;
+}
+
+}  // namespace
+
+Expr BaseTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_columns, int i) {
+  Expr sum = g.Constant(0);
+  for (std::size_t d = 0; d < base_columns.size(); ++d)
+    sum = sum + rows[i][base_columns[d]] * g.Input("base" + std::to_string(d));
+  return sum;
+}
+
+BodyRows AccelerationRows(Graph& g, const Robot& robot, int joint) {
+  return At(g, At(g, BodyRegressor(g, Weightless(robot)), "qd", -1), "qdd", joint);
+}
+
+Dynamics MakeDynamics(Graph& g, const Robot& robot, const std::vector<int>& base_columns) {
+  const int n = robot.joints();
+  const BodyRows moving = BodyRegressor(g, Weightless(robot)), resting = BodyRegressor(g, robot, false);
+  const BodyRows steady = At(g, moving, "qdd", -1), still = At(g, moving, "qd", -1);
+  Dynamics out;
+  for (int j = 0; j < n; ++j) {
+    const BodyRows column = At(g, still, "qdd", j);
+    out.mass.emplace_back();
+    for (int i = 0; i <= j; ++i) out.mass[j].push_back(BaseTorque(g, column, base_columns, i));
+    out.velocity.push_back(BaseTorque(g, steady, base_columns, j));
+    out.gravity.push_back(BaseTorque(g, resting, base_columns, j));
+  }
+  return out;
+}
+
+}  // namespace armcal::codegen

@@ -1,0 +1,24 @@
+// generator - M, V and G of (1) as expressions; knows no effect and no output format.
+#pragma once
+
+#include <vector>
+
+#include "codegen/src/generator/rigid_body.hpp"
+
+namespace armcal::codegen {
+
+// The base parameters are the graph inputs "base0", "base1" ... in the order of base_columns (indices into 11n).
+struct Dynamics {
+  std::vector<std::vector<Expr>> mass;  // [column j][i <= j]: upper triangle of M, by column
+  std::vector<Expr> velocity, gravity;  // V and G, one a joint
+};
+Dynamics MakeDynamics(Graph& graph, const Robot& robot, const std::vector<int>& base_columns);
+
+// Torque of joint i: its row times the base parameters.
+Expr BaseTorque(Graph& graph, const BodyRows& rows, const std::vector<int>& base_columns, int i);
+
+// Body rows of an arm without weight that stands still and accelerates by one at a joint: times parameters, a column of
+// M.
+BodyRows AccelerationRows(Graph& graph, const Robot& robot, int joint);
+
+}  // namespace armcal::codegen

@@ -10,12 +10,14 @@
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/excitation/compose.hpp"
 #include "host_sim/excitation/optimise.hpp"
+#include "host_sim/excitation/target.hpp"
 
 namespace armcal::cli {
 namespace {
 
 struct Options {
-  std::string robot, out, json, purpose = "train";
+  std::string robot, out, json, purpose = "train", curve = "fourier", criterion = "condition", search = "gradient";
+  std::vector<std::string> separate;
   std::uint64_t seed = 1;
   int periods = 0, harmonics = 5, starts = 0;
   double seconds = 20, period_s = 10, step_s = 0.004, margin = 0.05;
@@ -39,25 +41,55 @@ class InterruptGuard {
   void (*before_)(int);
 };
 
-excitation::Optimum Search(const excitation::Observation& observation, const Options& o) {
+excitation::Target MakeTarget(const codegen::Robot& robot, const Options& o) {
+  using Kind = excitation::Criterion::Kind;
+  const codegen::Catalogue records = LoadCatalogue();
+  if (!o.separate.empty()) return {robot, records, o.separate};
+  if (o.criterion == "friction") return excitation::Target::Friction(robot, records);
+  return {robot, records, o.criterion == "d-optimal" ? Kind::kDOptimal : Kind::kCondition};
+}
+
+excitation::Optimum Search(const excitation::Target& target, const Options& o) {
   excitation::OptimiseSettings s;
-  s.shape.frequency_radps = 2 * 3.14159265358979323846 / o.period_s;
-  s.shape.harmonics = o.harmonics;
-  if (observation.model().nonlinear() > 0) s.shape.samples = 250;
+  s.shape.family = excitation::FamilyNamed(o.curve);
+  s.shape.period_s = o.period_s;
+  s.shape.terms = 2 * o.harmonics;
+  if (target.observation().model().nonlinear() > 0) s.shape.samples = 250;
   s.shape.samples = std::max(s.shape.samples, 16 * o.harmonics);
+  s.criterion = target.criterion();
+  s.search = o.search == "genetic" ? excitation::Search::kGenetic : excitation::Search::kGradient;
   s.margin = o.margin;
   s.seconds = o.seconds;
   if (o.starts > 0) s.starts = o.starts;
   s.seed = 2 * o.seed + (o.purpose == "test" ? 1 : 0);  // one seed, two different trajectories
   s.stop = &interrupted;
   if (isatty(STDERR_FILENO))
-    s.progress = [](int starts, double condition) {
-      fmt::print(stderr, "\r{} searches, cond(K) {:.2f}  ", starts, condition);
+    s.progress = [&](int starts, double figure) {
+      fmt::print(stderr, "\r{} searches, {} {:.4g}  ", starts, excitation::Name(target.criterion().kind), figure);
     };
   const InterruptGuard guard;
-  const excitation::Optimum best = Optimise(observation, s);
+  const excitation::Optimum best = Optimise(target.observation(), s);
   if (s.progress) fmt::print(stderr, "\n");
   return best;
+}
+
+// What was asked to be accurate: one line a parameter, over one period.
+nlohmann::ordered_json PrintAccuracy(const excitation::Target& target, const excitation::Series& series) {
+  auto list = nlohmann::ordered_json::array();
+  if (target.criterion().about.empty()) return list;
+  const excitation::Observation& observation = target.observation();
+  const Eigen::MatrixXd gram = PeriodGram(observation, series);
+  const Eigen::VectorXd sd = excitation::Deviations(gram), separation = excitation::Separation(gram);
+  fmt::print(
+      "after one period at {} samples, all parameters unknown (separation: share of its torque that no other "
+      "parameter explains)\n  {:<24} {:>12} {:>12}\n",
+      excitation::kPeriodSamples, "parameter", "sd", "separation");
+  for (const int place : target.criterion().about) {
+    const std::string name = observation.model().column_name(observation.columns()[static_cast<std::size_t>(place)]);
+    fmt::print("  {:<24} {:>12.4g} {:>12.3f}\n", name, sd[place], separation[place]);
+    list.push_back({{"parameter", name}, {"sd", sd[place]}, {"separation", separation[place]}});
+  }
+  return list;
 }
 
 void PrintPeaks(const codegen::Robot& robot, const std::vector<excitation::JointPeaks>& peaks) {
@@ -100,7 +132,9 @@ int Run(const Options& o) {
   const codegen::Robot& robot = model.robot();
   const excitation::Observation observation(model);
   const excitation::Observation without_rotors(model, excitation::Observation::Rotors::kLeftOut);
-  const excitation::Optimum best = Search(observation, o);
+  const excitation::Target target = MakeTarget(robot, o);
+  const excitation::Optimum best = Search(target, o);
+  const double condition = PeriodCondition(observation, best.series);
 
   excitation::ComposeSettings compose;
   const bool test = o.purpose == "test";
@@ -115,8 +149,8 @@ int Run(const Options& o) {
   excitation::WriteTrajectory(o.out, composed.trajectory);
 
   const auto columns = observation.columns().size();
-  fmt::print("{}: cond(K) {:.3f} over one Fourier period, {:.3f} over the whole trajectory ({} searches, seed {}{})\n",
-             robot.name, best.condition, whole, best.starts, o.seed, interrupted ? ", interrupted" : "");
+  fmt::print("{}: cond(K) {:.3f} over one period, {:.3f} over the whole trajectory ({} searches, seed {}{})\n",
+             robot.name, condition, whole, best.starts, o.seed, interrupted ? ", interrupted" : "");
   fmt::print(
       "  columns: the {} filter coordinates that are estimated (rigid base, friction, effects); rows divided by the "
       "joint's torque "
@@ -126,6 +160,9 @@ int Run(const Options& o) {
     fmt::print("  without the rotor inertias ({} columns): {:.3f}\n", without_rotors.columns().size(), rigid_only);
   if (!observation.left_out().empty())
     fmt::print("  not asked for, motion alone does not excite them: {}\n", fmt::join(observation.left_out(), ", "));
+  if (o.criterion != "condition" || !o.separate.empty())
+    fmt::print("  minimised: {}: {:.4g}\n", excitation::Name(target.criterion().kind), best.figure);
+  const auto accuracy = PrintAccuracy(target, best.series);
   PrintPeaks(robot, composed.peaks);
   if (!robot.has_prior)
     fmt::print("  the robot file has prior = \"none\": torque is unknown, its limits are ignored\n");
@@ -145,7 +182,7 @@ int Run(const Options& o) {
                      {"seed", o.seed},
                      {"searches", best.starts},
                      {"interrupted", interrupted.load()},
-                     {"cond_period", best.condition},
+                     {"cond_period", condition},
                      {"cond_whole", whole},
                      {"cond_period_without_rotors", rigid_only},
                      {"columns", columns},
@@ -158,9 +195,13 @@ int Run(const Options& o) {
                      {"collisions_checked", false},
                      {"sections", sections},
                      {"peaks", PeaksJson(composed.peaks)},
-                     {"fourier",
-                      {{"frequency_radps", best.series.frequency_radps},
-                       {"rows", "a1..aL, b1..bL, q0"},
+                     {"minimised", excitation::Name(target.criterion().kind)},
+                     {"figure", best.figure},
+                     {"accuracy", accuracy},
+                     {"series",
+                      {{"curve", o.curve},
+                       {"period_s", best.series.period_s},
+                       {"rows", "coefficients (Fourier: a1..aL, b1..bL in rad/s), then q0"},
                        {"coefficient", Rows(best.series.coefficient)}}}});
   return kOk;
 }
@@ -184,7 +225,21 @@ void AddExcite(CLI::App& app, Action& action) {
   verb->add_option("--period", o->period_s, "length of a period in seconds")
       ->check(CLI::Range(1.0, 1000.0))
       ->capture_default_str();
-  verb->add_option("--harmonics", o->harmonics, "terms of the Fourier series")
+  verb->add_option("--curve", o->curve, "what the period is made of")
+      ->check(CLI::IsMember({"fourier", "sine", "polynomial", "spline"}))
+      ->capture_default_str();
+  auto* criterion =
+      verb->add_option("--criterion", o->criterion,
+                       "condition: cond(K); d-optimal: det(K'K); friction: accuracy of friction, low speeds included")
+          ->check(CLI::IsMember({"condition", "d-optimal", "friction"}))
+          ->capture_default_str();
+  verb->add_option("--separate", o->separate, "effects to tell apart: record, record:joint or record:joint-joint, ...")
+      ->delimiter(',')
+      ->excludes(criterion);
+  verb->add_option("--search", o->search, "gradient, or the survey's genetic algorithm")
+      ->check(CLI::IsMember({"gradient", "genetic"}))
+      ->capture_default_str();
+  verb->add_option("--harmonics", o->harmonics, "terms of the Fourier series; other curves have twice as many")
       ->check(CLI::Range(1, 20))
       ->capture_default_str();
   verb->add_option("--seconds", o->seconds, "time for the search; Ctrl-C ends it early")

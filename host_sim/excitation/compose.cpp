@@ -24,15 +24,15 @@ Part AsPart(const std::string& name, const Blend& blend) {
   return {name, blend.duration_s(), [blend](double t) { return blend.Position(t); }};
 }
 
-State StateAt(const Fourier& series, double t_s) {
+State StateAt(const Series& series, double t_s) {
   const codegen::Signals s = series.At(Eigen::VectorXd::Constant(1, t_s));
   return {s.q.row(0), s.qd.row(0), s.qdd.row(0)};
 }
 
 // Instants of the period, those at which the arm is slow and hardly accelerated first.
-std::vector<double> QuietInstants(const codegen::Robot& robot, const Fourier& series) {
+std::vector<double> QuietInstants(const codegen::Robot& robot, const Series& series) {
   constexpr int kInstants = 100;
-  const double period = series.period_s();
+  const double period = series.period_s;
   const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(kInstants, 0, period * (kInstants - 1) / kInstants);
   const codegen::Signals s = series.At(t);
   Eigen::VectorXd unrest = Eigen::VectorXd::Zero(kInstants);
@@ -52,15 +52,16 @@ std::vector<double> QuietInstants(const codegen::Robot& robot, const Fourier& se
 }
 
 // In, the periods, out; ends at rest.
-std::vector<Part> FourierParts(const Observation& observation, const Fourier& series, int periods, double share) {
+std::vector<Part> SeriesParts(const Observation& observation, const Series& series, int periods, double share) {
   for (const double begin : QuietInstants(observation.model().robot(), series)) {
     const State state = StateAt(series, begin);
     const auto in = ShortestStart(observation, state, share), out = ShortestStop(observation, state, share);
     if (!in || !out) continue;
     const auto position = [series, begin](double t) -> Eigen::VectorXd { return StateAt(series, begin + t).q; };
-    return {AsPart("blend in", *in), {"fourier", periods * series.period_s(), position}, AsPart("blend out", *out)};
+    return {
+        AsPart("blend in", *in), {Name(series.family), periods * series.period_s, position}, AsPart("blend out", *out)};
   }
-  Fail(observation, "no blend from rest into the Fourier series within the limits; expected wider limits");
+  Fail(observation, "no blend from rest into the series within the limits; expected wider limits");
 }
 
 std::optional<Part> SlowPart(const Observation& observation, const Eigen::VectorXd& home, int speeds, double share) {
@@ -103,13 +104,13 @@ Composed OnGrid(const std::vector<Part>& parts, double step_s) {
 
 }  // namespace
 
-Composed Compose(const Observation& observation, const Fourier& series, const ComposeSettings& settings) {
+Composed Compose(const Observation& observation, const Series& series, const ComposeSettings& settings) {
   const double share = 1 - settings.margin;
-  std::vector<Part> parts = FourierParts(observation, series, settings.periods, share);
+  std::vector<Part> parts = SeriesParts(observation, series, settings.periods, share);
   const Eigen::VectorXd first = parts.front().position(0);
   Eigen::VectorXd pose = parts.back().position(parts.back().duration_s);
   if (settings.slow_speeds > 0) {
-    const Eigen::VectorXd home = series.coefficient.row(2 * series.harmonics());
+    const Eigen::VectorXd home = series.offset();
     const auto slow = SlowPart(observation, home, settings.slow_speeds, share);
     if (!slow) Fail(observation, "no slow moves within the limits; expected --no-slow or limits that allow them");
     parts.push_back(Transfer(observation, "transfer", pose, home, share));

@@ -1,11 +1,12 @@
-// excitation - the whole trajectory: blend in, Fourier periods, slow moves, back to the first pose. Knows no search.
+// excitation - the whole trajectory: blend in, periods of a series, slow moves, back to the first pose. Knows no
+// search.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "host_sim/excitation/fourier.hpp"
 #include "host_sim/excitation/peaks.hpp"
+#include "host_sim/excitation/series.hpp"
 #include "host_sim/excitation/trajectory.hpp"
 
 namespace armcal::excitation {
@@ -30,6 +31,6 @@ struct Composed {
 
 // Starts and ends at rest in the same pose, so that it may be repeated. The series is entered where it is slowest.
 // InputError: no blend or slow part within the limits.
-Composed Compose(const Observation& observation, const Fourier& series, const ComposeSettings& settings);
+Composed Compose(const Observation& observation, const Series& series, const ComposeSettings& settings);
 
 }  // namespace armcal::excitation

@@ -1,17 +1,14 @@
 // excitation - value and gradient of the excitation objective; knows no search.
 #include "host_sim/excitation/objective.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace armcal::excitation {
 namespace {
 
-constexpr double kNorm = 10;      // p of the surrogate
 constexpr double kPenalty = 100;  // per sample and unit of squared excess: 1 % too far costs what 1 % of cond gains
 constexpr double kRelativeShift = 1e-7;  // of a joint's limit, for the derivative of the regressor by its state
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // kPenalty * excess^2 of |x - middle| / half over `share`; adds the derivative by x.
 double Excess(double x, double middle, double half, double share, double& derivative) {
@@ -23,53 +20,48 @@ double Excess(double x, double middle, double half, double share, double& deriva
 
 }  // namespace
 
-Objective::Objective(const Observation& observation, const SeriesShape& shape, double share)
-    : observation_(observation), shape_(shape), share_(share) {
+Objective::Objective(const Observation& observation, const Criterion& criterion, const SeriesShape& shape, double share)
+    : observation_(observation), criterion_(criterion), shape_(shape), share_(share) {
   const codegen::Robot& robot = observation.model().robot();
-  const int terms = 2 * shape.harmonics + 1;
-  const double period = Fourier{shape.frequency_radps, {}}.period_s();
-  t_ = Eigen::VectorXd::LinSpaced(shape.samples, 0, period * (shape.samples - 1) / shape.samples);
-  for (int order = 0; order < 3; ++order)
-    basis_[order] = FourierBasis(t_, shape.frequency_radps, shape.harmonics, order);
-  zero_ = Eigen::MatrixXd::Zero(terms, robot.joints());
+  t_ = Eigen::VectorXd::LinSpaced(shape.samples, 0, shape.period_s * (shape.samples - 1) / shape.samples);
+  for (int order = 0; order < 3; ++order) basis_[order] = Basis(shape.family, t_, shape.period_s, shape.terms, order);
+  zero_ = Eigen::MatrixXd::Zero(shape.terms + 1, robot.joints());
   unit_ = zero_;
+  Eigen::RowVectorXd peak[3];  // of each term
+  for (int order = 0; order < 3; ++order) peak[order] = basis_[order].cwiseAbs().colwise().maxCoeff();
   for (int j = 0; j < robot.joints(); ++j) {
     const codegen::Joint& joint = robot.joint[j];
     const auto [low, high] = joint.position_limit_rad;
-    for (int l = 1; l <= shape.harmonics; ++l) {
-      const double w = shape.frequency_radps * l;
-      unit_(l - 1, j) = unit_(shape.harmonics + l - 1, j) =
-          std::min({joint.speed_limit_radps, joint.acceleration_limit_radps2 / w, w * (high - low) / 2}) / 2;
-    }
-    unit_(terms - 1, j) = (high - low) / 4;
-    zero_(terms - 1, j) = (low + high) / 2;
+    for (int i = 0; i < shape.terms; ++i)
+      unit_(i, j) = std::min({(high - low) / (2 * peak[0][i]), joint.speed_limit_radps / peak[1][i],
+                              joint.acceleration_limit_radps2 / peak[2][i]}) /
+                    2;
+    unit_(shape.terms, j) = (high - low) / 4;
+    zero_(shape.terms, j) = (low + high) / 2;
   }
 }
 
-Fourier Objective::Series(const Eigen::VectorXd& u) const {
+Series Objective::Series(const Eigen::VectorXd& u) const {
   const Eigen::Map<const Eigen::MatrixXd> table(u.data(), unit_.rows(), unit_.cols());
-  return {shape_.frequency_radps, zero_ + unit_.cwiseProduct(table)};
+  return {shape_.family, shape_.period_s, zero_ + unit_.cwiseProduct(table)};
+}
+
+codegen::Signals Objective::Motion(const Eigen::VectorXd& u) const {
+  const Eigen::MatrixXd coefficient = Series(u).coefficient;
+  codegen::Signals s;
+  s.t = t_;
+  s.q = basis_[0] * coefficient, s.qd = basis_[1] * coefficient, s.qdd = basis_[2] * coefficient;
+  return s;
 }
 
 // d_gram: derivative by the Gram matrix of all model columns (zero where a column is not asked for).
-double Objective::LogCondition(Eigen::MatrixXd& d_gram) const {
-  const Eigen::MatrixXd gram = observation_.Gram(row_, shape_.samples);
-  const Eigen::VectorXd diagonal = gram.diagonal();
-  if (!(diagonal.minCoeff() > 0)) return kInfinity;
-  const Eigen::MatrixXd scaled = Equilibrated(gram);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
-  const Eigen::ArrayXd value = solver.eigenvalues();  // s^2
-  if (!(value[0] > 1e-12)) return kInfinity;
-  const Eigen::ArrayXd up = value.pow(kNorm / 2), down = value.pow(-kNorm / 2);
-  const Eigen::VectorXd d_value = (up / up.sum() - down / down.sum()) / (2 * value);
-  const Eigen::MatrixXd d_scaled = solver.eigenvectors() * d_value.asDiagonal() * solver.eigenvectors().transpose();
-  const Eigen::VectorXd scale = diagonal.cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd d_asked = scale.asDiagonal() * d_scaled * scale.asDiagonal();
-  // The scaling, too, follows the diagonal.
-  d_asked.diagonal() -= (d_scaled.cwiseProduct(scaled).rowwise().sum()).cwiseQuotient(diagonal);
+double Objective::SmoothFigure(Eigen::MatrixXd& d_gram) const {
+  Eigen::MatrixXd d_asked;
+  const double value = excitation::SmoothFigure(criterion_, observation_.Gram(row_, shape_.samples), d_asked);
+  if (!std::isfinite(value)) return value;
   d_gram.setZero(observation_.model().columns(), observation_.model().columns());
   d_gram(observation_.columns(), observation_.columns()) = d_asked;
-  return (std::log(up.sum()) + std::log(down.sum())) / kNorm;
+  return value;
 }
 
 double Objective::Penalties(const codegen::Signals& s, Adjoint& adjoint) const {
@@ -122,18 +114,15 @@ void Objective::Perturb(const codegen::Signals& s) {
 
 double Objective::operator()(const Eigen::VectorXd& u, Eigen::VectorXd& gradient) {
   const int n = static_cast<int>(unit_.cols()), samples = shape_.samples;
-  const Eigen::MatrixXd coefficient = Series(u).coefficient;
-  codegen::Signals s;
-  s.t = t_;
-  s.q = basis_[0] * coefficient, s.qd = basis_[1] * coefficient, s.qdd = basis_[2] * coefficient;
+  const codegen::Signals s = Motion(u);
   Perturb(s);
   observation_.Rows(perturbed_, row_);
 
   Eigen::MatrixXd d_gram, d_torque = Eigen::MatrixXd::Zero(samples, n);
   Adjoint adjoint{d_torque, d_torque, d_torque};
-  const double condition = LogCondition(d_gram);
-  if (!std::isfinite(condition)) return kInfinity;
-  const double value = condition + Penalties(s, adjoint) + TorquePenalty(d_torque);
+  const double figure = SmoothFigure(d_gram);
+  if (!std::isfinite(figure)) return figure;
+  const double value = figure + Penalties(s, adjoint) + TorquePenalty(d_torque);
 
   // Each state variable moves the rows of its own sample only: value's derivative by the rows, times the rows'
   // quotient.
@@ -155,6 +144,15 @@ double Objective::operator()(const Eigen::VectorXd& u, Eigen::VectorXd& gradient
   const Eigen::MatrixXd d_u = unit_.cwiseProduct(d_coefficient);
   gradient = Eigen::Map<const Eigen::VectorXd>(d_u.data(), d_u.size());
   return value;
+}
+
+double Objective::operator()(const Eigen::VectorXd& u) {
+  const codegen::Signals s = Motion(u);
+  observation_.Rows(s, row_);
+  Eigen::MatrixXd d_gram, d_torque = Eigen::MatrixXd::Zero(shape_.samples, unit_.cols());
+  Adjoint adjoint{d_torque, d_torque, d_torque};
+  const double figure = SmoothFigure(d_gram);
+  return std::isfinite(figure) ? figure + Penalties(s, adjoint) + TorquePenalty(d_torque) : figure;
 }
 
 }  // namespace armcal::excitation

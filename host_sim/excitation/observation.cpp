@@ -1,10 +1,10 @@
 // excitation - weighted regressor, its Gram matrix and condition number; knows no trajectory family.
 #include "host_sim/excitation/observation.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <cmath>
-#include <limits>
+
+#include "host_sim/excitation/criterion.hpp"
+#include "host_sim/io/input_error.hpp"
 
 namespace armcal::excitation {
 namespace {
@@ -16,7 +16,7 @@ bool MotionAloneExcites(const codegen::Model& model, const std::string& effect) 
     if (e.record->name != effect) continue;
     for (const std::string& input : e.record->inputs)
       if (input == "temp" || input == "t" || input == "flag") return false;
-    return e.record->kind_class != "run_state";
+    return e.record->kind_class == "static";
   }
   return true;
 }
@@ -89,23 +89,33 @@ Eigen::MatrixXd Observation::Gram(const std::vector<Eigen::MatrixXd>& row, Eigen
   return all(column_, column_);
 }
 
-double Observation::ConditionNumber(const codegen::Signals& s) const {
+Eigen::MatrixXd Observation::Gram(const codegen::Signals& s) const {
   const auto asked = static_cast<Eigen::Index>(column_.size());
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(asked, asked);
   ForEachPiece(*this, s,
                [&](Eigen::Index, const std::vector<Eigen::MatrixXd>& row) { gram += Gram(row, row[0].rows()); });
-  if (!(gram.diagonal().minCoeff() > 0)) return std::numeric_limits<double>::infinity();
-  const Eigen::VectorXd value =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Equilibrated(gram), Eigen::EigenvaluesOnly).eigenvalues();
-  const double smallest = value[0], largest = value[asked - 1];
-  // Squaring K halves the digits: below this the smallest eigenvalue is round-off.
-  const bool singular = smallest < largest * static_cast<double>(asked) * std::numeric_limits<double>::epsilon();
-  return singular ? std::numeric_limits<double>::infinity() : std::sqrt(largest / smallest);
+  return gram;
 }
 
-Eigen::MatrixXd Equilibrated(const Eigen::MatrixXd& gram) {
-  const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseInverse();
-  return scale.asDiagonal() * gram * scale.asDiagonal();
+double Observation::ConditionNumber(const codegen::Signals& s) const { return Figure({}, Gram(s)); }
+
+std::vector<int> Observation::Places(const std::vector<std::string>& effects) const {
+  std::vector<int> places;
+  for (const std::string& name : effects) {
+    const auto colon = name.find(':');
+    const std::string effect = name.substr(0, colon), joint = colon == name.npos ? "" : name.substr(colon + 1);
+    const std::size_t before = places.size();
+    for (std::size_t k = 0; k < column_.size(); ++k) {
+      if (model_.is_rigid(column_[k])) continue;
+      const codegen::TableParameter& p = model_.table()[model_.table_index(column_[k])];
+      if (p.effect == effect && (joint.empty() || joint == std::to_string(p.joint + 1)))
+        places.push_back(static_cast<int>(k));
+    }
+    if (places.size() == before)
+      throw io::InputError(model_.robot().path + ": no estimated column of " + name +
+                           "; expected an effect of the model, or effect:joint");
+  }
+  return places;
 }
 
 }  // namespace armcal::excitation

@@ -16,7 +16,8 @@ class Observation {
   enum class Rotors { kAsked, kLeftOut };
 
   // Left out are columns whose state is not `estimated`, and effects that motion alone does not excite: those that look
-  // at temperature, time or a flag, and states of the run. Rotors::kLeftOut: without the rotor inertias, as in the
+  // at temperature, time or a flag, states of the run, and effects with memory (a row then depends on all samples
+  // before). Rotors::kLeftOut: without the rotor inertias, as in the
   // survey. The model must outlive the observation.
   explicit Observation(const codegen::Model& model, Rotors rotors = Rotors::kAsked);
 
@@ -35,8 +36,16 @@ class Observation {
   // sum_i K_i' K_i / noise_i^2 over the columns asked for, of the first `samples` rows.
   Eigen::MatrixXd Gram(const std::vector<Eigen::MatrixXd>& row, Eigen::Index samples) const;
 
-  // cond(K); infinite if a column is zero or K is singular to working precision. Long motions are taken piece by piece.
+  // The same over a whole motion, piece by piece.
+  Eigen::MatrixXd Gram(const codegen::Signals& s) const;
+
+  // cond(K); infinite if a column is zero or K is singular to working precision.
   double ConditionNumber(const codegen::Signals& s) const;
+
+  // Places among columns() of the friction and effects of these names, "coulomb_viscous" for Coulomb and viscous
+  // friction, "stribeck" or "stribeck:3" for an effect on every joint or on joint 3. InputError: a name without a
+  // column.
+  std::vector<int> Places(const std::vector<std::string>& effects) const;
 
  private:
   const codegen::Model& model_;
@@ -44,8 +53,5 @@ class Observation {
   std::vector<std::string> left_out_;
   Eigen::VectorXd mean_;
 };
-
-// G with its diagonal scaled to one: the Gram matrix of unit columns.
-Eigen::MatrixXd Equilibrated(const Eigen::MatrixXd& gram);
 
 }  // namespace armcal::excitation

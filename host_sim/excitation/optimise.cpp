@@ -1,23 +1,24 @@
-// excitation - random starts and local searches on threads; knows no file and no drive.
+// excitation - random starts and searches on threads; knows no file and no drive.
 #include "host_sim/excitation/optimise.hpp"
 
 #include <chrono>
 #include <cmath>
-#include <exception>
 #include <mutex>
 #include <random>
-#include <thread>
 
-#include "host_sim/excitation/minimise.hpp"
 #include "host_sim/excitation/peaks.hpp"
 #include "host_sim/io/input_error.hpp"
+#include "host_sim/search/genetic.hpp"
+#include "host_sim/search/minimise.hpp"
+#include "host_sim/search/parallel.hpp"
 
 namespace armcal::excitation {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kTries = 50;  // starts without a series within the limits, when time is up, before giving up
+constexpr double kRange = 2;  // of the genes, in units of u: beyond, some limit is passed
+constexpr int kTries = 50;    // starts without a series within the limits, when time is up, before giving up
 
 Eigen::VectorXd RandomStart(int size, std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -37,18 +38,18 @@ std::uint64_t StartSeed(std::uint64_t seed, int start) {
 // The best series so far; equal ones in favour of the earlier start, so that threads do not decide.
 class Best {
  public:
-  Best() { found_.condition = std::numeric_limits<double>::infinity(); }
+  Best() { found_.figure = std::numeric_limits<double>::infinity(); }
 
-  void Offer(const Fourier& series, double condition, int start, const OptimiseSettings& settings) {
+  void Offer(const Series& series, double figure, int start, const OptimiseSettings& settings) {
     const std::lock_guard lock(mutex_);
     ++found_.starts;
-    if (condition < found_.condition || (condition == found_.condition && start < start_))
-      found_.series = series, found_.condition = condition, start_ = start;
-    if (settings.progress) settings.progress(found_.starts, found_.condition);
+    if (figure < found_.figure || (figure == found_.figure && start < start_))
+      found_.series = series, found_.figure = figure, start_ = start;
+    if (settings.progress) settings.progress(found_.starts, found_.figure);
   }
   bool empty() {
     const std::lock_guard lock(mutex_);
-    return !std::isfinite(found_.condition);
+    return !std::isfinite(found_.figure);
   }
   const Optimum& found() const { return found_; }  // when the threads are done
 
@@ -58,18 +59,40 @@ class Best {
   int start_ = 0;
 };
 
+// The unknowns that one search ends with.
+Eigen::VectorXd SearchFrom(Objective& objective, Search search, std::uint64_t seed, const std::function<bool()>& stop) {
+  if (search == Search::kGradient) {
+    Eigen::VectorXd u = RandomStart(objective.size(), seed);
+    search::MinimiseSettings local;
+    local.stop = stop;
+    search::Minimise([&](const Eigen::VectorXd& x, Eigen::VectorXd& gradient) { return objective(x, gradient); }, local,
+                     u);
+    return u;
+  }
+  const auto scaled = [](const Eigen::VectorXd& x) -> Eigen::VectorXd { return kRange * (2 * x.array() - 1); };
+  search::GeneticSettings genetic;
+  genetic.individuals = 60;
+  genetic.seed = seed;
+  genetic.stop = stop;
+  return scaled(
+      search::MinimiseGenetic([&](const Eigen::VectorXd& x) { return objective(scaled(x)); }, objective.size(), genetic)
+          .x);
+}
+
 }  // namespace
 
-double PeriodCondition(const Observation& observation, const Fourier& series) {
-  constexpr int kSamples = 1000;
-  const double period = series.period_s();
-  return observation.ConditionNumber(
-      series.At(Eigen::VectorXd::LinSpaced(kSamples, 0, period * (kSamples - 1) / kSamples)));
+Eigen::MatrixXd PeriodGram(const Observation& observation, const Series& series) {
+  return observation.Gram(series.At(
+      Eigen::VectorXd::LinSpaced(kPeriodSamples, 0, series.period_s * (kPeriodSamples - 1) / kPeriodSamples)));
+}
+
+double PeriodCondition(const Observation& observation, const Series& series) {
+  return Figure({}, PeriodGram(observation, series));
 }
 
 bool RandomSeries(const Observation& observation, const OptimiseSettings& settings, std::uint64_t seed,
-                  Fourier& series) {
-  Objective objective(observation, settings.shape, 1 - settings.margin);
+                  Series& series) {
+  Objective objective(observation, settings.criterion, settings.shape, 1 - settings.margin);
   series = objective.Series(RandomStart(objective.size(), seed));
   return ScaleToLimits(observation, 1 - settings.margin, series);
 }
@@ -78,34 +101,18 @@ Optimum Optimise(const Observation& observation, const OptimiseSettings& setting
   const auto end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(settings.seconds));
   const auto stop = [&] { return Clock::now() >= end || (settings.stop && *settings.stop); };
-  MinimiseSettings local;
-  local.stop = stop;
   Best best;
   std::atomic<int> next{0};
-  std::exception_ptr failure;
-  std::mutex failure_mutex;
 
-  const auto search = [&] {
-    try {
-      Objective objective(observation, settings.shape, 1 - settings.margin);
-      // Out of time, starts are still scaled to the limits until one keeps them: there is an answer whatever the time.
-      for (int start; (start = next++) < settings.starts && (!stop() || (start < kTries && best.empty()));) {
-        Eigen::VectorXd u = RandomStart(objective.size(), StartSeed(settings.seed, start));
-        Minimise(std::ref(objective), local, u);
-        Fourier series = objective.Series(u);
-        if (ScaleToLimits(observation, 1 - settings.margin, series))
-          best.Offer(series, PeriodCondition(observation, series), start, settings);
-      }
-    } catch (...) {
-      const std::lock_guard lock(failure_mutex);
-      failure = std::current_exception();
+  search::InParallel(settings.threads, settings.threads, [&](int) {
+    Objective objective(observation, settings.criterion, settings.shape, 1 - settings.margin);
+    // Out of time, starts are still scaled to the limits until one keeps them: there is an answer whatever the time.
+    for (int start; (start = next++) < settings.starts && (!stop() || (start < kTries && best.empty()));) {
+      Series series = objective.Series(SearchFrom(objective, settings.search, StartSeed(settings.seed, start), stop));
+      if (ScaleToLimits(observation, 1 - settings.margin, series))
+        best.Offer(series, Figure(settings.criterion, PeriodGram(observation, series)), start, settings);
     }
-  };
-  std::vector<std::thread> helpers;
-  for (int k = 1; k < settings.threads; ++k) helpers.emplace_back(search);
-  search();
-  for (std::thread& helper : helpers) helper.join();
-  if (failure) std::rethrow_exception(failure);
+  });
   if (best.empty())
     throw io::InputError(
         observation.model().robot().path +

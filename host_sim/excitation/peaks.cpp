@@ -52,9 +52,9 @@ codegen::Signals Sampled(const TrajectorySpline& spline, double step_s) {
   return s;
 }
 
-bool ScaleToLimits(const Observation& observation, double share, Fourier& series) {
+bool ScaleToLimits(const Observation& observation, double share, Series& series) {
   const codegen::Robot& robot = observation.model().robot();
-  const auto points = static_cast<Eigen::Index>(std::ceil(series.period_s() / kCheckStep_s));
+  const auto points = static_cast<Eigen::Index>(std::ceil(series.period_s / kCheckStep_s));
   const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(points, 0, kCheckStep_s * static_cast<double>(points - 1));
   const auto keeps = [&](double factor) { return Keeps(FindPeaks(observation, series.Scaled(factor).At(t)), share); };
 
@@ -63,7 +63,7 @@ bool ScaleToLimits(const Observation& observation, double share, Fourier& series
   const std::vector<JointPeaks> peaks = FindPeaks(observation, series.At(t));
   for (int j = 0; j < robot.joints(); ++j) {
     const auto [low, high] = robot.joint[j].position_limit_rad;
-    const double q0 = series.coefficient(2 * series.harmonics(), j), half = (high - low) / 2;
+    const double q0 = series.offset()[j], half = (high - low) / 2;
     const double room_up = (low + high) / 2 + share * half - q0, room_down = q0 - (low + high) / 2 + share * half;
     if (room_up <= 0 || room_down <= 0) return false;
     const JointPeaks& p = peaks[j];

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "host_sim/excitation/fourier.hpp"
 #include "host_sim/excitation/observation.hpp"
+#include "host_sim/excitation/series.hpp"
 #include "host_sim/excitation/trajectory.hpp"
 
 namespace armcal::excitation {
@@ -32,6 +32,6 @@ codegen::Signals Sampled(const TrajectorySpline& spline, double step_s = kCheckS
 
 // The series with its amplitude reduced (never enlarged) until every share is at most `share` on the check grid over
 // one period. False: not even the pose q0 keeps it.
-bool ScaleToLimits(const Observation& observation, double share, Fourier& series);
+bool ScaleToLimits(const Observation& observation, double share, Series& series);
 
 }  // namespace armcal::excitation

@@ -32,7 +32,7 @@ h3{font-size:1.02rem;margin:1.5rem 0 .4rem}p{margin:.5rem 0;max-width:48rem}ul{m
 caption{text-align:left;min-width:min(30rem,85vw);color:var(--soft);padding-bottom:.3rem}
 th,td{padding:.28rem 1.1rem .28rem 0;text-align:left;border-bottom:1px solid var(--rule);vertical-align:top}
 th{font-weight:600;border-bottom:1.5px solid var(--soft)}
-.n{text-align:right;font-variant-numeric:tabular-nums}
+.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
 pre{background:var(--faint);padding:.7rem 1rem;overflow-x:auto;border-radius:4px;font-size:.88rem}
 details{margin:.7rem 0}summary{cursor:pointer;color:var(--soft)}
 figure{margin:1rem 0}figcaption{color:var(--soft);font-size:.9rem;margin-top:.2rem;max-width:48rem}

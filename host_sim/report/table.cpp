@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <string_view>
 
 namespace armcal::report {
 namespace {
@@ -12,10 +13,13 @@ std::size_t Letters(const std::string& text) {
       std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
 }
 
+// A number, with a unit of % or an interval behind it.
 bool LooksNumeric(const std::string& cell) {
   if (cell.empty() || cell == "-") return true;
   char* end = nullptr;
   std::strtod(cell.c_str(), &end);
+  const std::string_view rest = end;
+  if (end != cell.c_str() && (rest.starts_with(" ±") || rest.starts_with(" ["))) return true;
   return *end == '\0' || (*end == '%' && end[1] == '\0') || (*end == ' ' && end[1] == '%' && end[2] == '\0');
 }
 

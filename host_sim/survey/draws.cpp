@@ -2,8 +2,11 @@
 #include "host_sim/survey/draws.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <mutex>
 
+#include "host_sim/search/parallel.hpp"
 #include "host_sim/survey/platform.hpp"
 
 namespace armcal::survey {
@@ -12,7 +15,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kSlow_s = 1;       // a method whose solve takes longer is slow
 constexpr double kSurveyStart = 1;  // qs in rad/s where the survey's own filters start, which it does not print
 // Standard deviations of DrawStribeck's draws, relative to what is believed before.
 constexpr double kLogSpeed = 0.4, kBreakaway = 0.46;
@@ -48,44 +50,58 @@ calibration::Problem ProblemFor(const std::string& method, const codegen::Model&
 
 double Growth(double without, double with) { return (with - without) / without; }
 
-struct Place {
-  const calibration::Method* method;
-  Outcome outcome;
-  double seconds = 0;
-  bool over = false;
+// Of one method on one draw; [0] without noise, [1] with.
+struct Solved {
+  std::optional<Score> score[2];
+  calibration::Solution solution[2];
+  int failed = 0;
+  std::string why;
 };
 
-// Both solves of one method on one draw.
-void RunOne(const Settings& settings, const DrawSettings& draws, const Truth& truth, const codegen::Model& prior,
-            const calibration::Dataset& clean, const calibration::Dataset& noisy, Place& place) {
-  Outcome& out = place.outcome;
+Solved SolveBoth(const Settings& settings, const DrawSettings& draws, const Truth& truth, const codegen::Model& prior,
+                 const calibration::Dataset& clean, const calibration::Dataset& noisy,
+                 const calibration::Method& method) {
+  Solved out;
   const VectorXd bodies = calibration::BodyMean(prior);
-  std::optional<Score> score[2];
   for (int with_noise = 0; with_noise < 2; ++with_noise) {
     const calibration::Dataset& log = with_noise ? noisy : clean;
     const VectorXd sigma = truth.sigma_Nm * (with_noise ? 1 : draws.clean_sigma);
-    calibration::Problem problem = ProblemFor(place.method->name, prior, log, draws, sigma);
+    calibration::Problem problem = ProblemFor(method.name, prior, log, draws, sigma);
     problem.stop = settings.stop;
-    Attempt attempt = Try(*place.method, problem);
+    Attempt attempt = Try(method, problem);
     if (!attempt.solution) {
       out.why = attempt.why;
-      place.over = true;
-      return;
+      return out;
     }
-    place.seconds = std::max(place.seconds, attempt.solution->seconds);
     if (!attempt.solution->z.allFinite()) {
       ++out.failed;
-      if (out.why.empty()) out.why = attempt.solution->remark;
+      out.why = attempt.solution->remark;
       continue;
     }
-    score[with_noise] = Judge(truth, settings.levels, log.tau, *attempt.solution, bodies);
-    (with_noise ? out.noisy : out.clean).push_back(*score[with_noise]);
-    calibration::Solution& first = with_noise ? out.first_noisy : out.first;
-    if (first.z.size() == 0) first = *std::move(attempt.solution);
+    out.score[with_noise] = Judge(truth, settings.levels, log.tau, *attempt.solution, bodies);
+    attempt.solution->path.resize(0, 0);
+    out.solution[with_noise] = *std::move(attempt.solution);
   }
-  if (!score[0] || !score[1]) return;
-  out.delta.push_back(Growth(score[0]->J_e, score[1]->J_e));
-  out.delta_true.push_back(Growth(score[0]->J_true, score[1]->J_true));
+  return out;
+}
+
+void Append(Solved solved, Outcome& out) {
+  out.failed += solved.failed;
+  if (out.why.empty()) out.why = solved.why;
+  for (int with_noise = 0; with_noise < 2; ++with_noise) {
+    if (!solved.score[with_noise]) continue;
+    (with_noise ? out.noisy : out.clean).push_back(*solved.score[with_noise]);
+    calibration::Solution& first = with_noise ? out.first_noisy : out.first;
+    if (first.z.size() == 0) first = std::move(solved.solution[with_noise]);
+  }
+  if (!solved.score[0] || !solved.score[1]) return;
+  out.delta.push_back(Growth(solved.score[0]->J_e, solved.score[1]->J_e));
+  out.delta_true.push_back(Growth(solved.score[0]->J_true, solved.score[1]->J_true));
+}
+
+// Takes seconds where others take milliseconds.
+bool Slow(const std::string& method) {
+  return method == "gradient_descent" || method == "genetic" || method == "particle_filter";
 }
 
 }  // namespace
@@ -95,41 +111,51 @@ bool Settings::Wants(const std::string& table) const {
 }
 
 std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck) {
-  const excitation::Fourier& train = law == Law::kStribeck ? motions.nonlinear.series : motions.linear.series;
+  const excitation::Series& train = law == Law::kStribeck ? motions.nonlinear.series : motions.linear.series;
   return std::make_unique<Truth>(
       codegen::Model(Variant(settings.robot, law, Bodies::kStandard, stribeck), settings.records), Sampled(train),
       Sampled(motions.other));
 }
 
 std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, const DrawSettings& draws,
-                              const std::vector<std::string>& methods, std::vector<std::string>& missing) {
-  std::vector<Place> places;
-  for (const std::string& name : methods)
-    if (const calibration::Method* method = Find(name, missing))
-      places.push_back({method, {method->name, method->title, method->equation, {}, {}, {}, {}, {}, {}, 0, ""}});
-
+                              const std::vector<std::string>& methods) {
   const int joints = settings.robot.joints();
-  std::unique_ptr<Truth> truth = MakeTruth(settings, motions, draws.law, SetStribeck(joints));
-  for (int d = 0; d < draws.draws && !settings.Stopped(); ++d) {
+  const std::unique_ptr<Truth> set = MakeTruth(settings, motions, draws.law, SetStribeck(joints));
+  std::vector<std::vector<Solved>> solved(static_cast<std::size_t>(draws.draws));
+  std::atomic<int> done{0};
+  std::mutex line;
+  search::InParallel(draws.draws, 0, [&](int d) {
+    if (settings.Stopped()) return;
     // What CAD says about friction's Stribeck part is centred on the set values, or, for drawn truths, on their range.
     Stribeck believed = SetStribeck(joints);
+    std::unique_ptr<Truth> drawn;
     if (draws.random_truth) {
-      truth = MakeTruth(settings, motions, draws.law, DrawStribeck(joints, SeedOf(draws.seed, d, 3)));
+      drawn = MakeTruth(settings, motions, draws.law, DrawStribeck(joints, SeedOf(draws.seed, d, 3)));
       believed.fs_over_fc.setConstant(1.25);
     }
+    const Truth& truth = drawn ? *drawn : *set;
     const codegen::Robot cad = Variant(settings.robot, draws.law, Bodies::kStandard, believed);
     const codegen::Model prior(DrawPrior(cad, draws.prior, SeedOf(draws.seed, d, 1)), settings.records);
-    const calibration::Dataset clean = Measured(truth->train, truth->tau);
+    const calibration::Dataset clean = Measured(truth.train, truth.tau);
     const calibration::Dataset noisy =
-        Measured(truth->train, truth->tau + Noise(truth->train.samples(), truth->sigma_Nm, SeedOf(draws.seed, d, 2)));
-    for (Place& place : places) {
-      if (place.over || (d >= draws.slow_draws && place.seconds > kSlow_s)) continue;
-      RunOne(settings, draws, *truth, prior, clean, noisy, place);
+        Measured(truth.train, truth.tau + Noise(truth.train.samples(), truth.sigma_Nm, SeedOf(draws.seed, d, 2)));
+    for (const std::string& name : methods) {
+      Solved one;
+      if (!Slow(name) || d < draws.slow_draws)
+        one = SolveBoth(settings, draws, truth, prior, clean, noisy, calibration::FindMethod(name));
+      if (d > 0) one.solution[0] = one.solution[1] = {};  // only the first is shown
+      solved[static_cast<std::size_t>(d)].push_back(std::move(one));
     }
-    settings.progress(LawName(draws.law) + ", " + PriorName(draws.prior), (d + 1.0) / draws.draws);
-  }
+    const std::lock_guard lock(line);
+    settings.progress(LawName(draws.law) + ", " + PriorName(draws.prior), static_cast<double>(++done) / draws.draws);
+  });
   std::vector<Outcome> out;
-  for (Place& place : places) out.push_back(std::move(place.outcome));
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    const calibration::Method& method = calibration::FindMethod(methods[m]);
+    out.push_back({method.name, method.title, method.equation, {}, {}, {}, {}, {}, {}, 0, ""});
+    for (std::vector<Solved>& of_draw : solved)
+      if (m < of_draw.size()) Append(std::move(of_draw[m]), out.back());
+  }
   return out;
 }
 

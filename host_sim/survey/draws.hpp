@@ -21,10 +21,10 @@ struct Settings {
   Printed printed;
   std::string home;      // the folder of codegen/ and host_sim/: channel maps and robots of measured logs
   std::string measured;  // folder of measured logs; empty: Table 12 on real machines is left out
-  int draws = 200;       // of a method that answers within a second
-  int slow_draws = 2;    // of any other
+  int draws = 200;       // of prior, noise and, where drawn, truth
+  int slow_draws = 5;    // of the methods of (25)
   std::uint64_t seed = 1;
-  double search_s = 25;             // of each trajectory search
+  double search_s = 55;             // of each trajectory search at most: given time, results follow from the seed
   std::vector<std::string> tables;  // "5" .. "12", "figures"; empty: all
   const std::atomic<bool>* stop = nullptr;
   std::function<void(const std::string& what, double share)> progress = [](const std::string&, double) {};
@@ -36,14 +36,15 @@ struct Settings {
 // The trajectories that all tables share.
 struct Motions {
   ExcitedBy linear, nonlinear;
-  excitation::Fourier other;  // nothing is fitted to it
+  std::vector<ExcitedBy> others;  // for the table of trajectories alone
+  excitation::Series other;       // nothing is fitted to it
 };
 
 struct DrawSettings {
   Law law = Law::kCoulombViscous;
   PriorError prior;
   bool random_truth = false;  // qs and Fs / Fc of (4) drawn, too
-  int draws = 20, slow_draws = 2;
+  int draws = 20, slow_draws = 5;
   std::uint64_t seed = 1;
   double clean_sigma = 1;  // of Table 7's sigma, told to a method for noise-free data
 };
@@ -61,8 +62,8 @@ struct Outcome {
 // The Truth of the first draw (all draws, unless random_truth).
 std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck);
 
-// Methods that do not exist go to `missing`. A method whose solves take over a second gets `slow_draws`.
+// On all cores. The methods of (25) take seconds each and get `slow_draws`.
 std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, const DrawSettings& draws,
-                              const std::vector<std::string>& methods, std::vector<std::string>& missing);
+                              const std::vector<std::string>& methods);
 
 }  // namespace armcal::survey

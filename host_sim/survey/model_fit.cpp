@@ -6,18 +6,13 @@ namespace armcal::survey {
 ModelFit FitModel(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
                   const std::atomic<bool>* stop) {
   ModelFit fit;
-  std::vector<std::string> missing;
-  const calibration::Method* method =
-      Find(model.nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse", missing);
-  if (!method) {
-    fit.why = "no method " + missing.front();
-    return fit;
-  }
+  const calibration::Method& method =
+      calibration::FindMethod(model.nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse");
   calibration::Problem problem = calibration::MakeProblem(model, std::move(train));
   problem.covariance.resize(0, 0);
   problem.stop = stop;
-  Attempt attempt = Try(*method, problem);
-  fit.method = method->title;
+  Attempt attempt = Try(method, problem);
+  fit.method = method.title;
   if (attempt.solution && attempt.solution->z.allFinite()) fit.z = attempt.solution->z;
   else fit.why = attempt.solution ? attempt.solution->remark : attempt.why;
   return fit;

@@ -103,25 +103,34 @@ report::Plot Positions(const ExcitedBy& e, const std::string& title) {
 void ShowTrajectories(const Settings& settings, const Motions& motions, Findings& out) {
   Sheet sheet{
       "trajectories",
-      "condition number of K, (26), for series (27) with L = 5, 0.1 Hz, an offset a joint",
-      {"model", "columns", "cond(K)", "printed", "columns unscaled", "rows unweighted", "largest share of a limit",
-       "search / s", "searches"},
+      "condition number of K, (26); ten coefficients a joint (Fourier series (27): L = 5), 0.1 Hz, an offset a joint",
+      {"model", "curve", "search", "minimised", "columns", "cond(K)", "printed", "columns unscaled", "rows unweighted",
+       "all sd", "friction sd", "largest share of a limit", "search / s", "searches"},
       {},
       {"cond(K): base parameters and friction (for (4) the derivatives by Fc, Fs, qs, beta at the set values), rows "
        "divided by the torque noise of their joint, columns scaled to unit norm, 1000 samples of one period. The "
        "survey does not say what it scales; with 60 standard columns K is singular.",
+       "all sd: det(K' R^-1 K)^(-1/2n), the D-optimal figure; friction sd: geometric mean of the standard deviations "
+       "of the friction columns, all others unknown, too. Compare them within a model only.",
        "Limits: position, speed, acceleration, torque of the robot file on a 1 ms grid."}};
+  const auto add = [&](const ExcitedBy& e, const Cell& printed) {
+    constexpr const char* kMinimised[] = {"cond(K)", "all sd", "friction sd"};
+    sheet.rows.push_back({LawName(e.law == Law::kGradient ? Law::kStribeck : e.law), excitation::Name(e.family),
+                          e.search == excitation::Search::kGenetic ? "genetic" : "gradient",
+                          kMinimised[static_cast<int>(e.criterion)], static_cast<double>(e.columns), e.condition,
+                          printed, e.raw, e.unweighted, e.all_sd, e.friction_sd, e.share, e.seconds,
+                          static_cast<double>(e.searches)});
+  };
   for (const bool nonlinear : {false, true}) {
     const ExcitedBy& e = nonlinear ? motions.nonlinear : motions.linear;
     const char* const name = nonlinear ? "nonlinear" : "linear";
-    sheet.rows.push_back({nonlinear ? "(4)" : "(7)", static_cast<double>(e.columns), e.condition,
-                          settings.printed.At("condition", name, 0), e.raw, e.unweighted, e.share, e.seconds,
-                          static_cast<double>(e.searches)});
+    add(e, settings.printed.At("condition", name, 0));
     const std::string where = std::string(name) + " trajectory, " + std::to_string(e.columns) + " columns: ";
     out.goals.push_back({where + "cond(K), rows / sigma, unit columns", e.condition, nonlinear ? 5.0 : 4.6, true});
     out.goals.push_back({where + "largest share of a limit on a 1 ms grid", e.share, 1, true});
     out.goals.push_back({where + "search / s", e.seconds, 60, true});
   }
+  for (const ExcitedBy& e : motions.others) add(e, "-");
   out.sheets.push_back(sheet);
   out.pictures.push_back({"2",
                           "optimised trajectories",

@@ -9,7 +9,7 @@ namespace armcal::survey {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-codegen::Signals Sampled(const excitation::Fourier& series, int samples) {
+codegen::Signals Sampled(const excitation::Series& series, int samples) {
   return series.At(VectorXd::LinSpaced(samples, 0, (samples - 1) / kRate_Hz));
 }
 

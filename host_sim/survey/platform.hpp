@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "host_sim/calibration/dataset.hpp"
-#include "host_sim/excitation/fourier.hpp"
+#include "host_sim/excitation/series.hpp"
 
 namespace armcal::survey {
 
@@ -15,7 +15,7 @@ inline constexpr double kRate_Hz = 100;
 inline constexpr int kSamples = 1000;
 
 // (27) sampled at 100 Hz from t = 0.
-codegen::Signals Sampled(const excitation::Fourier& series, int samples = kSamples);
+codegen::Signals Sampled(const excitation::Series& series, int samples = kSamples);
 
 // White Gaussian noise, [samples x sigma.size()].
 Eigen::MatrixXd Noise(int samples, const Eigen::VectorXd& sigma, std::uint64_t seed);

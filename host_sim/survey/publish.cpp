@@ -41,6 +41,9 @@ std::string Figure(const Picture& p) {
 std::string TextOf(const Cell& cell) {
   if (!cell.words.empty()) return cell.words;
   if (std::isnan(cell.low)) return report::Number(cell.value, 4);
+  const double up = cell.high - cell.value, down = cell.value - cell.low;
+  if (std::abs(up - down) < 1e-6 * (up + down) || up + down == 0)
+    return fmt::format("{} ± {}", report::Number(cell.value), report::Number(up, 2));
   return fmt::format("{} [{}, {}]", report::Number(cell.value), report::Number(cell.low), report::Number(cell.high));
 }
 
@@ -71,8 +74,7 @@ std::string Json(const Findings& findings, const Settings& settings) {
                    {"seed", settings.seed},
                    {"draws", settings.draws},
                    {"tables", tables},
-                   {"goals", goals},
-                   {"missing_methods", findings.missing}};
+                   {"goals", goals}};
   return all.dump(1) + "\n";
 }
 
@@ -83,10 +85,7 @@ std::string Html(const Findings& findings, const Settings& settings) {
   page.Facts({{"robot file", settings.robot.name},
               {"seed", std::to_string(settings.seed)},
               {"draws", std::to_string(settings.draws) + ", of slow methods " + std::to_string(settings.slow_draws)},
-              {"numbers in brackets", "95 % interval of the mean over draws"}});
-  if (!findings.missing.empty())
-    page.Box(report::Tone::kWarning, "methods that do not exist here",
-             fmt::format("{}", fmt::join(findings.missing, ", ")));
+              {"± and brackets", "95 % interval, of the mean over draws where there are draws"}});
   page.Section("Goals");
   page.Add(GoalTable(findings));
   page.Section("Tables");

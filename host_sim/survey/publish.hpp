@@ -13,7 +13,7 @@ std::string TextOf(const Cell& cell);
 report::Table TableOf(const Sheet& sheet);
 
 // {"robot", "seed", "draws", "tables": {number: {"title", "columns", "rows": [{column: cell}], "notes"}},
-//  "goals": [{"name", "value", "goal", "at_most", "met"}], "missing_methods"}. A cell is a string, a number, null for a
+//  "goals": [{"name", "value", "goal", "at_most", "met"}]}. A cell is a string, a number, null for a
 // number that does not exist, or {"mean", "low", "high"}.
 std::string Json(const Findings& findings, const Settings& settings);
 

@@ -49,7 +49,6 @@ struct Findings {
   std::vector<Sheet> sheets;
   std::vector<Picture> pictures;
   std::vector<Goal> goals;
-  std::vector<std::string> missing;  // methods that a table asks for and that do not exist
 };
 
 }  // namespace armcal::survey

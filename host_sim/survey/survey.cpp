@@ -36,13 +36,40 @@ std::vector<std::string> Both(std::vector<std::string> own, const std::vector<st
 }
 
 std::vector<Outcome> Draws(const Settings& settings, const Motions& motions, Law law,
-                           const std::vector<std::string>& methods, Findings& out) {
+                           const std::vector<std::string>& methods) {
   DrawSettings d;
   d.law = law;
   d.draws = std::min(settings.draws, 20);  // the survey shows one; the priors' table takes all
   d.slow_draws = settings.slow_draws;
   d.seed = settings.seed;
-  return RunDraws(settings, motions, d, methods, out.missing);
+  return RunDraws(settings, motions, d, methods);
+}
+
+// What the tables move along; and, for the table of trajectories, every other curve, search and criterion.
+Motions SearchMotions(const Settings& settings) {
+  using excitation::Criterion, excitation::Family, excitation::Search;
+  Motions motions;
+  const auto excite = [&](ExcitedBy& e, double seconds) {
+    settings.progress("trajectory " + LawName(e.law) + ", " + excitation::Name(e.family), 0);
+    Excite(settings.robot, settings.records, {seconds, settings.seed, settings.stop}, e);
+  };
+  motions.nonlinear.law = Law::kGradient;
+  excite(motions.linear, settings.search_s);
+  excite(motions.nonlinear, settings.search_s);
+  motions.other = Validation(settings.robot, settings.records, settings.seed);
+  if (!settings.Wants("trajectories")) return motions;
+  const auto other = [&](Law law, Family family, Search search, Criterion::Kind criterion) {
+    motions.others.push_back({law, family, search, criterion, {}});
+  };
+  for (const Law law : {Law::kCoulombViscous, Law::kGradient}) {
+    other(law, Family::kFourier, Search::kGenetic, Criterion::Kind::kCondition);
+    other(law, Family::kFourier, Search::kGradient, Criterion::Kind::kDOptimal);
+    other(law, Family::kFourier, Search::kGradient, Criterion::Kind::kAccuracy);
+  }
+  for (const Family family : {Family::kSine, Family::kPolynomial, Family::kSpline})
+    other(Law::kCoulombViscous, family, Search::kGradient, Criterion::Kind::kCondition);
+  for (ExcitedBy& e : motions.others) excite(e, settings.search_s);
+  return motions;
 }
 
 }  // namespace
@@ -69,27 +96,23 @@ Findings RunSurvey(const Settings& asked) {
   settings.records = Records(asked.records);
   Findings out;
   if (settings.Wants("figures")) ShowArm(settings, out);
-  Motions motions;
-  settings.progress("trajectory (7)", 0);
-  const SearchSettings search{settings.search_s, settings.seed, settings.stop};
-  motions.linear = Excite(settings.robot, settings.records, Law::kCoulombViscous, search);
-  settings.progress("trajectory (4)", 0);
-  motions.nonlinear = Excite(settings.robot, settings.records, Law::kGradient, search);
-  motions.other = Validation(settings.robot, settings.records, settings.seed);
+  const Motions motions = SearchMotions(settings);
   ShowTrajectories(settings, motions, out);
 
   Evidence evidence;
   const bool levels = settings.Wants("11");
   if (levels || settings.Wants("5") || settings.Wants("8"))
-    evidence.linear = Draws(settings, motions, Law::kCoulombViscous, Both(OwnLinear(), BetterLinear()), out);
+    evidence.linear = Draws(settings, motions, Law::kCoulombViscous, Both(OwnLinear(), BetterLinear()));
   if (levels || settings.Wants("6") || settings.Wants("9"))
-    evidence.nonlinear = Draws(settings, motions, Law::kStribeck, Both(OwnNonlinear(), BetterNonlinear()), out);
+    evidence.nonlinear = Draws(settings, motions, Law::kStribeck, Both(OwnNonlinear(), BetterNonlinear()));
   ShowParameters(settings, motions, evidence, out);
   ShowErrors(settings, evidence, out);
   ShowInstruments(settings, motions, out);
+  ShowDifferentiation(settings, motions, out);
   if (levels || settings.Wants("figures")) ShowTracking(settings, motions, evidence, out);
   ShowLevels(settings, evidence, out);
   ShowModels(settings, motions, out);
+  ShowLoad(settings, motions, out);
   if (settings.Wants("priors")) ShowPriors(settings, motions, out);
   out.sheets.push_back(Slips());
   return out;

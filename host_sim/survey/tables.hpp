@@ -26,12 +26,15 @@ void ShowParameters(const Settings& settings, const Motions& motions, const Evid
 void ShowErrors(const Settings& settings, const Evidence& evidence, Findings& out);
 // The better methods under every prior, and the goals that they are to reach.
 void ShowPriors(const Settings& settings, const Motions& motions, Findings& out);
-// Table 10.
+// Table 10: in the closed loop, and without one.
+void ShowDifferentiation(const Settings& settings, const Motions& motions, Findings& out);
 void ShowInstruments(const Settings& settings, const Motions& motions, Findings& out);
 // Figure 4; fills in evidence.follow_*.
 void ShowTracking(const Settings& settings, const Motions& motions, Evidence& evidence, Findings& out);
 // Table 11.
 void ShowLevels(const Settings& settings, const Evidence& evidence, Findings& out);
+// What (9) adds to the rigid columns.
+void ShowLoad(const Settings& settings, const Motions& motions, Findings& out);
 // Table 12, simulated and on measured logs.
 void ShowModels(const Settings& settings, const Motions& motions, Findings& out);
 // Figures 1 and 3.

@@ -1,8 +1,11 @@
 // survey - Figure 4: friction that changes while the filter runs; who follows it.
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
+#include <mutex>
 
+#include "host_sim/search/parallel.hpp"
 #include "host_sim/survey/platform.hpp"
 #include "host_sim/survey/tables.hpp"
 
@@ -79,7 +82,7 @@ std::vector<double> List(const VectorXd& v) { return {v.begin(), v.end()}; }
 
 report::Plot PlotOf(const std::string& title, const std::vector<std::pair<std::string, const Run*>>& runs) {
   report::Plot plot;
-  plot.text = {title, "time / s", "viscous friction of joint 3 / N m s/rad", 560, 300};
+  plot.text = {title, "time / s", "viscous friction of joint 3 / N m s/rad", 760, 300};
   const MatrixXd& beta = runs.front().second->beta;
   const std::vector<double> t =
       List(VectorXd::LinSpaced(beta.rows(), 0, static_cast<double>(beta.rows() - 1) / kRate_Hz));
@@ -105,33 +108,44 @@ void ShowTracking(const Settings& settings, const Motions& motions, Evidence& ev
                "in directions that no torque sees, for ever: small mu diverge while the arm moves, larger ones at "
                "rest."}};
   for (const Profile& p : kProfiles) sheet.columns.emplace_back(p.name);
+  constexpr int kFilterCount = std::size(kFilters), kProfileCount = std::size(kProfiles);
+  std::vector<Run> runs(kFilterCount * kProfileCount * kDraws);
+  const auto place = [](int filter, int profile, int draw) {
+    return static_cast<std::size_t>((filter * kProfileCount + profile) * kDraws + draw);
+  };
+  std::atomic<int> done{0};
+  std::mutex line;
+  search::InParallel(static_cast<int>(runs.size()), 0, [&](int k) {
+    if (settings.Stopped()) return;
+    const int f = k / (kProfileCount * kDraws), p = k / kDraws % kProfileCount;
+    runs[static_cast<std::size_t>(k)] =
+        Track(settings, motions, calibration::FindMethod(kFilters[f].method), kFilters[f].mu, kProfiles[p], k % kDraws);
+    const std::lock_guard lock(line);
+    settings.progress("figure 4", static_cast<double>(++done) / static_cast<double>(runs.size()));
+  });
   std::map<std::pair<std::string, std::string>, Run> shown;  // (profile, filter) -> the first draw
-  int done = 0;
-  for (const Filter& f : kFilters) {
-    const calibration::Method* method = Find(f.method, out.missing);
-    if (!method) continue;
-    std::vector<Cell> row{method->title, f.mu > 0 ? Cell(f.mu) : Cell("-")};
-    double slope = 0, step = 0;
-    for (const Profile& p : kProfiles) {
+  for (int k = 0; k < kFilterCount; ++k) {
+    const Filter& f = kFilters[k];
+    std::vector<Cell> row{calibration::FindMethod(f.method).title, f.mu > 0 ? Cell(f.mu) : Cell("-")};
+    std::map<std::string, double> mean;  // by profile
+    for (int p = 0; p < kProfileCount; ++p) {
       std::vector<double> errors;
-      for (int d = 0; d < kDraws && !settings.Stopped(); ++d) {
-        Run run = Track(settings, motions, *method, f.mu, p, d);
-        errors.push_back(FollowError(run.beta, run.found, 1 / kRate_Hz, settings.levels.settle_s));
-        if (d == 0)
-          shown[{p.name, f.method + (f.mu > 0 ? " " + std::to_string(f.mu).substr(0, 5) : "")}] = std::move(run);
+      for (int d = 0; d < kDraws; ++d) {
+        const Run& run = runs[place(k, p, d)];
+        if (run.beta.size() > 0)
+          errors.push_back(FollowError(run.beta, run.found, 1 / kRate_Hz, settings.levels.settle_s));
       }
+      shown[{kProfiles[p].name, f.method + (f.mu > 0 ? " " + std::to_string(f.mu).substr(0, 5) : "")}] =
+          std::move(runs[place(k, p, 0)]);
       const bool diverged = std::any_of(errors.begin(), errors.end(), [](double e) { return !std::isfinite(e); });
       const Statistic s = Summarise(errors);
       row.push_back(diverged ? Cell("diverged") : Cell(s.mean, s.low, s.high));
-      const double value = diverged ? std::numeric_limits<double>::infinity() : s.mean;
-      if (std::string(p.name) == "slope") slope = value;
-      if (std::string(p.name) == "step") step = value;
+      mean[kProfiles[p].name] = diverged || errors.empty() ? std::numeric_limits<double>::infinity() : s.mean;
     }
     sheet.rows.push_back(row);
     const auto known = evidence.follow_slope.find(f.method);
-    if (known == evidence.follow_slope.end() || slope < known->second)
-      evidence.follow_slope[f.method] = slope, evidence.follow_step[f.method] = step;
-    settings.progress("figure 4", static_cast<double>(++done) / static_cast<double>(std::size(kFilters)));
+    if (known == evidence.follow_slope.end() || mean["slope"] < known->second)
+      evidence.follow_slope[f.method] = mean["slope"], evidence.follow_step[f.method] = mean["step"];
   }
   out.sheets.push_back(sheet);
   Picture picture{
@@ -139,10 +153,10 @@ void ShowTracking(const Settings& settings, const Motions& motions, Evidence& ev
   for (const char* profile : {"slope", "second order"}) {
     std::vector<std::pair<std::string, const Run*>> kalman, forgetting;
     for (const auto& [key, run] : shown) {
-      if (key.first != profile) continue;
-      if (key.second == "kalman") kalman.insert(kalman.begin(), {"Kalman filter (19)", &run});
+      if (key.first != profile || run.beta.size() == 0) continue;
+      if (key.second == "kalman") kalman.insert(kalman.begin(), {"(19)", &run});
       if (key.second == "forgetting 0.995" || key.second == "forgetting 0.998")
-        forgetting.emplace_back("exponential forgetting (23), mu " + key.second.substr(11), &run);
+        forgetting.emplace_back("(23), mu " + key.second.substr(11), &run);
       if (key.second == "multiple_model")
         kalman.emplace_back("bank of three", &run), forgetting.emplace_back("bank of three", &run);
     }

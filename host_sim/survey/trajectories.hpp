@@ -5,38 +5,44 @@
 #include <atomic>
 #include <functional>
 
-#include "host_sim/excitation/fourier.hpp"
+#include "host_sim/excitation/optimise.hpp"
 #include "host_sim/survey/arm.hpp"
 
 namespace armcal::survey {
 
+// What to search, and what came out.
 struct ExcitedBy {
-  excitation::Fourier series;
-  std::string law;        // "(7)"
-  int columns = 0;        // of K: base parameters and friction
-  double condition = 0;   // rows divided by sigma, columns scaled to unit norm
-  double raw = 0;         // rows divided by sigma, columns as they are
-  double unweighted = 0;  // rows as they are, columns scaled to unit norm
-  double share = 0;       // the largest share of any position, speed, acceleration or torque limit on a 1 ms grid
-  double seconds = 0;     // the search took
+  Law law = Law::kCoulombViscous;  // kCoulombViscous (48 columns) or kGradient (60 columns)
+  excitation::Family family = excitation::Family::kFourier;
+  excitation::Search search = excitation::Search::kGradient;
+  excitation::Criterion::Kind criterion = excitation::Criterion::Kind::kCondition;  // kAccuracy: of friction
+
+  excitation::Series series;
+  int columns = 0;         // of K: base parameters and friction
+  double condition = 0;    // rows divided by sigma, columns scaled to unit norm
+  double raw = 0;          // rows divided by sigma, columns as they are
+  double unweighted = 0;   // rows as they are, columns scaled to unit norm
+  double all_sd = 0;       // the D-optimal figure: geometric mean over all of K's axes, units of the columns
+  double friction_sd = 0;  // geometric mean of the standard deviations of friction's columns
+  double share = 0;        // the largest share of any position, speed, acceleration or torque limit on a 1 ms grid
+  double seconds = 0;      // the search took
   int searches = 0;
 };
 
 struct SearchSettings {
-  double seconds = 25;
+  double seconds = 55;  // at most; the number of starts is fixed, so that with time enough the seed decides alone
   std::uint64_t seed = 1;
   const std::atomic<bool>* stop = nullptr;
 };
 
-// L = 5, w_f = 2 pi 0.1 rad/s, offset allowed. law: kCoulombViscous (48 columns) or kGradient (60 columns).
-ExcitedBy Excite(const codegen::Robot& file, const codegen::Catalogue& records, Law law,
-                 const SearchSettings& settings);
+// Ten coefficients a joint (Fourier: L = 5), period 10 s, offset allowed; fills in what came out.
+void Excite(const codegen::Robot& file, const codegen::Catalogue& records, const SearchSettings& settings,
+            ExcitedBy& excited);
 
-// The figures of `found` for a series from elsewhere.
-ExcitedBy Examine(const codegen::Robot& file, const codegen::Catalogue& records, Law law,
-                  const excitation::Fourier& series);
+// Fills in the figures of excited.series.
+void Examine(const codegen::Robot& file, const codegen::Catalogue& records, ExcitedBy& excited);
 
 // A trajectory that nothing was fitted to: a random series within the limits.
-excitation::Fourier Validation(const codegen::Robot& file, const codegen::Catalogue& records, std::uint64_t seed);
+excitation::Series Validation(const codegen::Robot& file, const codegen::Catalogue& records, std::uint64_t seed);
 
 }  // namespace armcal::survey

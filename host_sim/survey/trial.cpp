@@ -59,13 +59,6 @@ Attempt Try(const calibration::Method& method, const calibration::Problem& probl
   }
 }
 
-const calibration::Method* Find(const std::string& name, std::vector<std::string>& missing) {
-  for (const calibration::Method& m : calibration::Methods())
-    if (name == m.name) return &m;
-  if (std::find(missing.begin(), missing.end(), name) == missing.end()) missing.push_back(name);
-  return nullptr;
-}
-
 calibration::Problem WithPrior(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
                                double relative_sd) {
   calibration::Problem p = calibration::MakeProblem(model, std::move(train));

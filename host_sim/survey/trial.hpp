@@ -47,9 +47,6 @@ struct Attempt {
 };
 Attempt Try(const calibration::Method& method, const calibration::Problem& problem);
 
-// The method of that name; nullptr where it does not exist, and then its name goes to `missing` (once).
-const calibration::Method* Find(const std::string& name, std::vector<std::string>& missing);
-
 // A prior for a model whose robot file says how far it may be off: relative deviations of eta and of effects, too.
 calibration::Problem WithPrior(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
                                double relative_sd);

@@ -17,18 +17,14 @@ constexpr int kIterations = 10;
 
 Solution Didim(const Problem& problem) {
   const double began = CpuSeconds();
-  RequireLoop(problem, "didim");
+  LoopLogs simulation(problem, "didim");
   Solution solution;
   VectorXd z = problem.start;
   ClampEta(problem, z);
   solution.converged = false;
-  std::vector<Dataset> simulated;
   for (; solution.iterations < kIterations && !solution.converged && !Stopped(problem); ++solution.iterations) {
-    if (!SimulateLogs(problem, z, simulated)) {
-      solution.remark = "the simulated arm runs away at iteration " + std::to_string(solution.iterations + 1);
-      break;
-    }
-    const Linearised sim = Linearise(Along(problem, simulated), z);
+    solution.remark = ShareRemark(simulation.Simulate(z));
+    const Linearised sim = Linearise(Along(problem, simulation.logs()), z);
     VectorXd next = SolveRegularised(problem, sim.A.transpose() * sim.A, sim.A.transpose() * (sim.residual + sim.A * z),
                                      &solution.covariance);
     ClampEta(problem, next);

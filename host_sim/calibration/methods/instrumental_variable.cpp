@@ -63,22 +63,17 @@ VectorXd Step(const Problem& problem, const VectorXd& z, const Linearised& K, co
 
 Solution InstrumentalVariable(const Problem& problem) {
   const double began = CpuSeconds();
-  RequireLoop(problem, "instrumental_variable");
+  LoopLogs simulation(problem, "instrumental_variable");
   Solution solution;
   // The first instrument is the start's: least squares may be so biased that its arm cannot be simulated.
   VectorXd z = problem.start;
   ClampEta(problem, z);
   Linearised measured;
   solution.converged = false;
-  std::vector<Dataset> simulated;
   for (; solution.iterations < kIterations && !solution.converged && !Stopped(problem); ++solution.iterations) {
-    if (!SimulateLogs(problem, z, simulated)) {
-      solution.remark =
-          "the simulated arm of estimate " + std::to_string(solution.iterations) + " runs away; that estimate stands";
-      break;
-    }
+    solution.remark = ShareRemark(simulation.Simulate(z));
     measured = Linearise(problem, z);
-    VectorXd next = Step(problem, z, measured, Linearise(Along(problem, simulated), z), solution.covariance);
+    VectorXd next = Step(problem, z, measured, Linearise(Along(problem, simulation.logs()), z), solution.covariance);
     ClampEta(problem, next);
     const double change = LargestChange(z, next, solution.covariance);
     solution.converged = change < kSettledChange;

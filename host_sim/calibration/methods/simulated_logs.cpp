@@ -10,22 +10,56 @@ namespace armcal::calibration {
 
 using Eigen::VectorXd;
 
-void RequireLoop(const Problem& problem, const char* method) {
+namespace {
+
+constexpr double kFollows = 0.1;
+constexpr double kShares[] = {1, 0.5, 0.25, 0.125};
+
+bool Follows(const codegen::Signals& s, const codegen::Signals& path) {
+  for (Eigen::Index j = 0; j < path.q.cols(); ++j) {
+    const auto motion = path.q.col(j).array() - path.q.col(j).mean();
+    if ((s.q.col(j) - path.q.col(j)).squaredNorm() > kFollows * kFollows * motion.square().sum()) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+LoopLogs::LoopLogs(const Problem& problem, const char* method) : problem_(problem) {
   if (!problem.closed_loop)
     throw io::InputError(std::string("method ") + method +
                          ": expected a control law in the robot file and a log with qref");
+  if (!Run(problem.start))
+    throw io::InputError(std::string("method ") + method +
+                         ": the arm with the robot file's values runs away in simulation; expected gains and values "
+                         "with which it follows its reference");
+  start_ = logs_;
 }
 
-bool SimulateLogs(const Problem& problem, const VectorXd& z, std::vector<Dataset>& simulated) {
-  simulated.clear();
-  for (const Dataset* log : problem.train) {
+bool LoopLogs::Run(const VectorXd& z) {
+  logs_.clear();
+  for (const Dataset* log : problem_.train) {
     Dataset copy = *log;
-    copy.s = problem.closed_loop(*log, z);
+    copy.s = problem_.closed_loop(*log, z);
     copy.s.temp = log->s.temp;
     if (!copy.s.q.allFinite() || !copy.s.qd.allFinite() || !copy.s.qdd.allFinite()) return false;
-    simulated.push_back(std::move(copy));
+    if (!start_.empty() && !Follows(copy.s, start_[logs_.size()].s)) return false;
+    logs_.push_back(std::move(copy));
   }
   return true;
+}
+
+double LoopLogs::Simulate(const VectorXd& z) {
+  for (const double share : kShares)
+    if (Run(problem_.start + share * (z - problem_.start))) return share;
+  logs_ = start_;
+  return 0;
+}
+
+std::string ShareRemark(double share) {
+  return share == 1 ? ""
+                    : "simulated at " + std::to_string(static_cast<int>(100 * share)) +
+                          " % of the way from the start to the estimate, whose own arm runs away";
 }
 
 Problem Along(const Problem& problem, const std::vector<Dataset>& logs) {

@@ -1,15 +1,35 @@
 // calibration methods - what methods that simulate the closed loop share; knows no single method.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "host_sim/calibration/method.hpp"
 
 namespace armcal::calibration {
 
-// InputError naming the method where the problem has no closed loop.
-void RequireLoop(const Problem& problem, const char* method);
+// The training logs with their signals replaced by those of a simulated arm.
+class LoopLogs {
+ public:
+  // Simulates the arm of problem.start. InputError naming the method where the problem has no closed loop, or where
+  // not even that arm can be simulated.
+  LoopLogs(const Problem& problem, const char* method);
 
-// The training logs with their signals replaced by the simulated ones at z; false where the simulated arm runs away.
-bool SimulateLogs(const Problem& problem, const Eigen::VectorXd& z, std::vector<Dataset>& simulated);
+  // At problem.start + share (z - start): at z itself (1), or, where that arm does not follow the start's within a
+  // tenth of each joint's motion (an estimate of noise may have a negative inertia), at the largest share tried that
+  // does. Under one control law two arms take nearly the same path.
+  double Simulate(const Eigen::VectorXd& z);
+  const std::vector<Dataset>& logs() const { return logs_; }  // of the last call
+
+ private:
+  bool Run(const Eigen::VectorXd& z);
+
+  const Problem& problem_;
+  std::vector<Dataset> start_, logs_;
+};
+
+// What a reader must know of the share that the last round used; empty if it was 1.
+std::string ShareRemark(double share);
 
 // The same problem along other logs, which must outlive it.
 Problem Along(const Problem& problem, const std::vector<Dataset>& logs);

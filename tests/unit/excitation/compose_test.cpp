@@ -16,7 +16,7 @@ namespace {
 using Eigen::VectorXd;
 
 Composed OfPublishedSeries(const Observation& observation, const ComposeSettings& settings) {
-  Fourier series = test::PublishedSeries();
+  Series series = test::PublishedSeries();
   EXPECT_TRUE(ScaleToLimits(observation, 1 - settings.margin, series));
   return Compose(observation, series, settings);
 }

@@ -42,7 +42,7 @@ TEST(Observation, ConditionNumber_IsThatOfTheStackedScaledMatrix) {
 TEST(Observation, OfAMotionLongerThanOnePiece_IsThatOfTheWhole) {
   const codegen::Model model = test::Arm(test::RobotFile("two_link"));
   const Observation observation(model);
-  Fourier series = test::PublishedSeries();
+  Series series = test::PublishedSeries();
   series.coefficient = series.coefficient.leftCols(2).eval();
   const codegen::Signals s = series.At(test::OnePeriod(2500));
   EXPECT_NEAR(observation.ConditionNumber(s) / ConditionBySvd(model, observation.columns(), s), 1, 1e-9);

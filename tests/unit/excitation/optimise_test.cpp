@@ -22,7 +22,7 @@ OptimiseSettings Searches(int starts) {
   return settings;
 }
 
-codegen::Signals OnCheckGrid(const Fourier& series) { return series.At(test::OnePeriod(10000)); }
+codegen::Signals OnCheckGrid(const Series& series) { return series.At(test::OnePeriod(10000)); }
 
 TEST(Objective, Gradient_IsTheDifferenceQuotientOfTheValue) {
   for (const char* name : {"er20_like", "two_link", "emps"}) {
@@ -30,7 +30,7 @@ TEST(Objective, Gradient_IsTheDifferenceQuotientOfTheValue) {
     for (codegen::Joint& j : robot.joint) j.torque_limit_Nm /= 5;  // so that the torque's penalty takes part
     const codegen::Model model = test::Arm(robot);
     const Observation observation(model);
-    Objective objective(observation, {}, 0.6);
+    Objective objective(observation, {}, {}, 0.6);
     VectorXd gradient, unused;
     const VectorXd u = VectorXd::LinSpaced(objective.size(), 0.1, 20).array().sin();
     const double value = objective(u, gradient);
@@ -47,7 +47,7 @@ TEST(Objective, Gradient_IsTheDifferenceQuotientOfTheValue) {
 TEST(Objective, WithoutPenalties_IsCloseAboveTheLogarithmOfTheConditionNumber) {
   const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
   const Observation observation(model);
-  Objective objective(observation, {}, 1e3);
+  Objective objective(observation, {}, {}, 1e3);
   VectorXd gradient;
   const VectorXd u = VectorXd::LinSpaced(objective.size(), 0.1, 20).array().sin();
   const double value = objective(u, gradient);
@@ -59,7 +59,7 @@ TEST(Objective, WithoutPenalties_IsCloseAboveTheLogarithmOfTheConditionNumber) {
 TEST(ScaleToLimits, OfASeriesThatBreaksThem_MeetsTheTightestOne) {
   const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
   const Observation observation(model);
-  Fourier series = test::PublishedSeries().Scaled(3);
+  Series series = test::PublishedSeries().Scaled(3);
   ASSERT_GT(LargestShare(FindPeaks(observation, OnCheckGrid(series))), 1.5);
   ASSERT_TRUE(ScaleToLimits(observation, 0.9, series));
   EXPECT_NEAR(LargestShare(FindPeaks(observation, OnCheckGrid(series))), 0.9, 1e-6);
@@ -70,7 +70,7 @@ TEST(ScaleToLimits, WhereTorqueIsTheTightestLimit_MeetsIt) {
   robot.joint[2].torque_limit_Nm = 250;
   const codegen::Model model = test::Arm(robot);
   const Observation observation(model);
-  Fourier series = test::PublishedSeries();
+  Series series = test::PublishedSeries();
   ASSERT_TRUE(ScaleToLimits(observation, 0.95, series));
   const auto peaks = FindPeaks(observation, OnCheckGrid(series));
   EXPECT_LE(LargestShare(peaks), 0.95);
@@ -79,7 +79,7 @@ TEST(ScaleToLimits, WhereTorqueIsTheTightestLimit_MeetsIt) {
 
 TEST(ScaleToLimits, OfASeriesThatKeepsThem_ChangesNothing) {
   const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
-  Fourier series = test::PublishedSeries().Scaled(0.5);
+  Series series = test::PublishedSeries().Scaled(0.5);
   const Eigen::MatrixXd before = series.coefficient;
   ASSERT_TRUE(ScaleToLimits(Observation(model), 0.95, series));
   EXPECT_EQ(series.coefficient, before);
@@ -101,14 +101,14 @@ TEST(Optimise, OnASixAxisArm_BeatsTheBestOfFiftyRandomSeries) {
   const OptimiseSettings settings = Searches(2);
   double best_random = INFINITY;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    Fourier series;
+    Series series;
     if (RandomSeries(observation, settings, seed, series))
       best_random = std::min(best_random, PeriodCondition(observation, series));
   }
   const Optimum best = Optimise(observation, settings);
-  EXPECT_LT(best.condition, 0.7 * best_random);
-  EXPECT_LT(best.condition, 6);  // single searches end between 4.2 and 5.5
-  EXPECT_DOUBLE_EQ(best.condition, PeriodCondition(observation, best.series));
+  EXPECT_LT(best.figure, 0.7 * best_random);
+  EXPECT_LT(best.figure, 6);  // single searches end between 4.2 and 5.5
+  EXPECT_DOUBLE_EQ(best.figure, PeriodCondition(observation, best.series));
 }
 
 TEST(Optimise, WithTheSameSeedAndStarts_FindsTheSameOnAnyNumberOfThreads) {
@@ -145,7 +145,7 @@ TEST(Optimise, ForARobotWithoutPrior_IgnoresTorqueLimits) {
   codegen::Robot robot = test::RobotFile("emps");
   robot.joint[0].torque_limit_Nm = 1e-3;
   const codegen::Model model = test::Arm(robot);
-  EXPECT_LT(Optimise(Observation(model), Searches(4)).condition, 3);
+  EXPECT_LT(Optimise(Observation(model), Searches(4)).figure, 3);
 }
 
 }  // namespace

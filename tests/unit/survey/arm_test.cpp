@@ -69,20 +69,27 @@ TEST(Variants, GradientColumns_AreTheDerivativesOfTheStribeckTorque) {
   }
 }
 
+ExcitedBy Examined(Law law, const excitation::Series& series) {
+  ExcitedBy e;
+  e.law = law, e.series = series;
+  Examine(test::File(), test::AllRecords(), e);
+  return e;
+}
+
 // Two trajectories and their condition numbers from another program in another language. Printed with 3 digits, and
 // the coefficients with 4.
 TEST(Trajectories, StudysOwn_HaveTheConditionNumbersItFound) {
-  const ExcitedBy linear = Examine(test::File(), test::AllRecords(), Law::kCoulombViscous, test::StudyLinear());
+  const ExcitedBy linear = Examined(Law::kCoulombViscous, test::StudyLinear());
   EXPECT_NEAR(linear.condition, 4.37, 0.02);
   EXPECT_EQ(linear.columns, 48);
   EXPECT_LE(linear.share, 1.0);
-  const ExcitedBy nonlinear = Examine(test::File(), test::AllRecords(), Law::kGradient, test::StudyNonlinear());
+  const ExcitedBy nonlinear = Examined(Law::kGradient, test::StudyNonlinear());
   EXPECT_NEAR(nonlinear.condition, 4.40, 0.02);
   EXPECT_EQ(nonlinear.columns, 60);
 }
 
 TEST(Trajectories, ConditionNumber_OfUnscaledColumnsIsAnotherNumber) {
-  const ExcitedBy e = Examine(test::File(), test::AllRecords(), Law::kCoulombViscous, test::StudyLinear());
+  const ExcitedBy e = Examined(Law::kCoulombViscous, test::StudyLinear());
   EXPECT_GT(e.raw, 20 * e.condition);  // the study: 160 to 310
   EXPECT_NE(e.unweighted, e.condition);
 }

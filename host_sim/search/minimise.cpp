@@ -1,10 +1,10 @@
-// excitation - limited-memory BFGS; knows nothing of what is minimised.
-#include "host_sim/excitation/minimise.hpp"
+// search - limited-memory BFGS; knows nothing of what is minimised.
+#include "host_sim/search/minimise.hpp"
 
 #include <cmath>
 #include <deque>
 
-namespace armcal::excitation {
+namespace armcal::search {
 namespace {
 
 constexpr std::size_t kMemory = 12;   // pairs kept
@@ -75,4 +75,4 @@ double Minimise(const Differentiable& function, const MinimiseSettings& settings
   return value;
 }
 
-}  // namespace armcal::excitation
+}  // namespace armcal::search

@@ -1,10 +1,10 @@
-// excitation - unconstrained minimisation by limited-memory BFGS; knows nothing of what is minimised.
+// search - unconstrained minimisation by limited-memory BFGS; knows nothing of what is minimised.
 #pragma once
 
 #include <Eigen/Core>
 #include <functional>
 
-namespace armcal::excitation {
+namespace armcal::search {
 
 // Value at x, and its gradient. May return infinity where x is out of the function's domain.
 using Differentiable = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd& gradient)>;
@@ -19,4 +19,4 @@ struct MinimiseSettings {
 // algorithm 7.5, with backtracking: a pair whose curvature is not positive is left out.
 double Minimise(const Differentiable& function, const MinimiseSettings& settings, Eigen::VectorXd& x);
 
-}  // namespace armcal::excitation
+}  // namespace armcal::search

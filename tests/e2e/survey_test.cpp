@@ -1,0 +1,159 @@
+// end-to-end tests - armcal survey shows the survey's picture on fresh draws; excite with every curve and criterion.
+#include "tests/e2e/tool.hpp"
+
+namespace armcal::tests {
+namespace {
+
+// The mean in a cell, whether it has an interval or not.
+double Value(const nlohmann::json& cell) {
+  return cell.is_object() ? cell.at("mean").get<double>() : cell.get<double>();
+}
+
+class Survey : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = FreshFolder("survey");
+    run_ = Tool({"survey",
+                 "--draws",
+                 "6",
+                 "--slow-draws",
+                 "1",
+                 "--search-seconds",
+                 "6",
+                 "--table",
+                 "5",
+                 "--table",
+                 "6",
+                 "--table",
+                 "7",
+                 "--table",
+                 "8",
+                 "--table",
+                 "9",
+                 "--table",
+                 "10",
+                 "--table",
+                 "11",
+                 "--table",
+                 "12",
+                 "--table",
+                 "priors",
+                 "--table",
+                 "figures",
+                 "--json",
+                 (folder_ / "out.json").string(),
+                 "--report",
+                 (folder_ / "out.html").string()});
+    if (run_.code == 0) all_ = ReadJson(folder_ / "out.json");
+  }
+  void SetUp() override { ASSERT_EQ(run_.code, 0) << run_.err; }
+
+  static const nlohmann::json& Rows(const std::string& table) { return all_.at("tables").at(table).at("rows"); }
+  // The row whose cells are these words; null if there is none.
+  static nlohmann::json Row(const std::string& table, const std::vector<std::pair<std::string, std::string>>& words) {
+    for (const auto& row : Rows(table))
+      if (std::all_of(words.begin(), words.end(), [&](const auto& w) { return row.at(w.first) == w.second; }))
+        return row;
+    ADD_FAILURE() << "table " << table << " has no such row";
+    return {};
+  }
+  static nlohmann::json Noisy(const std::string& table, const std::string& method) {
+    return Row(table, {{"method", method}, {"torque", "with noise"}});
+  }
+
+  inline static fs::path folder_;
+  inline static Outcome run_;
+  inline static nlohmann::json all_;
+};
+
+TEST_F(Survey, MethodsWithoutAPrior_FitFrictionAndReturnImpossibleBodies) {
+  for (const char* method : {"pseudo-inverse", "Kalman filter", "exponential forgetting"}) {
+    const auto row = Noisy("8", method);
+    EXPECT_GT(Value(row.at("e_d")), 10) << method;
+    EXPECT_LT(Value(row.at("e_f")), 0.05) << method;
+    EXPECT_NEAR(Value(row.at("e_T_Std")), 0.0203, 0.001) << method;  // as printed: the noise itself
+    EXPECT_EQ(Value(Noisy("8 judged", method).at("share physical")), 0) << method;
+  }
+}
+
+TEST_F(Survey, Searches_ArePhysicalAndWorseThanTheirStart_ThePriorsMap_IsBetter) {
+  for (const char* method : {"gradient descent", "genetic algorithm", "particle filter"}) {
+    EXPECT_EQ(Value(Noisy("8 judged", method).at("share physical")), 1) << method;
+    EXPECT_GT(Value(Noisy("8 judged", method).at("e_d / e_d(prior)")), 1) << method;
+  }
+  const auto map = Noisy("8 judged", "MAP with CAD prior and barrier");
+  EXPECT_EQ(Value(map.at("share physical")), 1);
+  EXPECT_LT(Value(map.at("e_d / e_d(prior)")), 1);
+}
+
+TEST_F(Survey, ExtendedKalmanFilter_FailsOnTheStribeckSpeed_BetterOnesDoNot) {
+  EXPECT_GT(Value(Noisy("9", "extended Kalman filter").at("e_f")), 1);
+  for (const char* method : {"variable projection", "iterated EKF in logarithms", "fixed Stribeck basis"})
+    EXPECT_LT(Value(Noisy("9", method).at("e_f")), 0.2) << method;
+}
+
+TEST_F(Survey, Instruments_UndoWhatNoiseInQDoesToLeastSquares) {
+  const auto least_squares = Row("10", {{"method", "pseudo-inverse"}}), iv = Row("10", {{"method", "IDIM-IV"}});
+  EXPECT_LT(Value(iv.at("base error no filter")), 0.2 * Value(least_squares.at("base error no filter")));
+  EXPECT_LT(Value(iv.at("J_e no filter")), Value(least_squares.at("J_e no filter")));
+}
+
+TEST_F(Survey, ForgettingFollowsBetterThanKalman_TheBankBetterThanBoth) {
+  double kalman = 0, forgetting = INFINITY, bank = 0;
+  for (const auto& row : Rows("figure 4")) {
+    if (row.at("slope") == "diverged") continue;
+    const double slope = Value(row.at("slope"));
+    if (row.at("method") == "Kalman filter") kalman = slope;
+    else if (row.at("method") == "exponential forgetting") forgetting = std::min(forgetting, slope);
+    else bank = slope;
+  }
+  EXPECT_LT(forgetting, 0.6 * kalman);
+  EXPECT_LT(bank, 0.6 * forgetting);
+}
+
+TEST_F(Survey, EveryTableAndFigureIsThere_AndGoalsThatNoSearchDecides_AreMet) {
+  for (const char* table :
+       {"trajectories", "5", "6", "7", "8", "9", "10", "10 tier 2", "11", "12", "(9)", "priors", "figure 4", "slips"})
+    EXPECT_TRUE(all_.at("tables").contains(table)) << table;
+  const std::string page = ReadText(folder_ / "out.html");
+  for (const char* figure : {"Figure 1", "Figure 2", "Figure 3", "Figure 4"})
+    EXPECT_NE(page.find(figure), std::string::npos) << figure;
+  EXPECT_GE(all_.at("goals").size(), 30U);
+  for (const auto& goal : all_.at("goals")) {
+    const std::string name = goal.at("name");
+    const bool of_a_long_run = name.find("trajectory") != std::string::npos || name.find("draws") != std::string::npos;
+    EXPECT_TRUE(goal.at("met") || of_a_long_run) << name << ": " << goal.at("value");
+  }
+}
+
+TEST(Excite, WithEveryCurveAndCriterion_WritesATrajectoryWithinTheLimits) {
+  const fs::path folder = FreshFolder("excite");
+  const std::vector<std::vector<std::string>> ways{{"--curve", "sine"},
+                                                   {"--curve", "polynomial"},
+                                                   {"--curve", "spline", "--criterion", "d-optimal"},
+                                                   {"--criterion", "friction"},
+                                                   {"--separate", "stribeck:2,viscous_cuberoot:2"},
+                                                   {"--search", "genetic"}};
+  for (const auto& way : ways) {
+    const fs::path json = folder / "out.json", csv = folder / "out.csv";
+    std::vector<std::string> words{"excite",    "--robot", "two_link",  "--out",  csv.string(),
+                                   "--seconds", "2",       "--no-slow", "--json", json.string()};
+    words.insert(words.end(), way.begin(), way.end());
+    const Outcome o = Tool(words);
+    ASSERT_EQ(o.code, 0) << way[1] << ": " << o.err;
+    const nlohmann::json found = ReadJson(json);
+    for (const auto& peak : found.at("peaks"))
+      for (const char* share : {"position_share", "speed_share", "acceleration_share", "torque_share"})
+        EXPECT_LE(peak.at(share).get<double>(), 1) << way[1] << " " << share;
+    EXPECT_EQ(found.at("accuracy").size(), way[0] == "--separate" ? 2U : way[1] == "friction" ? 6U : 0U);
+    EXPECT_GT(fs::file_size(csv), 10000U);
+    fs::remove(csv);
+  }
+  const fs::path csv = folder / "never.csv";
+  ExpectOneLine(Tool({"excite", "--robot", "two_link", "--out", csv.string(), "--separate", "stribeck:9"}), 2,
+                "stribeck:9");
+  EXPECT_FALSE(fs::exists(csv));
+}
+
+}  // namespace
+}  // namespace armcal::tests

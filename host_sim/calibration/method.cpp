@@ -30,24 +30,26 @@ double UnknownDeviation(const codegen::EffectUnknown& u, double value) {
 
 const std::vector<Method>& Methods() {
   static const std::vector<Method> methods = {
-      // name, title, equation, nonlinear, online, needs_loop, needs_prior
-      {"pseudo_inverse", "pseudo-inverse", "(15)", false, false, false, false, PseudoInverse},
-      {"weighted_pseudo_inverse", "weighted pseudo-inverse", "(15)", false, false, false, false, WeightedPseudoInverse},
-      {"instrumental_variable", "IDIM-IV", "(17)", false, false, true, false, InstrumentalVariable},
-      {"kalman", "Kalman filter", "(19)", false, true, false, false, Kalman},
-      {"extended_kalman", "extended Kalman filter", "(21)", true, true, false, false, ExtendedKalman},
-      {"forgetting", "exponential forgetting", "(23), (24)", true, true, false, false, Forgetting},
-      {"gradient_descent", "gradient descent", "(25)", true, false, false, false, GradientDescent},
-      {"genetic", "genetic algorithm", "(25)", true, false, false, false, Genetic},
-      {"particle_filter", "particle filter", "(25)", true, false, false, false, ParticleFilter},
-      {"map_barrier", "MAP with CAD prior and barrier", "", true, false, false, true, MapBarrier},
-      {"variable_projection", "variable projection", "", true, false, false, false, VariableProjection},
-      {"log_ekf", "iterated EKF in logarithms", "", true, true, false, true, LogEkf},
-      {"stribeck_basis", "fixed Stribeck basis", "", true, false, false, false, StribeckBasis},
-      {"multiple_model", "three Kalman filters", "", false, true, false, true, MultipleModel},
-      {"didim", "DIDIM", "", false, false, true, false, Didim},
-      {"robust", "robust weights", "", false, false, false, false, Robust},
-      {"parallel_decimation", "parallel decimation", "", false, false, false, false, ParallelDecimation},
+      // name, title, equation, nonlinear, online, needs_loop, needs_prior, needs_ranges
+      {"pseudo_inverse", "pseudo-inverse", "(15)", false, false, false, false, false, PseudoInverse},
+      {"weighted_pseudo_inverse", "weighted pseudo-inverse", "(15)", false, false, false, false, false,
+       WeightedPseudoInverse},
+      {"instrumental_variable", "IDIM-IV", "(17)", false, false, true, false, false, InstrumentalVariable},
+      {"kalman", "Kalman filter", "(19)", false, true, false, false, false, Kalman},
+      {"extended_kalman", "extended Kalman filter", "(21)", true, true, false, false, false, ExtendedKalman},
+      {"forgetting", "exponential forgetting", "(23), (24)", true, true, false, false, false, Forgetting},
+      {"gradient_descent", "gradient descent", "(25)", true, false, false, false, true, GradientDescent},
+      {"genetic", "genetic algorithm", "(25)", true, false, false, false, true, Genetic},
+      {"particle_filter", "particle filter", "(25)", true, false, false, false, true, ParticleFilter},
+      {"map_barrier", "MAP with CAD prior and barrier", "", true, false, false, true, false, MapBarrier},
+      {"variable_projection", "variable projection", "", true, false, false, false, false, VariableProjection},
+      {"log_ekf", "iterated EKF in logarithms", "", true, true, false, true, false, LogEkf},
+      {"stribeck_basis", "fixed Stribeck basis", "", true, false, false, false, false, StribeckBasis},
+      {"multiple_model", "three Kalman filters", "", false, true, false, true, false, MultipleModel},
+      {"didim", "DIDIM", "", false, false, true, false, false, Didim},
+      {"robust", "robust weights", "", false, false, false, false, false, Robust},
+      {"parallel_decimation", "parallel decimation", "", false, false, false, false, false, ParallelDecimation},
+      {"fourier_fit", "Fourier fit of periodic motion", "", true, false, false, false, false, FourierFitted},
   };
   return methods;
 }

@@ -57,6 +57,7 @@ struct Method {
   bool online;                                // one sample after the other
   bool needs_loop;                            // Problem::closed_loop
   bool needs_prior;                           // Problem::covariance
+  bool needs_ranges;                          // Problem::lower, upper; a search, which takes seconds
   Solution (*solve)(const Problem& problem);  // throws io::InputError, one line, where the problem lacks what it needs
 };
 

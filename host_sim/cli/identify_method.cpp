@@ -42,6 +42,21 @@ calibration::ClosedLoop Loop(const codegen::Model& model, const LogReader& read,
   return calibration::MakeClosedLoop(model, reference);
 }
 
+// Where the robot file has no prior, a search still needs a start and ranges: those of weighted least squares. Returns
+// what to tell the user.
+std::string RangesFromLeastSquares(calibration::Problem& problem) {
+  constexpr double kDeviations = 10;
+  calibration::Problem plain = problem;
+  plain.covariance.resize(0, 0);
+  const calibration::Solution s = calibration::Solve(calibration::FindMethod("weighted_pseudo_inverse"), plain);
+  const Eigen::VectorXd reach = kDeviations * s.covariance.diagonal().cwiseSqrt();
+  problem.start = s.z;
+  problem.lower = problem.lower.cwiseMax(s.z - reach), problem.upper = problem.upper.cwiseMin(s.z + reach);
+  problem.start = problem.start.cwiseMax(problem.lower).cwiseMin(problem.upper);
+  return fmt::format("ranges: weighted least squares +- {:g} standard deviations; the robot file has no prior",
+                     kDeviations);
+}
+
 }  // namespace
 
 int RunMethod(const MethodOptions& o) {
@@ -51,12 +66,16 @@ int RunMethod(const MethodOptions& o) {
   const std::vector<calibration::Dataset> train = read.All(o.train);
   calibration::Problem problem = calibration::MakeProblem(model, Pointers(train));
   if (method.needs_loop) problem.closed_loop = Loop(model, read, o.train, train);
+  const std::string ranges =
+      method.needs_ranges && !model.robot().has_prior ? RangesFromLeastSquares(problem) : std::string();
+  if (!ranges.empty()) fmt::print("{}\n", ranges);
   const calibration::Solution s = calibration::Solve(method, problem);
   nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}, {"method", method.name}};
   json["parameters"] = PrintUnknowns(model, s);
   json["physical"] = s.physical, json["converged"] = s.converged, json["iterations"] = s.iterations;
   json["seconds"] = s.seconds, json["memory_bytes"] = s.memory_bytes, json["from_prior"] = s.from_prior;
   json["remark"] = s.remark;
+  if (!ranges.empty()) json["ranges"] = ranges;
   fmt::print("{}{}{}: {} iterations, {}, {:.3f} s, {:.1f} MB, bodies physical: {}{}{}\n", method.title,
              *method.equation ? " " : "", method.equation, s.iterations, s.converged ? "converged" : "NOT converged",
              s.seconds, 1e-6 * static_cast<double>(s.memory_bytes), s.physical ? "yes" : "no",

@@ -99,11 +99,6 @@ void Append(Solved solved, Outcome& out) {
   out.delta_true.push_back(Growth(solved.score[0]->J_true, solved.score[1]->J_true));
 }
 
-// Takes seconds where others take milliseconds.
-bool Slow(const std::string& method) {
-  return method == "gradient_descent" || method == "genetic" || method == "particle_filter";
-}
-
 }  // namespace
 
 bool Settings::Wants(const std::string& table) const {
@@ -140,9 +135,10 @@ std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, 
     const calibration::Dataset noisy =
         Measured(truth.train, truth.tau + Noise(truth.train.samples(), truth.sigma_Nm, SeedOf(draws.seed, d, 2)));
     for (const std::string& name : methods) {
+      const calibration::Method& method = calibration::FindMethod(name);
       Solved one;
-      if (!Slow(name) || d < draws.slow_draws)
-        one = SolveBoth(settings, draws, truth, prior, clean, noisy, calibration::FindMethod(name));
+      if (!method.needs_ranges || d < draws.slow_draws)
+        one = SolveBoth(settings, draws, truth, prior, clean, noisy, method);
       if (d > 0) one.solution[0] = one.solution[1] = {};  // only the first is shown
       solved[static_cast<std::size_t>(d)].push_back(std::move(one));
     }

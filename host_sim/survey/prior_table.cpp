@@ -33,6 +33,7 @@ void WorstGoals(const std::vector<Outcome>& outcomes, Findings& out) {
   if (!map) return;
   const std::string where = "MAP, worst case +-20 %, noise, " + std::to_string(map->noisy.size()) + " draws: ";
   const Statistic e_d = Over(map->noisy, &Score::e_d);
+  out.goals.push_back({where + "draws", static_cast<double>(map->noisy.size()), 200, false});
   out.goals.push_back({where + "mean e_d", e_d.mean, 0.19, true});
   out.goals.push_back({where + "95th percentile of e_d", e_d.p95, 0.19, true});
   out.goals.push_back({where + "mean e_f", Over(map->noisy, &Score::e_f).mean, 0.02, true});
@@ -56,12 +57,16 @@ void ShowPriors(const Settings& settings, const Motions& motions, Findings& out)
        "has a floor, and level A for e_d says as much about the prior as about the method.",
        "sigma / 10: the noise-free data with the torque noise declared ten times smaller than Table 7. With "
        "Table 7's own sigma an estimator rightly distrusts noise-free data as much as noisy ones."}};
-  const auto run = [&](const PriorError& prior, Law law, bool random_truth, double clean_sigma,
-                       const std::vector<std::string>& methods) {
+  const auto run_along = [&](const Motions& along, const PriorError& prior, Law law, bool random_truth,
+                             double clean_sigma, const std::vector<std::string>& methods) {
     DrawSettings d;
     d.law = law, d.prior = prior, d.random_truth = random_truth, d.clean_sigma = clean_sigma;
     d.draws = settings.draws, d.slow_draws = settings.slow_draws, d.seed = settings.seed + 7;
-    return RunDraws(settings, motions, d, methods);
+    return RunDraws(settings, along, d, methods);
+  };
+  const auto run = [&](const PriorError& prior, Law law, bool random_truth, double clean_sigma,
+                       const std::vector<std::string>& methods) {
+    return run_along(motions, prior, law, random_truth, clean_sigma, methods);
   };
   const std::vector<std::string> map{"map_barrier"}, laws{"log_ekf", "stribeck_basis"},
       laws_and_map{"log_ekf", "stribeck_basis", "map_barrier"};
@@ -88,6 +93,14 @@ void ShowPriors(const Settings& settings, const Motions& motions, Findings& out)
         out.goals.push_back(
             {"Stribeck, drawn truths, noise, " + std::to_string(o->noisy.size()) + " draws, " + o->name + ": mean e_f",
              Over(o->noisy, &Score::e_f).mean, 0.06, true});
+  }
+  // The same laws where the trajectory asked for them: low speeds instead of a small cond(K).
+  for (const ExcitedBy& e : motions.others) {
+    if (e.law != Law::kGradient || e.criterion != excitation::Criterion::Kind::kAccuracy) continue;
+    Motions along = motions;
+    along.nonlinear = e;
+    const auto stribeck = run_along(along, uniform, Law::kStribeck, true, 1, laws);
+    AddRows(PriorName(uniform), "(4), drawn truths, noise, friction-aware trajectory", stribeck, true, sheet);
   }
   out.sheets.push_back(sheet);
 }

@@ -86,7 +86,7 @@ Sheet Slips() {
            {"Tables 5, 6", "inertia of link 3", "belongs to no body: an eigenvalue is -0.016"},
            {"Table 12", "(5) worse than (7)", "impossible, (5) contains (7): the solver failed"},
            {"Table 11", "B for e_f of the EKF and forgetting", "their printed e_f are above 1, which is C"},
-           {"(9)", "f1 tau_load", "with the arm's own load it repeats rigid columns; needs a declared payload"},
+           {"(9)", "f1 tau_load", "one f1 for the arm repeats rigid columns, whatever the load: table (9)"},
            {"Table 4", "Delta J_e", "with measured torque in J_e it cannot be below 0.1 once J_e is below 0.2"}},
           {}};
 }

@@ -14,6 +14,7 @@ Solution MultipleModel(const Problem& problem);       // three Kalman filters fo
 Solution InstrumentalVariable(const Problem& problem);  // (17), (18), regularised by the prior where there is one
 Solution Didim(const Problem& problem);                 // output error on torque by simulation of the closed loop
 Solution Robust(const Problem& problem);                // Huber, then bisquare weights; outliers
+Solution FourierFitted(const Problem& problem);         // motion as its Fourier series, then MAP or weighted (15)
 Solution ParallelDecimation(const Problem& problem);    // torque and columns through one low-pass, then every m-th row
 
 }  // namespace armcal::calibration

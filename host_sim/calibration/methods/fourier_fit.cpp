@@ -3,8 +3,12 @@
 
 #include <Eigen/QR>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
+#include "host_sim/calibration/methods/better_methods.hpp"
+#include "host_sim/calibration/methods/linearised.hpp"
+#include "host_sim/calibration/methods/simulated_logs.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::calibration {
@@ -67,6 +71,28 @@ double FindPeriod_s(const Dataset& log, int harmonics) {
     if (now < least) least = now, best = length / k;
   }
   return best;
+}
+
+Solution FourierFitted(const Problem& problem) {
+  const double began = CpuSeconds();
+  std::vector<Dataset> fitted;
+  std::string remark;
+  for (const Dataset* log : problem.train) {
+    const double period_s = FindPeriod_s(*log);
+    char what[120];
+    std::snprintf(what, sizeof(what), "%speriod %.4g s leaves %.2g of q (worst joint, RMS)", remark.empty() ? "" : "; ",
+                  period_s, FourierResidual(*log, period_s).maxCoeff());
+    remark += what;
+    fitted.push_back(FourierFit(*problem.model, *log, period_s));
+  }
+  const bool prior = problem.covariance.size() > 0, nonlinear = problem.model->nonlinear() > 0;
+  Solution s = Solve(FindMethod(prior       ? "map_barrier"
+                                : nonlinear ? "variable_projection"
+                                            : "weighted_pseudo_inverse"),
+                     Along(problem, fitted));
+  s.remark = remark + (s.remark.empty() ? "" : "; " + s.remark);
+  s.seconds = CpuSeconds() - began;
+  return s;
 }
 
 }  // namespace armcal::calibration

@@ -41,6 +41,7 @@ SearchSpace::SearchSpace(const Problem& problem, const char* method) : model_(*p
   map_.resize(offset_.size(), model_.rigid());
   for (int k = 0; k < model_.rigid(); ++k)
     map_.col(k) = ReadOutBodies(model_, VectorXd::Unit(model_.rigid(), k)) - offset_;
+  if (!model_.robot().has_prior) return;
   const VectorXd bodies = Bodies(start_);
   for (int j = 0; j < model_.joints(); ++j)
     if (!IsPhysical(bodies.segment(11 * j, 11)))
@@ -73,6 +74,7 @@ VectorXd SearchSpace::Bodies(const VectorXd& z) const {
 }
 
 VectorXd SearchSpace::Possible(const VectorXd& z) const {
+  if (!model_.robot().has_prior) return z;
   const VectorXd there = Bodies(z);
   if (IsPhysical(there)) return z;
   const VectorXd here = Bodies(start_);
@@ -84,6 +86,7 @@ VectorXd SearchSpace::Possible(const VectorXd& z) const {
 
 double SearchSpace::Barrier(const VectorXd& z, VectorXd& gradient) const {
   gradient.setZero(z.size());
+  if (!model_.robot().has_prior) return 0;
   const VectorXd bodies = Bodies(z);
   VectorXd slope = VectorXd::Zero(bodies.size());
   double value = start_log_det_;

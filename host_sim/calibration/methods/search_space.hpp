@@ -6,7 +6,8 @@
 namespace armcal::calibration {
 
 // Coordinates u in [0, 1] stand for the free coordinates of z within their ranges. The bodies that can exist are a
-// convex set that holds Problem::start, so whatever lies outside is drawn back along the straight line to the start.
+// convex set that holds Problem::start, so whatever lies outside is drawn back along the straight line to the start. Of
+// an arm whose robot file knows no bodies, base parameters alone are searched, and no body is asked for.
 class SearchSpace {
  public:
   // InputError: a free coordinate without a finite range, or bodies of the start that cannot exist (names them).

@@ -13,7 +13,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kFollows = 0.1;
-constexpr double kShares[] = {1, 0.5, 0.25, 0.125};
+constexpr double kSmallestShare = 0.125;
 
 bool Follows(const codegen::Signals& s, const codegen::Signals& path) {
   for (Eigen::Index j = 0; j < path.q.cols(); ++j) {
@@ -50,10 +50,10 @@ bool LoopLogs::Run(const VectorXd& z) {
 }
 
 double LoopLogs::Simulate(const VectorXd& z) {
-  for (const double share : kShares)
-    if (Run(problem_.start + share * (z - problem_.start))) return share;
+  for (; share_ >= kSmallestShare; share_ /= 2)
+    if (Run(problem_.start + share_ * (z - problem_.start))) return share_;
   logs_ = start_;
-  return 0;
+  return share_ = 0;
 }
 
 std::string ShareRemark(double share) {

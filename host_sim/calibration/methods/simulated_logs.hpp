@@ -17,7 +17,8 @@ class LoopLogs {
 
   // At problem.start + share (z - start): at z itself (1), or, where that arm does not follow the start's within a
   // tenth of each joint's motion (an estimate of noise may have a negative inertia), at the largest share tried that
-  // does. Under one control law two arms take nearly the same path.
+  // does. Under one control law two arms take nearly the same path. The share never grows again from call to call: a
+  // method that iterates would go back and forth between two shares.
   double Simulate(const Eigen::VectorXd& z);
   const std::vector<Dataset>& logs() const { return logs_; }  // of the last call
 
@@ -26,6 +27,7 @@ class LoopLogs {
 
   const Problem& problem_;
   std::vector<Dataset> start_, logs_;
+  double share_ = 1;
 };
 
 // What a reader must know of the share that the last round used; empty if it was 1.

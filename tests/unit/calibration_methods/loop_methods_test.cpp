@@ -95,5 +95,16 @@ TEST(FourierFit, OfNoisyPositions_GivesTheTrueDerivatives) {
   EXPECT_GT(FourierResidual(noisy, 7.3)[0], 1e-3);  // planted: not its period
 }
 
+TEST(FourierFit, AsAMethod_UndoesTheBiasOfNoisyPositions) {
+  SyntheticArm arm(tests::TwoLinkWithControl(), 1);
+  const Dataset reference = arm.Run(10, 2);
+  const Dataset d = tests::Measured(arm, reference, 3e-4, 1, 50);
+  Problem p = tests::ProblemOf(arm, {&d});
+  p.covariance.resize(0, 0);
+  const Solution s = Solve(FindMethod("fourier_fit"), p);
+  EXPECT_LT(tests::TorqueError(arm, reference, s.z), 0.2 * tests::TorqueError(arm, reference, LeastSquares(p)));
+  EXPECT_NE(s.remark.find("period 10 s"), std::string::npos) << s.remark;
+}
+
 }  // namespace
 }  // namespace armcal::calibration

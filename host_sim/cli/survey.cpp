@@ -18,6 +18,7 @@ namespace {
 struct Options {
   std::string robot = "er20_like", json, report, data;
   std::vector<std::string> tables;
+  std::string feedforward = "set";
   int draws = 200, slow_draws = 5;
   std::uint64_t seed = 1;
   double search_s = 55;
@@ -47,6 +48,7 @@ int Run(const Options& o) {
                          std::to_string(s.levels.tau_max_Nm.size()) + " joints, like the survey's");
   s.measured = MeasuredLogs(o);
   s.tables = o.tables, s.draws = o.draws, s.slow_draws = o.slow_draws, s.seed = o.seed, s.search_s = o.search_s;
+  s.cad_feedforward = o.feedforward == "cad";
   s.stop = &stop_asked;
   std::string task;
   std::unique_ptr<report::Progress> line;
@@ -86,6 +88,10 @@ void AddSurvey(CLI::App& app, Action& action) {
   verb->add_option("--search-seconds", o->search_s,
                    "of each trajectory search at most; with time enough, results follow from the seed")
       ->check(CLI::PositiveNumber);
+  verb->add_option("--feedforward", o->feedforward,
+                   "what the simulated controller knows: the set parameters, as in the survey, or CAD values")
+      ->check(CLI::IsMember({"set", "cad"}))
+      ->capture_default_str();
   verb->add_option("--robot", o->robot, "robot file or name: its CAD values are the set parameters");
   verb->add_option("--data", o->data, "folder of measured logs (default: measured in ARMCAL_DATA)");
   verb->add_option("--json", o->json, "write every table and goal here");

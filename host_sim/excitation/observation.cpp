@@ -113,7 +113,7 @@ std::vector<int> Observation::Places(const std::vector<std::string>& effects) co
     }
     if (places.size() == before)
       throw io::InputError(model_.robot().path + ": no estimated column of " + name +
-                           "; expected an effect of the model, or effect:joint");
+                           "; expected an effect that motion alone shows: no temperature, time or memory");
   }
   return places;
 }

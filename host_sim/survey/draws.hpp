@@ -24,6 +24,7 @@ struct Settings {
   int draws = 200;       // of prior, noise and, where drawn, truth
   int slow_draws = 5;    // of the methods of (25)
   std::uint64_t seed = 1;
+  bool cad_feedforward = false;     // the loop's controller knows CAD values instead of the set parameters
   double search_s = 55;             // of each trajectory search at most: given time, results follow from the seed
   std::vector<std::string> tables;  // "5" .. "12", "figures"; empty: all
   const std::atomic<bool>* stop = nullptr;

@@ -40,6 +40,8 @@ std::string Figure(const Picture& p) {
 
 std::string TextOf(const Cell& cell) {
   if (!cell.words.empty()) return cell.words;
+  if (std::isnan(cell.low) && cell.value == std::round(cell.value) && std::abs(cell.value) < 1e6)
+    return fmt::format("{:.0f}", cell.value);
   if (std::isnan(cell.low)) return report::Number(cell.value, 4);
   const double up = cell.high - cell.value, down = cell.value - cell.low;
   if (std::abs(up - down) < 1e-6 * (up + down) || up + down == 0)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_sim/diagnosis/run_state.hpp"
 #include "host_sim/diagnosis/work.hpp"
 
 namespace armcal::diagnosis {
@@ -162,37 +163,6 @@ void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
   finding.innovation = w.estimate.innovation;
 }
 
-// One-step-ahead tracking of a run-state term's amplitudes on a log where they are not known: a Kalman filter whose
-// amplitudes wander as far in the length of the training log as the term was large there.
-MatrixXd Track(const Chosen& term, const VectorXd& amplitude, const Quantities& q, const MatrixXd& residual,
-               const VectorXd& sigma, double train_s) {
-  const auto& s = q.data->s;
-  std::vector<double> open(term.eta.size());
-  for (std::size_t k = 0; k < open.size(); ++k) open[k] = k == 0 ? s.t[0] - 1 : s.t[s.samples() - 1] + 1;
-  std::vector<std::vector<VectorXd>> value;
-  term.candidate->Evaluate(q, open, value);
-  const int k = term.candidate->columns();
-  VectorXd a = VectorXd::Zero(k);
-  MatrixXd P = amplitude.cwiseAbs2().asDiagonal();
-  MatrixXd predicted = MatrixXd::Zero(residual.rows(), residual.cols());
-  for (int i = 0; i < s.samples(); ++i) {
-    if (i > 0) P.diagonal() += amplitude.cwiseAbs2() * ((s.t[i] - s.t[i - 1]) / train_s);
-    const VectorXd before = a;
-    for (std::size_t r = 0; r < term.candidate->rows().size(); ++r) {
-      const int j = term.candidate->rows()[r];
-      VectorXd h(k);
-      for (int c = 0; c < k; ++c) h[c] = value[c][r].size() ? value[c][r][i] : 0;
-      predicted(i, j) = h.dot(before);
-      if (!q.data->used(i, j)) continue;
-      const VectorXd Ph = P * h;
-      const double variance = h.dot(Ph) + sigma[j] * sigma[j];
-      a += Ph * ((residual(i, j) - h.dot(a)) / variance);
-      P -= Ph * Ph.transpose() / variance;
-    }
-  }
-  return predicted;
-}
-
 }  // namespace
 
 Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
@@ -227,7 +197,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   const VectorXd before = calibration::Rms(test, out.before, true);
   for (;;) {
     w.estimate = w.Solve(Pointers(w.chosen));
-    const Quantities q = MakeQuantities(model_, test, w.estimate.x, w.declared.eta, w.needs_flange);
+    const Quantities q = MakeQuantities(model_, w.arm, test, w.estimate.x, w.declared.eta, w.needs_flange);
     out.after = test.tau - calibration::Predict(model_, test, w.estimate.x, w.declared.eta);
     std::size_t k = 0;
     for (const Chosen& c : w.chosen) {
@@ -235,7 +205,8 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
       const VectorXd& amplitude = w.estimate.amplitude[k++];
       if (c.candidate->record().kind_class == "run_state") {
         const auto& t = w.train[0]->s.t;
-        out.after -= Track(c, amplitude, q, out.after, w.estimate.sigma, t[t.size() - 1] - t[0]);
+        const RunState state = MakeRunState(*c.candidate, c.eta, amplitude, t[t.size() - 1] - t[0]);
+        out.after -= Track(state, q, out.after, w.estimate.sigma);
         out.tracking = "run states followed one step ahead; delay one sample";
       } else {
         out.after -= CandidateTorque(*c.candidate, q, c.eta, amplitude);
@@ -255,7 +226,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
 
 std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
   const Work& w = *work_;
-  const Quantities q = MakeQuantities(model_, data, w.estimate.x, w.declared.eta, w.needs_flange);
+  const Quantities q = MakeQuantities(model_, w.arm, data, w.estimate.x, w.declared.eta, w.needs_flange);
   std::vector<MatrixXd> out;
   std::size_t k = 0;
   for (const Chosen& c : w.chosen)

@@ -35,7 +35,6 @@ Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, cons
 
 namespace {
 
-// A signal of the candidate's own joint over its used rows.
 // A signal of the candidate's joint j ("q") or of its other one ("q[k]") in the rows of joint j.
 VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::string name) {
   int j = candidate.joints().empty() ? candidate.rows()[0] : candidate.joints()[0];
@@ -49,10 +48,11 @@ VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::st
     const Quantities& log = evidence.logs[index.dataset[k]];
     const auto& s = log.data->s;
     const int at = index.sample[k];
-    out[k] = name == "q"      ? s.q(at, j)
+    out[k] = name == "t"      ? s.t[at]
+             : name == "q"    ? s.q(at, j)
              : name == "qd"   ? s.qd(at, j)
              : name == "temp" ? (s.temp.cols() > j ? s.temp(at, j) : 0)
-                              : log.tau_rigid(at, j);
+                              : log.parts.rigid(at, j);
   }
   return out;
 }
@@ -89,10 +89,18 @@ class Searcher {
 
  private:
   double Consider(const std::vector<double>& eta) {
-    const Gain g = m_.Try(GatherColumns(c_, e_, eta));
+    Gain g = m_.Try(GatherColumns(c_, e_, eta));
+    if (c_.columns() == 1 && c_.instance().columns[0].fixed_amplitude) HoldAmplitude(g);
     const double value = InBounds(c_, g) ? g.gain : 0;
     if (value > best_.gain.gain) best_.gain = g, best_.eta = eta;
     return value;
+  }
+  // What the column gains at its record's own amplitude: the parabola about the best one.
+  void HoldAmplitude(Gain& g) const {
+    if (g.rank == 0) return;
+    const double off = (c_.instance().columns[0].amplitude - g.amplitude[0]) / g.sd[0];
+    g.gain -= off * off;
+    g.rank = 0;
   }
   double FromUnit(int k, double u) const {
     const auto& p = c_.unknowns()[k];
@@ -178,6 +186,7 @@ class Searcher {
   void Spline() {
     const VectorXd signal = OwnSignal(c_, e_, c_.record().search.signal);
     if (signal.size() == 0 || signal.maxCoeff() - signal.minCoeff() <= 0) return;
+    if (c_.record().search.signal == "t" && e_.logs.size() != 1) return;  // each run has a time of its own
     Consider({signal.minCoeff(), signal.maxCoeff()});
   }
   // Windows [on, off] on a grid of the log's time, not shorter than the record's minimum; then refined.

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "codegen/src/generator/state_path.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::diagnosis {
@@ -11,18 +12,18 @@ namespace armcal::diagnosis {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, const VectorXd& x,
-                          const std::vector<double>& eta, bool flange) {
+Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque& arm, const calibration::Dataset& data,
+                          const VectorXd& x, const std::vector<double>& eta, bool flange) {
   Quantities out;
   out.data = &data;
-  const int n = model.joints(), front = model.front(), rigid = model.rigid();
-  std::vector<MatrixXd> row;
-  model.Regressor(data.s, {x.data(), static_cast<std::size_t>(model.columns())}, eta, row);
-  out.tau_rigid.resize(data.samples(), n);
-  for (int j = 0; j < n; ++j) out.tau_rigid.col(j) = row[j].middleCols(front, rigid) * x.segment(front, rigid);
-  model.GravityRegressor(data.s, row);
-  out.tau_gravity.resize(data.samples(), n);
-  for (int j = 0; j < n; ++j) out.tau_gravity.col(j) = row[j] * x.segment(front, rigid);
+  const int n = model.joints(), samples = data.samples();
+  out.parts = arm.Evaluate(data.s, {x.data() + model.front(), static_cast<std::size_t>(model.rigid())});
+  out.tau_model = calibration::Predict(model, data, x, eta);
+  out.dt = codegen::SampleSteps(data.s.t, samples, 0, out.restart);
+  out.dtau_model = MatrixXd::Zero(samples, n);
+  for (int k = 1; k + 1 < samples; ++k)  // central differences: the prediction carries no noise of the torque
+    if (!out.restart[k] && !out.restart[k + 1])
+      out.dtau_model.row(k) = (out.tau_model.row(k + 1) - out.tau_model.row(k - 1)) / (data.s.t[k + 1] - data.s.t[k - 1]);
   if (flange) model.BodyColumns(data.s, n - 1, out.flange);
   return out;
 }
@@ -41,7 +42,7 @@ MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantitie
 
 Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalogue,
                       std::vector<const calibration::Dataset*> logs)
-    : model(m), train(std::move(logs)), prior(calibration::MakePrior(m)), candidates(MakeCandidates(catalogue, m)) {
+    : model(m), arm(m), train(std::move(logs)), prior(calibration::MakePrior(m)), candidates(MakeCandidates(catalogue, m)) {
   if (train.empty()) throw io::InputError("diagnose: expected at least one training log");
   declared = calibration::WeightedFit(model, train);
   estimate.x = declared.x;
@@ -75,7 +76,7 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   const int n = model.joints(), columns = model.columns();
   evidence.logs.clear();
   for (const auto* d : train)
-    evidence.logs.push_back(MakeQuantities(model, *d, estimate.x, declared.eta, needs_flange));
+    evidence.logs.push_back(MakeQuantities(model, arm, *d, estimate.x, declared.eta, needs_flange));
   rows = BaseRows{};
   rows.index = evidence.index;
   rows.informative = prior.informative;

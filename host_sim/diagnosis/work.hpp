@@ -34,6 +34,7 @@ struct Diagnosis::Work {
   std::vector<NoiseModel> WhiteNoise() const;
 
   const codegen::Model& model;
+  codegen::ArmTorque arm;
   std::vector<const calibration::Dataset*> train;
   calibration::Prior prior;
   calibration::Fit declared;
@@ -46,9 +47,9 @@ struct Diagnosis::Work {
   bool needs_flange = false;
 };
 
-// Model torque and body columns of one dataset at x.
-Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, const Eigen::VectorXd& x,
-                          const std::vector<double>& eta, bool flange);
+// Model torque, its parts and body columns of one dataset at x.
+Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque& arm, const calibration::Dataset& data,
+                          const Eigen::VectorXd& x, const std::vector<double>& eta, bool flange);
 
 // Torque of a candidate with given parameters on a dataset, N x n.
 Eigen::MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities,

@@ -37,6 +37,7 @@ class Candidate {
   int columns() const { return static_cast<int>(instance_.columns.size()); }
   const std::vector<int>& rows() const { return rows_; }  // joints whose torque it touches
   bool reads(const std::string& input) const;
+  bool has_memory() const { return !graph_->states().empty(); }
   std::string name() const;  // "stribeck, joint 3"
 
   // value[c][r]: column c in row rows()[r], N values (empty where the column does not touch that row). time_s: what the

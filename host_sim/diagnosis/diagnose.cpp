@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
+#include "host_sim/diagnosis/grounds.hpp"
 #include "host_sim/diagnosis/run_state.hpp"
 #include "host_sim/diagnosis/work.hpp"
 
@@ -20,15 +22,8 @@ constexpr double kAccept = 15;  // score: odds of about e^7 to one after all pen
 constexpr double kKeepsOutOfFold = 0.35;
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates another
+constexpr double kNothing = 10;  // a gain that no score above zero can come from
 constexpr double kWorse = 1.005;           // held-out: a joint that gets worse by more than this refutes the term
-
-// Deviance of the candidate's joints without any new column.
-double DevianceWithout(const Metric& metric, const Columns& c, std::vector<NoiseModel>* noise = nullptr) {
-  Columns none;
-  none.joints = c.joints;
-  for (const MatrixXd& block : c.block) none.block.emplace_back(block.rows(), 0);
-  return metric.RefittedDeviance(none, noise);
-}
 
 bool SharesJoint(const Candidate& a, const Candidate& b) {
   return std::any_of(a.rows().begin(), a.rows().end(),
@@ -46,46 +41,50 @@ class Selector {
 
   // The best further term given those chosen; false if none is worth it.
   bool Next(const std::vector<const Chosen*>& terms, Chosen& out) {
-    w_.estimate = w_.Solve(terms);
-    w_.Prepare(terms);
-    const Metric white(w_.rows, w_.WhiteNoise());
+    const Grounds grounds(w_, terms);
     std::vector<Ranked> ranked;
     for (const auto& c : w_.candidates) {
-      if (AlreadyIn(*c, terms) || !IsExcited(*c, w_.evidence)) continue;
-      Found f = SearchCandidate(*c, w_.evidence, white);
+      if (AlreadyIn(*c, terms) || IsOutOfReach(*c, terms) || !IsExcited(*c, w_.evidence)) continue;
+      const Found f = SearchCandidate(*c, grounds.Of(*c));
+      gain_[c.get()] = f.gain.gain;
       if (f.score > 0) ranked.push_back({c.get(), f});
     }
-    std::sort(ranked.begin(), ranked.end(),
-              [](const Ranked& a, const Ranked& b) { return a.found.score > b.found.score; });
+    const auto stronger = [](const Ranked& a, const Ranked& b) { return a.found.score > b.found.score; };
+    std::sort(ranked.begin(), ranked.end(), stronger);
     if (ranked.size() > kRescored) ranked.resize(kRescored);
-    for (Ranked& r : ranked) {
-      const Columns c = GatherColumns(*r.candidate, w_.evidence, r.found.eta);
-      r.found.score = Score(r.found, DevianceWithout(white, c) - white.RefittedDeviance(c), w_.evidence);
-    }
+    for (Ranked& r : ranked) Rescore(grounds, r.found);
     std::sort(ranked.begin(), ranked.end(), [this](const Ranked& a, const Ranked& b) {
       // what is compiled in already wins among equals
       return a.found.score + Preference(a) > b.found.score + Preference(b);
     });
     for (std::size_t k = 0; k < ranked.size() && ranked[k].found.score > kAccept; ++k)
-      if (Accept(white, ranked, k, out)) return true;
+      if (Accept(grounds, ranked, k, out)) return true;
     return false;
   }
 
   // Searches a chosen term again with the others in; false if it no longer earns its place.
   bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
-    w_.estimate = w_.Solve(others);
-    w_.Prepare(others);
-    const Metric white(w_.rows, w_.WhiteNoise());
-    Found f = SearchCandidate(*term.candidate, w_.evidence, white);
+    const Grounds grounds(w_, others);
+    Found f = SearchCandidate(*term.candidate, grounds.Of(*term.candidate));
     if (f.gain.gain <= 0) return false;
-    const Columns c = GatherColumns(*term.candidate, w_.evidence, f.eta);
-    f.score = Score(f, DevianceWithout(white, c) - white.RefittedDeviance(c), w_.evidence);
+    Rescore(grounds, f);
     term.eta = f.eta;
     term.found = f;
     return f.score > kAccept;
   }
 
  private:
+  void Rescore(const Grounds& grounds, Found& f) const {
+    const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
+    const double with = grounds.Of(*f.candidate).metric.RefittedDeviance(c);
+    f.score = Score(f, grounds.DevianceWithout(c.joints) - with, w_.evidence);
+  }
+  // The latest term touches none of its joints, and there was nothing on them before.
+  bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const {
+    const auto known = gain_.find(&c);
+    return known != gain_.end() && !terms.empty() && known->second < kNothing &&
+           !SharesJoint(c, *terms.back()->candidate);
+  }
   double Preference(const Ranked& r) const {
     const auto& names = w_.standby;
     return std::find(names.begin(), names.end(), r.candidate->record().name) != names.end() ? 1e-3 : 0;
@@ -101,15 +100,17 @@ class Selector {
              (confusable && t->candidate->joints() == c.joints());
     });
   }
-  bool Accept(const Metric& white, const std::vector<Ranked>& ranked, std::size_t k, Chosen& out) {
+  bool Accept(const Grounds& grounds, const std::vector<Ranked>& ranked, std::size_t k, Chosen& out) {
     const Ranked& r = ranked[k];
     const Columns c = GatherColumns(*r.candidate, w_.evidence, r.found.eta);
     std::vector<NoiseModel> noise;
-    white.RefittedDeviance(c, &noise);
-    const Metric metric(w_.rows, noise);
-    const Gain gain = metric.Try(c);
-    const VectorXd folds = metric.CrossValidate(c, kBlocks, kFolds);
-    if (folds.sum() < kKeepsOutOfFold * gain.gain || (folds.array() > 0).count() < kFoldsThatImprove) return false;
+    (void)grounds.Of(*r.candidate).metric.RefittedDeviance(c, &noise);
+    const Metric without(w_.rows, noise), with(grounds.RowsOf(*r.candidate), noise);
+    const Gain gain = with.Try(c);
+    const double gained = gain.gain + without.Cost() - with.Cost();
+    const VectorXd folds =
+        without.OutOfFold(Columns{}, kBlocks, kFolds) - with.OutOfFold(c, kBlocks, kFolds);
+    if (folds.sum() < kKeepsOutOfFold * gained || (folds.array() > 0).count() < kFoldsThatImprove) return false;
     out = Chosen{};
     out.candidate = r.candidate;
     out.eta = r.found.eta;
@@ -120,8 +121,7 @@ class Selector {
       const Candidate& o = *ranked[other].candidate;
       if (out.runner_up.empty()) out.runner_up = o.name(), out.runner_up_score = ranked[other].found.score;
       if (!SharesJoint(o, *r.candidate) || o.record().name == r.candidate->record().name) continue;
-      const auto [taken, own] =
-          metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].found.eta), c, gain.amplitude);
+      const auto [taken, own] = with.Imitates(GatherColumns(o, w_.evidence, ranked[other].found.eta), c, gain.amplitude);
       const double left = own - taken;
       const bool same = left < kIndistinguishable && left < 0.1 * own;
       const bool near = ranked[other].found.score > 0.95 * r.found.score;
@@ -131,6 +131,7 @@ class Selector {
   }
 
   Diagnosis::Work& w_;
+  std::map<const Candidate*, double> gain_;  // as last searched
 };
 
 std::vector<const Chosen*> Pointers(const std::vector<Chosen>& chosen, const Chosen* without = nullptr) {

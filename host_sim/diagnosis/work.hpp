@@ -31,7 +31,12 @@ struct Diagnosis::Work {
 
   // Refreshes model torque and base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
+  // Base rows with joint j's friction law taken out, for a candidate that takes its place.
+  BaseRows WithoutLaw(const BaseRows& all, const std::string& law, int j) const;
   std::vector<NoiseModel> WhiteNoise() const;
+  std::vector<int> LawOf(const std::string& law, int j) const;
+  void FillDeclared();
+  void MakeCoordinates(int size);
 
   const codegen::Model& model;
   codegen::ArmTorque arm;
@@ -43,6 +48,7 @@ struct Diagnosis::Work {
   BaseRows rows;
   Estimate estimate;
   std::vector<Chosen> chosen;
+  std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept where it does not hang on the estimate
   std::vector<std::string> standby;  // records compiled in, not yet estimated
   bool needs_flange = false;
 };

@@ -22,6 +22,7 @@ constexpr double kAccept = 15;  // score: odds of about e^7 to one after all pen
 constexpr double kKeepsOutOfFold = 0.35;
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates another
+constexpr int kSharpenings = 3;
 constexpr double kNothing = 10;  // a gain that no score above zero can come from
 constexpr double kWorse = 1.005;           // held-out: a joint that gets worse by more than this refutes the term
 
@@ -41,17 +42,19 @@ class Selector {
 
   // The best further term given those chosen; false if none is worth it.
   bool Next(const std::vector<const Chosen*>& terms, Chosen& out) {
-    const Grounds grounds(w_, terms);
-    std::vector<Ranked> ranked;
-    for (const auto& c : w_.candidates) {
-      if (AlreadyIn(*c, terms) || IsOutOfReach(*c, terms) || !IsExcited(*c, w_.evidence)) continue;
-      const Found f = SearchCandidate(*c, grounds.Of(*c));
-      gain_[c.get()] = f.gain.gain;
-      if (f.score > 0) ranked.push_back({c.get(), f});
+    Grounds grounds(w_, terms);
+    std::vector<Candidate*> reach;
+    for (const auto& c : w_.candidates)
+      if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence)) reach.push_back(c.get());
+    std::vector<Ranked> ranked = Rank(reach, grounds);
+    // A strong effect passes for noise, and under so much noise others look as good. Once it is known what it leaves,
+    // those that may be meant are searched again.
+    for (int round = 0; round < kSharpenings && !ranked.empty(); ++round) {
+      if (!grounds.Sharpen(GatherColumns(*ranked[0].candidate, w_.evidence, ranked[0].found.eta))) break;
+      reach.clear();
+      for (const Ranked& r : ranked) reach.push_back(r.candidate);
+      ranked = Rank(reach, grounds);
     }
-    const auto stronger = [](const Ranked& a, const Ranked& b) { return a.found.score > b.found.score; };
-    std::sort(ranked.begin(), ranked.end(), stronger);
-    if (ranked.size() > kRescored) ranked.resize(kRescored);
     for (Ranked& r : ranked) Rescore(grounds, r.found);
     std::sort(ranked.begin(), ranked.end(), [this](const Ranked& a, const Ranked& b) {
       // what is compiled in already wins among equals
@@ -65,7 +68,7 @@ class Selector {
   // Searches a chosen term again with the others in; false if it no longer earns its place.
   bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
     const Grounds grounds(w_, others);
-    Found f = SearchCandidate(*term.candidate, grounds.Of(*term.candidate));
+    Found f = SearchCandidate(*term.candidate, grounds.ground());
     if (f.gain.gain <= 0) return false;
     Rescore(grounds, f);
     term.eta = f.eta;
@@ -74,9 +77,22 @@ class Selector {
   }
 
  private:
+  // The strongest candidates by white score.
+  std::vector<Ranked> Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds) {
+    std::vector<Ranked> ranked;
+    for (Candidate* c : candidates) {
+      const Found f = SearchCandidate(*c, grounds.ground());
+      gain_[c] = f.gain.gain;
+      if (f.score > 0) ranked.push_back({c, f});
+    }
+    const auto stronger = [](const Ranked& a, const Ranked& b) { return a.found.score > b.found.score; };
+    std::sort(ranked.begin(), ranked.end(), stronger);
+    if (ranked.size() > kRescored) ranked.resize(kRescored);
+    return ranked;
+  }
   void Rescore(const Grounds& grounds, Found& f) const {
     const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
-    const double with = grounds.Of(*f.candidate).metric.RefittedDeviance(c);
+    const double with = grounds.metric().RefittedDeviance(c);
     f.score = Score(f, grounds.DevianceWithout(c.joints) - with, w_.evidence);
   }
   // The latest term touches none of its joints, and there was nothing on them before.
@@ -104,13 +120,11 @@ class Selector {
     const Ranked& r = ranked[k];
     const Columns c = GatherColumns(*r.candidate, w_.evidence, r.found.eta);
     std::vector<NoiseModel> noise;
-    (void)grounds.Of(*r.candidate).metric.RefittedDeviance(c, &noise);
-    const Metric without(w_.rows, noise), with(grounds.RowsOf(*r.candidate), noise);
-    const Gain gain = with.Try(c);
-    const double gained = gain.gain + without.Cost() - with.Cost();
-    const VectorXd folds =
-        without.OutOfFold(Columns{}, kBlocks, kFolds) - with.OutOfFold(c, kBlocks, kFolds);
-    if (folds.sum() < kKeepsOutOfFold * gained || (folds.array() > 0).count() < kFoldsThatImprove) return false;
+    (void)grounds.metric().RefittedDeviance(c, &noise);
+    const Metric metric(w_.rows, noise);
+    const Gain gain = metric.Try(c);
+    const VectorXd folds = metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds);
+    if (folds.sum() < kKeepsOutOfFold * gain.gain || (folds.array() > 0).count() < kFoldsThatImprove) return false;
     out = Chosen{};
     out.candidate = r.candidate;
     out.eta = r.found.eta;
@@ -121,7 +135,7 @@ class Selector {
       const Candidate& o = *ranked[other].candidate;
       if (out.runner_up.empty()) out.runner_up = o.name(), out.runner_up_score = ranked[other].found.score;
       if (!SharesJoint(o, *r.candidate) || o.record().name == r.candidate->record().name) continue;
-      const auto [taken, own] = with.Imitates(GatherColumns(o, w_.evidence, ranked[other].found.eta), c, gain.amplitude);
+      const auto [taken, own] = metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].found.eta), c, gain.amplitude);
       const double left = own - taken;
       const bool same = left < kIndistinguishable && left < 0.1 * own;
       const bool near = ranked[other].found.score > 0.95 * r.found.score;

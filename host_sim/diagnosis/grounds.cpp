@@ -1,44 +1,25 @@
-// diagnosis - metrics are made when a candidate first asks for them.
+// diagnosis - base rows and metrics of a pass.
 #include "host_sim/diagnosis/grounds.hpp"
 
 namespace armcal::diagnosis {
 
 namespace {
 constexpr int kThinnedRows = 2500;  // of a log: a coarse grid needs to see where the gain is, not how large
-}
+constexpr double kClearly = 0.9;    // of a joint's noise: below this a found effect was most of what looked like noise
+}  // namespace
 
 Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms) : work_(work) {
   work_.estimate = work_.Solve(terms);
   work_.Prepare(terms);
   thinned_ = std::make_unique<Thinned>(work_.evidence, kThinnedRows);
-  auto base = std::make_unique<Place>();
-  base->all = &work_.rows;
-  base->metric = std::make_unique<Metric>(work_.rows, work_.WhiteNoise());
-  base->thin_rows = thinned_->Pick(work_.rows);
-  base->thin_metric = std::make_unique<Metric>(base->thin_rows, work_.WhiteNoise());
-  place_[{"", -1}] = std::move(base);
+  thin_rows_ = thinned_->Pick(work_.rows);
+  MakeMetrics(work_.WhiteNoise());
 }
 
-const Grounds::Place& Grounds::At(const Candidate& candidate) const {
-  const std::string& law = candidate.record().replaces;
-  const int j = candidate.joints().empty() ? -1 : candidate.joints()[0];
-  const Place& base = *place_.at({"", -1});
-  if (law.empty() || work_.LawOf(law, j).empty()) return base;
-  auto& place = place_[{law, j}];
-  if (place) return *place;
-  place = std::make_unique<Place>();
-  place->own = work_.WithoutLaw(work_.rows, law, j);
-  place->all = &place->own;
-  place->metric = std::make_unique<Metric>(*base.metric, place->own, j);
-  place->thin_rows = thinned_->Pick(place->own);
-  place->thin_metric = std::make_unique<Metric>(*base.thin_metric, place->thin_rows, j);
-  place->cost = place->metric->Cost() - base.metric->Cost();
-  return *place;
-}
-
-Ground Grounds::Of(const Candidate& candidate) const {
-  const Place& p = At(candidate);
-  return {work_.evidence, *thinned_, *p.metric, *p.thin_metric, p.cost};
+void Grounds::MakeMetrics(const std::vector<NoiseModel>& noise) {
+  metric_ = std::make_unique<Metric>(work_.rows, noise);
+  thin_metric_ = std::make_unique<Metric>(thin_rows_, noise);
+  without_.clear();
 }
 
 double Grounds::DevianceWithout(const std::vector<int>& joints) const {
@@ -47,7 +28,22 @@ double Grounds::DevianceWithout(const std::vector<int>& joints) const {
   Columns none;
   none.joints = joints;
   for (const int j : joints) none.block.emplace_back(work_.rows.index[j].size(), 0);
-  return at->second = place_.at({"", -1})->metric->RefittedDeviance(none);
+  return at->second = metric_->RefittedDeviance(none);
+}
+
+bool Grounds::Sharpen(const Columns& with) {
+  std::vector<NoiseModel> noise = metric_->noise();
+  bool clearly = false;
+  for (int j = 0; j < work_.rows.joints(); ++j) {
+    const Eigen::VectorXd e = metric_->ResidualWith(with, j);
+    if (e.size() == 0) continue;
+    const double spread = std::sqrt(e.squaredNorm() / static_cast<double>(e.size()));
+    if (spread > kClearly * noise[j].innovation) continue;
+    noise[j].innovation = std::max(spread, 1e-12);
+    clearly = true;
+  }
+  if (clearly) MakeMetrics(noise);
+  return clearly;
 }
 
 }  // namespace armcal::diagnosis

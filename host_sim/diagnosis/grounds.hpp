@@ -1,5 +1,4 @@
-// diagnosis - the base rows of one pass on which candidates are tried, whole and thinned; one set more for each friction
-// law that a candidate takes the place of.
+// diagnosis - what candidates of one pass are tried on: the base with the terms so far, whole and thinned.
 #pragma once
 
 #include <map>
@@ -13,24 +12,20 @@ class Grounds {
   // Fits the base with the given terms and takes its residuals' spread as white noise.
   Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms);
 
-  Ground Of(const Candidate& candidate) const;
-  const BaseRows& RowsOf(const Candidate& candidate) const { return At(candidate).rows(); }
+  Ground ground() const { return {work_.evidence, *thinned_, *metric_, *thin_metric_}; }
+  const Metric& metric() const { return *metric_; }
   // Deviance of these joints with no further column.
   double DevianceWithout(const std::vector<int>& joints) const;
+  // Takes as noise what the fit with these columns leaves; true if it is clearly less.
+  bool Sharpen(const Columns& with);
 
  private:
-  struct Place {
-    BaseRows own, thin_rows;  // own: empty where the work's rows serve
-    const BaseRows* all = nullptr;
-    std::unique_ptr<Metric> metric, thin_metric;
-    double cost = 0;
-    const BaseRows& rows() const { return *all; }
-  };
-  const Place& At(const Candidate& candidate) const;
+  void MakeMetrics(const std::vector<NoiseModel>& noise);
 
   Diagnosis::Work& work_;
   std::unique_ptr<Thinned> thinned_;
-  mutable std::map<std::pair<std::string, int>, std::unique_ptr<Place>> place_;  // (law, joint); ("", -1): all of the base
+  BaseRows thin_rows_;
+  std::unique_ptr<Metric> metric_, thin_metric_;
   mutable std::map<std::vector<int>, double> without_;
 };
 

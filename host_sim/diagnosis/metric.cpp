@@ -74,6 +74,11 @@ void Metric::Solve() {
   factor_.compute(hessian);
   z_ = factor_.solve(right);
   for (int j = 0; j < n; ++j) residual_[j] = y_[j] - q_[j] * (map_[j] * z_);
+  bounded_sd_.resize(static_cast<Eigen::Index>(rows_.bounded.size()));
+  for (std::size_t k = 0; k < rows_.bounded.size(); ++k) {
+    const VectorXd row = rows_.L.row(rows_.bounded[k].coordinate).transpose();
+    bounded_sd_[static_cast<Eigen::Index>(k)] = std::sqrt(std::max(0.0, row.dot(factor_.solve(row))));
+  }
 }
 
 Metric::Metric(const BaseRows& rows, std::vector<NoiseModel> noise) : rows_(rows), noise_(std::move(noise)) {
@@ -83,26 +88,26 @@ Metric::Metric(const BaseRows& rows, std::vector<NoiseModel> noise) : rows_(rows
   Solve();
 }
 
-Metric::Metric(const Metric& like, const BaseRows& rows, int j)
-    : rows_(rows),
-      noise_(like.noise_),
-      map_(like.map_),
-      q_(like.q_),
-      residual_(like.residual_),
-      y_(like.y_),
-      gram_(like.gram_),
-      right_(like.right_) {
-  WhitenJoint(j);
-  Solve();
-}
-
-double Metric::Cost() const {
-  double sum = prior() * z_.squaredNorm();
-  for (const VectorXd& r : residual_) sum += r.squaredNorm();
-  return sum;
+bool Metric::InBounds(const Gain& g, const std::vector<int>& joints) const {
+  for (std::size_t k = 0; k < rows_.bounded.size(); ++k) {
+    const Bounded& b = rows_.bounded[k];
+    if (std::find(joints.begin(), joints.end(), b.joint) == joints.end()) continue;
+    const double x = rows_.mean[b.coordinate] + rows_.L.row(b.coordinate).dot(g.z);
+    const double slack = 2 * bounded_sd_[static_cast<Eigen::Index>(k)];
+    if (x < b.lower - slack || x > b.upper + slack) return false;
+  }
+  return true;
 }
 
 VectorXd Metric::RawResidual(int j) const { return rows_.target[j] - rows_.design[j] * (map_[j] * z_); }
+
+VectorXd Metric::ResidualWith(const Columns& c, int j) const {
+  const Gain g = Try(c);
+  VectorXd e = rows_.target[j] - rows_.design[j] * (map_[j] * g.z);
+  const auto at = std::find(c.joints.begin(), c.joints.end(), j);
+  if (at != c.joints.end()) e -= c.block[static_cast<std::size_t>(at - c.joints.begin())] * g.amplitude;
+  return e;
+}
 
 MatrixXd Metric::WhitenedColumns(const Columns& c, int r) const {
   return WhitenAll(noise_[c.joints[r]], rows_.index[c.joints[r]], c.block[r]);
@@ -125,7 +130,9 @@ Metric::Projection Metric::Project(const Columns& c) const {
 
 Gain Metric::Try(const Columns& c) const {
   const Projection p = Project(c);
-  return SolveGain(p.S, p.g, p.norm2);
+  Gain gain = SolveGain(p.S, p.g, p.norm2);
+  gain.z = z_ - factor_.solve(p.B * gain.amplitude);
+  return gain;
 }
 
 VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds) const {

@@ -25,6 +25,13 @@ struct Gain {
   double gain = 0;                // decrease of chi^2
   int rank = 0;                   // directions that the data see
   Eigen::VectorXd amplitude, sd;  // of the columns
+  Eigen::VectorXd z;              // of the base with the columns in
+};
+
+// A parameter of the base that cannot take every value, for instance a Coulomb level.
+struct Bounded {
+  int joint, coordinate;
+  double lower, upper;
 };
 
 // Raw (unwhitened) rows of the base model, shared by all metrics of one pass.
@@ -33,6 +40,7 @@ struct BaseRows {
   std::vector<std::vector<int>> columns;  // [n] the coordinates x that act on joint j
   std::vector<Eigen::MatrixXd> design;    // [n] rows x columns[j]
   std::vector<Eigen::VectorXd> target;    // [n] tau minus the prior mean's torque
+  std::vector<Bounded> bounded;
   bool informative = true;                // z has unit prior
   Eigen::MatrixXd L;                      // x - mean = L z
   Eigen::VectorXd mean;
@@ -43,13 +51,12 @@ struct BaseRows {
 class Metric {
  public:
   Metric(const BaseRows& rows, std::vector<NoiseModel> noise);
-  // The same noise on rows that differ from `like`'s in joint j alone.
-  Metric(const Metric& like, const BaseRows& rows, int j);
 
   Gain Try(const Columns& c) const;
-  // chi^2 of all whitened residuals after the base fit, prior included.
-  double Cost() const;
+  // No bounded parameter of the joints given leaves its range at g (by more than 2 standard deviations).
+  bool InBounds(const Gain& g, const std::vector<int>& joints) const;
   Eigen::VectorXd RawResidual(int j) const;  // torque units
+  Eigen::VectorXd ResidualWith(const Columns& c, int j) const;  // torque units, C fitted too
   const std::vector<NoiseModel>& noise() const { return noise_; }
   const Eigen::VectorXd& z() const { return z_; }
 
@@ -86,7 +93,7 @@ class Metric {
   std::vector<Eigen::MatrixXd> gram_;   // [n] of q_
   std::vector<Eigen::VectorXd> right_;  // [n] q_' y_
   Eigen::LLT<Eigen::MatrixXd> factor_;
-  Eigen::VectorXd z_;
+  Eigen::VectorXd z_, bounded_sd_;
 };
 
 }  // namespace armcal::diagnosis

@@ -46,6 +46,9 @@ bool InBounds(const Candidate& candidate, const Gain& gain) {
   return true;
 }
 
+constexpr int kSweeps = 4;           // of a pattern search at one step size
+constexpr double kWorthAStep = 0.3;  // of chi^2: less is below what noise moves it by
+
 class Searcher {
  public:
   Searcher(Candidate& candidate, const Ground& ground) : c_(candidate), g_(ground), e_(ground.evidence) {
@@ -62,31 +65,33 @@ class Searcher {
     else if (c_.unknowns().empty()) Consider(best_.eta);
     else Profile();
     best_.parameters = best_.gain.rank + searched_;
-    best_.gain.gain -= g_.cost;
     best_.score = Score(best_, best_.gain.gain, e_);
     return best_;
   }
 
  private:
   double Consider(const std::vector<double>& eta) {
-    const Gain g = Value(g_.metric.Try(GatherColumns(c_, e_, eta)));
+    const Gain g = Value(g_.metric, GatherColumns(c_, e_, eta));
     if (g.gain > best_.gain.gain) best_.gain = g, best_.eta = eta;
     return g.gain;
   }
   double ConsiderThinned(const std::vector<double>& eta) const {
-    return Value(g_.thin_metric.Try(g_.thinned.Gather(c_, eta))).gain;
+    return Value(g_.thin_metric, g_.thinned.Gather(c_, eta)).gain;
   }
-  // Amplitudes held or out of bounds, and what the candidate takes the place of, are counted.
-  Gain Value(Gain g) const {
+  // Amplitudes held, or out of bounds, are counted. A law that could take the declared one's place may stand beside it,
+  // as two frictions in one joint do, but not against it.
+  Gain Value(const Metric& metric, const Columns& columns) const {
+    Gain g = metric.Try(columns);
     if (c_.columns() == 1 && c_.instance().columns[0].fixed_amplitude) HoldAmplitude(g);
-    g.gain = InBounds(c_, g) ? g.gain : 0;
+    const bool rival = !c_.record().replaces.empty();
+    if (!InBounds(c_, g) || (rival && !metric.InBounds(g, c_.rows()))) g.gain = 0;
     return g;
   }
   // Half of what a score above zero needs: what a refinement may still bring.
   bool Promising() const {
     Found f = best_;
     f.parameters = f.gain.rank + searched_;
-    return f.gain.gain - g_.cost > -0.5 * Score(f, 0, e_);
+    return f.gain.gain > -0.5 * Score(f, 0, e_);
   }
   // What the column gains at its record's own amplitude: the parabola about the best one.
   void HoldAmplitude(Gain& g) const {
@@ -104,18 +109,21 @@ class Searcher {
     return p.logarithmic ? std::log(v / p.lower) / std::log(p.upper / p.lower) : (v - p.lower) / (p.upper - p.lower);
   }
   using Evaluator = std::function<double(const std::vector<double>&)>;
-  // Pattern search in unit coordinates from eta; halves its steps. Returns where it ends.
+  // Pattern search in unit coordinates from eta: steps while that helps, then halves them. Returns where it ends.
   std::vector<double> Refine(std::vector<double> eta, double step, int rounds, const Evaluator& evaluate) const {
     double value = evaluate(eta);
     for (int round = 0; round < rounds; ++round, step /= 2)
-      for (std::size_t k = 0; k < eta.size(); ++k)
-        for (const double sign : {-1.0, 1.0}) {
-          std::vector<double> next = eta;
-          const double u = ToUnit(static_cast<int>(k), eta[k]) + sign * step;
-          if (u < 0 || u > 1) continue;
-          next[k] = FromUnit(static_cast<int>(k), u);
-          if (const double v = evaluate(next); v > value) value = v, eta = next;
-        }
+      for (int sweep = 0, better = 1; better && sweep < kSweeps; ++sweep) {
+        better = 0;
+        for (std::size_t k = 0; k < eta.size(); ++k)
+          for (const double sign : {-1.0, 1.0}) {
+            std::vector<double> next = eta;
+            const double u = ToUnit(static_cast<int>(k), eta[k]) + sign * step;
+            if (u < 0 || u > 1) continue;
+            next[k] = FromUnit(static_cast<int>(k), u);
+            if (const double v = evaluate(next); v > value + kWorthAStep) value = v, eta = next, better = 1;
+          }
+      }
     return eta;
   }
   void RefineBest(double step, int rounds) {

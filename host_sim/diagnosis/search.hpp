@@ -39,7 +39,6 @@ struct Ground {
   const Thinned& thinned;
   const Metric& metric;
   const Metric& thin_metric;
-  double cost = 0;  // chi^2 that was lost by taking out what a candidate takes the place of
 };
 
 // The excitation the record asks for is in the logs.

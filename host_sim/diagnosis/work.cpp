@@ -78,35 +78,6 @@ std::vector<NoiseModel> Diagnosis::Work::WhiteNoise() const {
   return noise;
 }
 
-// Coordinates of joint j's friction law of this name.
-std::vector<int> Diagnosis::Work::LawOf(const std::string& law, int j) const {
-  std::vector<int> out;
-  for (std::size_t a = 0; a < declared.active.size(); ++a) {
-    const int c = declared.active[a];
-    if (c >= model.columns() || model.is_rigid(c) || model.column_joint(c) != j) continue;
-    if (model.table()[model.table_index(c)].effect == law) out.push_back(static_cast<int>(a));
-  }
-  return out;
-}
-
-BaseRows Diagnosis::Work::WithoutLaw(const BaseRows& all, const std::string& law, int j) const {
-  BaseRows out = all;
-  const std::vector<int> gone = LawOf(law, j);
-  std::vector<int> kept;
-  for (std::size_t i = 0; i < all.columns[j].size(); ++i) {
-    const int a = all.columns[j][i];
-    if (std::find(gone.begin(), gone.end(), a) == gone.end()) kept.push_back(static_cast<int>(i));
-    else out.target[j] += all.mean[a] * all.design[j].col(static_cast<Eigen::Index>(i)), out.mean[a] = 0;
-  }
-  out.columns[j].clear();
-  out.design[j].resize(all.design[j].rows(), static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    out.columns[j].push_back(all.columns[j][static_cast<std::size_t>(kept[i])]);
-    out.design[j].col(static_cast<Eigen::Index>(i)) = all.design[j].col(kept[i]);
-  }
-  return out;
-}
-
 // The declared model's rows over the used samples, coordinates declared.active.
 void Diagnosis::Work::FillDeclared() {
   const int n = model.joints(), columns = model.columns(), active = static_cast<int>(declared.active.size());
@@ -137,6 +108,12 @@ void Diagnosis::Work::FillDeclared() {
     }
     for (int k = 0; k < index.size(); ++k)
       target[k] = train[index.dataset[k]]->tau(index.sample[k], j) - at_mean[index.dataset[k]][index.sample[k]];
+    for (const int a : own) {
+      const int c = declared.active[a];
+      if (c >= columns || model.is_rigid(c) || model.column_joint(c) != j) continue;
+      const auto& p = model.table()[model.table_index(c)];
+      if (std::isfinite(p.lower) || std::isfinite(p.upper)) rows.bounded.push_back({j, a, p.lower, p.upper});
+    }
     rows.columns.push_back(std::move(own));
     rows.design.push_back(std::move(design));
     rows.target.push_back(std::move(target));
@@ -154,8 +131,6 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   FillDeclared();
   int size = active;
   for (const Chosen* t : terms) {
-    if (const std::string& law = t->candidate->record().replaces; !law.empty())
-      rows = WithoutLaw(rows, law, t->candidate->joints()[0]);
     const Columns c = GatherColumns(*t->candidate, evidence, t->eta);
     for (std::size_t r = 0; r < c.joints.size(); ++r) {
       const int j = c.joints[r];

@@ -31,10 +31,7 @@ struct Diagnosis::Work {
 
   // Refreshes model torque and base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
-  // Base rows with joint j's friction law taken out, for a candidate that takes its place.
-  BaseRows WithoutLaw(const BaseRows& all, const std::string& law, int j) const;
   std::vector<NoiseModel> WhiteNoise() const;
-  std::vector<int> LawOf(const std::string& law, int j) const;
   void FillDeclared();
   void MakeCoordinates(int size);
 

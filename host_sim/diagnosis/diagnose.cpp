@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "host_sim/calibration/delay.hpp"
 #include "host_sim/diagnosis/grounds.hpp"
 #include "host_sim/diagnosis/run_state.hpp"
 #include "host_sim/diagnosis/work.hpp"
@@ -155,6 +156,18 @@ std::vector<const Chosen*> Pointers(const std::vector<Chosen>& chosen, const Cho
   return out;
 }
 
+double TotalDelay_s(const std::vector<Chosen>& chosen) {
+  double sum = 0;
+  for (const Chosen& c : chosen) sum += c.confirmed ? c.delay_s : 0;
+  return sum;
+}
+
+// A log as the confirmed terms say that it was measured.
+calibration::Dataset AsTermsSay(const std::vector<Chosen>& chosen, const calibration::Dataset& log) {
+  const double delay_s = TotalDelay_s(chosen);
+  return delay_s != 0 ? calibration::Delayed(log, delay_s) : log;
+}
+
 void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
   finding.terms.clear();
   std::size_t k = 0;
@@ -170,7 +183,10 @@ void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
     t.runner_up = c.runner_up, t.runner_up_score = c.runner_up_score;
     t.confirmed = c.confirmed;
     t.amplitude = VectorXd::Zero(c.candidate->columns()), t.sd = t.amplitude;
-    if (c.confirmed) t.amplitude = w.estimate.amplitude[k], t.sd = w.estimate.sd[k], ++k;
+    if (c.confirmed) {
+      t.amplitude = w.estimate.amplitude[k], t.sd = w.estimate.sd[k], ++k;
+      if (c.delay_s != 0) t.amplitude[0] += c.delay_s;
+    }
     finding.terms.push_back(std::move(t));
   }
   finding.x = w.estimate.x;
@@ -185,10 +201,13 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
     : model_(model), work_(std::make_unique<Work>(model, catalogue, std::move(train))) {
   Work& w = *work_;
   Selector select(w);
-  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Pointers(w.chosen), next);)
+  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Pointers(w.chosen), next);) {
     w.chosen.push_back(next);
+    w.ApplyDelay(w.chosen);
+  }
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
-    if (select.StillEarns(w.chosen[k], Pointers(w.chosen, &w.chosen[k]))) ++k;
+    if (w.chosen[k].delay_s != 0) ++k;  // the logs are as it says now
+    else if (select.StillEarns(w.chosen[k], Pointers(w.chosen, &w.chosen[k]))) ++k;
     else w.chosen.erase(w.chosen.begin() + static_cast<long>(k));
   }
   std::sort(w.chosen.begin(), w.chosen.end(),
@@ -212,8 +231,9 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   const VectorXd before = calibration::Rms(test, out.before, true);
   for (;;) {
     w.estimate = w.Solve(Pointers(w.chosen));
-    const Quantities q = MakeQuantities(model_, w.arm, test, w.estimate.x, w.declared.eta, w.needs_flange);
-    out.after = test.tau - calibration::Predict(model_, test, w.estimate.x, w.declared.eta);
+    const calibration::Dataset seen = AsTermsSay(w.chosen, test);
+    const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
+    out.after = test.tau - calibration::Predict(model_, seen, w.estimate.x, w.declared.eta);
     std::size_t k = 0;
     for (const Chosen& c : w.chosen) {
       if (!c.confirmed) continue;
@@ -234,6 +254,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
         if (c.confirmed && after[j] > kWorse * before[j]) refuted = &c;  // the weakest one: they are sorted
     if (!refuted) break;
     refuted->confirmed = false;
+    if (refuted->delay_s != 0) w.SetDelay(TotalDelay_s(w.chosen));
   }
   WriteTerms(w, finding_);
   return out;
@@ -241,12 +262,16 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
 
 std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
   const Work& w = *work_;
-  const Quantities q = MakeQuantities(model_, w.arm, data, w.estimate.x, w.declared.eta, w.needs_flange);
+  const calibration::Dataset seen = AsTermsSay(w.chosen, data);
+  const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
   std::vector<MatrixXd> out;
   std::size_t k = 0;
-  for (const Chosen& c : w.chosen)
+  for (const Chosen& c : w.chosen) {
     out.push_back(c.confirmed ? CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[k++])
                               : MatrixXd::Zero(data.samples(), data.joints()));
+    if (c.confirmed && c.delay_s != 0)
+      out.back() += q.tau_model - calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
+  }
   return out;
 }
 

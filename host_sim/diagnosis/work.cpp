@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "codegen/src/generator/state_path.hpp"
+#include "host_sim/calibration/delay.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::diagnosis {
@@ -15,6 +16,7 @@ using Eigen::VectorXd;
 
 namespace {
 constexpr int kPasses = 3;
+constexpr int kDelayRounds = 2;  // the rest after the first is of second order, after the second of fourth
 constexpr double kSettled = 1e-3;  // relative change of the residuals' spread after which nothing else moves
 }  // namespace
 
@@ -48,7 +50,7 @@ MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantitie
 
 Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalogue,
                       std::vector<const calibration::Dataset*> logs)
-    : model(m), arm(m), train(std::move(logs)), prior(calibration::MakePrior(m)), candidates(MakeCandidates(catalogue, m)) {
+    : model(m), arm(m), train(std::move(logs)), logged(train), prior(calibration::MakePrior(m)), candidates(MakeCandidates(catalogue, m)) {
   if (train.empty()) throw io::InputError("diagnose: expected at least one training log");
   declared = calibration::WeightedFit(model, train);
   estimate.x = declared.x;
@@ -70,6 +72,35 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
         previous = k;
       }
     }
+}
+
+void Diagnosis::Work::SetDelay(double delay_s) {
+  delayed.clear();
+  for (const auto* d : logged) delayed.push_back(calibration::Delayed(*d, delay_s));
+  for (std::size_t k = 0; k < train.size(); ++k) train[k] = &delayed[k];
+  regressor.clear();
+}
+
+void Diagnosis::Work::ApplyDelay(std::vector<Chosen>& terms) {
+  for (int round = 0; round < kDelayRounds; ++round) {
+    std::vector<const Chosen*> confirmed;
+    for (const Chosen& c : terms)
+      if (c.confirmed) confirmed.push_back(&c);
+    estimate = Solve(confirmed);
+    double total_s = 0;
+    bool any = false;
+    std::size_t k = 0;
+    for (Chosen& c : terms) {
+      if (!c.confirmed) continue;
+      const double amplitude = estimate.amplitude[k++][0];
+      if (c.candidate->record().apply.how != "delay") continue;
+      c.delay_s += amplitude;
+      total_s += c.delay_s;
+      any = true;
+    }
+    if (!any) return;
+    SetDelay(total_s);
+  }
 }
 
 std::vector<NoiseModel> Diagnosis::Work::WhiteNoise() const {

@@ -15,6 +15,7 @@ struct Chosen {
   std::string runner_up;
   double runner_up_score = 0;
   bool confirmed = true;
+  double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
 };
 
 struct Diagnosis::Work {
@@ -32,12 +33,18 @@ struct Diagnosis::Work {
   // Refreshes model torque and base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
   std::vector<NoiseModel> WhiteNoise() const;
+  // Reads the logs' motion that much before their torque, from now on.
+  void SetDelay(double delay_s);
+  // Applies exactly what terms say of the measurement; their columns then hold the rest.
+  void ApplyDelay(std::vector<Chosen>& terms);
   void FillDeclared();
   void MakeCoordinates(int size);
 
   const codegen::Model& model;
   codegen::ArmTorque arm;
   std::vector<const calibration::Dataset*> train;
+  std::vector<const calibration::Dataset*> logged;  // as given
+  std::vector<calibration::Dataset> delayed;        // train points here once a delay has been applied
   calibration::Prior prior;
   calibration::Fit declared;
   std::vector<std::unique_ptr<Candidate>> candidates;

@@ -32,8 +32,8 @@ Dataset Derive(const codegen::Model& model, const io::Log& log, const Eigen::Vec
       if (d.s.qd(m, j) * d.s.qd(k, j) <= 0 || std::abs(d.s.qd(m, j)) <= model.robot().joint[j].v_min_radps) return true;
     return false;
   };
-  // A sign law that is smooth over more than v_min says that the joint does not stick: its friction is a function of speed
-  // at rest and near a turn, too.
+  // A sign law that is smooth over more than v_min says that the joint does not stick: its friction is a function of
+  // speed at rest and near a turn, too.
   const auto sticks = [&robot = model.robot()](int j) {
     return robot.sign_law != "tanh" || robot.joint[j].v_min_radps > robot.sign_width_radps;
   };

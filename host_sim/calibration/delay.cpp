@@ -22,8 +22,8 @@ Dataset Delayed(const Dataset& data, double delay_s) {
       for (int b = 0; b < 4; ++b)
         if (b != a) weight[a] *= (time - t[first + b]) / (t[first + a] - t[first + b]);
     }
-    for (const auto& [from, to] : {std::pair{&data.s.q, &out.s.q}, std::pair{&data.s.qd, &out.s.qd},
-                                   std::pair{&data.s.qdd, &out.s.qdd}}) {
+    for (const auto& [from, to] :
+         {std::pair{&data.s.q, &out.s.q}, std::pair{&data.s.qd, &out.s.qd}, std::pair{&data.s.qdd, &out.s.qdd}}) {
       to->row(i).setZero();
       for (int a = 0; a < 4; ++a) to->row(i) += weight[a] * from->row(first + a);
     }

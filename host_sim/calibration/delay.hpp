@@ -5,8 +5,8 @@
 
 namespace armcal::calibration {
 
-// The same log with position, speed and acceleration of delay_s before each torque sample (cubic between samples, held at
-// the ends): what a torque that is read late belongs to.
+// The same log with position, speed and acceleration of delay_s before each torque sample (cubic between samples, held
+// at the ends): what a torque that is read late belongs to.
 Dataset Delayed(const Dataset& data, double delay_s);
 
 }  // namespace armcal::calibration

@@ -39,9 +39,10 @@ void CheckClock(const io::Log& log) {
     if (speed.norm() < 1e-6 || bend > 0.5 * speed.norm()) continue;  // too slow or turning: nothing to tell it by
     const double passed = moved.dot(speed) / speed.squaredNorm();
     if (passed > 0.5 * (1 + std::min(steps, 5.0))) continue;
-    Fail(log, fmt::format("line {}: time jumps by {:.3g} s while the joints move on by one sample; expected the clock of "
-                          "one run",
-                          k + 3, log.t[k + 1] - log.t[k]));
+    Fail(log,
+         fmt::format("line {}: time jumps by {:.3g} s while the joints move on by one sample; expected the clock of "
+                     "one run",
+                     k + 3, log.t[k + 1] - log.t[k]));
   }
 }
 
@@ -77,11 +78,11 @@ void CheckPosition(const codegen::Robot& robot, const io::Log& log, int j) {
     const bool stuck = held * dt > kHeld_s;
     if (std::abs(step) > kJumpSpeed * joint.speed_limit_radps * dt)
       Fail(log, Joint(j) + fmt::format("line {}: position {} by {:.3g} in one sample, expected at most {:.3g}", k + 2,
-                                       stuck ? "is stuck, then jumps" : "jumps", step,
-                                       joint.speed_limit_radps * dt));
+                                       stuck ? "is stuck, then jumps" : "jumps", step, joint.speed_limit_radps * dt));
     const bool leaps = std::abs(step) > kStopAcceleration * joint.acceleration_limit_radps2 * dt * dt;
     if (stuck && step != 0 && leaps)
-      Fail(log, Joint(j) + fmt::format("line {}: position is stuck for {:.2g} s, then moves at once", k + 2, held * dt));
+      Fail(log,
+           Joint(j) + fmt::format("line {}: position is stuck for {:.2g} s, then moves at once", k + 2, held * dt));
     held = step == 0 ? held + 1 : 0;
     if (held * dt <= kHeld_s || (held - 1) * dt > kHeld_s || k - held < 3) continue;
     const Index start = k - held;  // the last sample before it froze; the speed into it
@@ -112,8 +113,9 @@ void CheckTorque(const codegen::Robot& robot, const io::Log& log, int j) {
     const bool moving = std::abs(log.q(k, j) - log.q(k - 1, j)) > joint.v_min_radps * dt;
     silent = moving && log.tau(k, j) == log.tau(k - 1, j) ? silent + 1 : 0;
     if (silent * dt <= kSilent_s) continue;
-    Fail(log, Joint(j) + fmt::format("line {}: torque stays at {:.3g} while the joint moves, expected a measured torque",
-                                     k + 2, log.tau(k, j)));
+    Fail(log,
+         Joint(j) + fmt::format("line {}: torque stays at {:.3g} while the joint moves, expected a measured torque",
+                                k + 2, log.tau(k, j)));
   }
 }
 

@@ -9,10 +9,10 @@
 
 namespace armcal::calibration {
 
-// From the samples alone and the robot's limits. InputError, one line naming file, joint and problem: a log shorter than
-// 3 s, a clock that jumps, more than a tenth of the samples missing, positions or torques far outside of the limits
-// (degrees, mN m), a position that jumps or sticks, a torque that is zero or does not change while the joint moves.
-// Returns what is worth a line but no refusal: gaps.
+// From the samples alone and the robot's limits. InputError, one line naming file, joint and problem: a log shorter
+// than 3 s, a clock that jumps, more than a tenth of the samples missing, positions or torques far outside of the
+// limits (degrees, mN m), a position that jumps or sticks, a torque that is zero or does not change while the joint
+// moves. Returns what is worth a line but no refusal: gaps.
 std::vector<std::string> CheckSignals(const codegen::Robot& robot, const io::Log& log);
 
 // Against the torque that the robot file's bodies need (arms with a prior): InputError where two columns are

@@ -104,8 +104,8 @@ namespace {
 // Whether the search binds what this record reads and knows how to look for it.
 bool CanBeTried(const codegen::EffectRecord& record) {
   if (record.search.how == "none" || record.search.how == "window") return false;
-  static const std::set<std::string> bound = {"q",           "qd",        "qdd",        "temp", "t",
-                                              "dt",          "tau_rigid", "tau_model",  "Y",    "M[:,j]",
+  static const std::set<std::string> bound = {"q",           "qd",         "qdd",        "temp", "t",
+                                              "dt",          "tau_rigid",  "tau_model",  "Y",    "M[:,j]",
                                               "tau_gravity", "dtau_model", "dY/dgravity"};
   return std::all_of(record.inputs.begin(), record.inputs.end(), [](const auto& i) { return bound.contains(i); });
 }

@@ -23,9 +23,10 @@ constexpr double kAccept = 15;  // score: odds of about e^7 to one after all pen
 constexpr double kKeepsOutOfFold = 0.35;
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates another
+constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr int kSharpenings = 3;
-constexpr double kNothing = 10;  // a gain that no score above zero can come from
-constexpr double kWorse = 1.005;           // held-out: a joint that gets worse by more than this refutes the term
+constexpr double kNothing = 10;   // a gain that no score above zero can come from
+constexpr double kWorse = 1.005;  // held-out: a joint that gets worse by more than this refutes the term
 
 bool SharesJoint(const Candidate& a, const Candidate& b) {
   return std::any_of(a.rows().begin(), a.rows().end(),
@@ -62,7 +63,7 @@ class Selector {
       return a.found.score + Preference(a) > b.found.score + Preference(b);
     });
     for (std::size_t k = 0; k < ranked.size() && ranked[k].found.score > kAccept; ++k)
-      if (Accept(grounds, ranked, k, out)) return true;
+      if (Accept(grounds, terms, ranked, k, out)) return true;
     return false;
   }
 
@@ -117,7 +118,19 @@ class Selector {
              (confusable && t->candidate->joints() == c.joints());
     });
   }
-  bool Accept(const Grounds& grounds, const std::vector<Ranked>& ranked, std::size_t k, Chosen& out) {
+  // Delay, elasticity and backlash look like what a derivation of speed and acceleration leaves: a term that is real
+  // gains about as much when these are derived otherwise.
+  bool StaysAtLowerBandwidth(const Ranked& r, const std::vector<const Chosen*>& terms, double gain,
+                             const std::vector<NoiseModel>& noise) {
+    if (!w_.narrow) return true;
+    Diagnosis::Work& narrow = *w_.narrow;
+    narrow.estimate = w_.estimate;
+    narrow.Prepare(terms);
+    return Metric(narrow.rows, noise).Try(GatherColumns(*r.candidate, narrow.evidence, r.found.eta)).gain >
+           kStays * gain;
+  }
+  bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Ranked>& ranked,
+              std::size_t k, Chosen& out) {
     const Ranked& r = ranked[k];
     const Columns c = GatherColumns(*r.candidate, w_.evidence, r.found.eta);
     std::vector<NoiseModel> noise;
@@ -126,6 +139,7 @@ class Selector {
     const Gain gain = metric.Try(c);
     const VectorXd folds = metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds);
     if (folds.sum() < kKeepsOutOfFold * gain.gain || (folds.array() > 0).count() < kFoldsThatImprove) return false;
+    if (!StaysAtLowerBandwidth(r, terms, gain.gain, noise)) return false;
     out = Chosen{};
     out.candidate = r.candidate;
     out.eta = r.found.eta;
@@ -136,7 +150,8 @@ class Selector {
       const Candidate& o = *ranked[other].candidate;
       if (out.runner_up.empty()) out.runner_up = o.name(), out.runner_up_score = ranked[other].found.score;
       if (!SharesJoint(o, *r.candidate) || o.record().name == r.candidate->record().name) continue;
-      const auto [taken, own] = metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].found.eta), c, gain.amplitude);
+      const auto [taken, own] =
+          metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].found.eta), c, gain.amplitude);
       const double left = own - taken;
       const bool same = left < kIndistinguishable && left < 0.1 * own;
       const bool near = ranked[other].found.score > 0.95 * r.found.score;
@@ -197,9 +212,13 @@ void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
 }  // namespace
 
 Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
-                     std::vector<const calibration::Dataset*> train)
+                     std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow)
     : model_(model), work_(std::make_unique<Work>(model, catalogue, std::move(train))) {
   Work& w = *work_;
+  if (!narrow.empty()) {
+    w.narrow = std::make_unique<Work>(model, codegen::Catalogue{}, std::move(narrow));
+    w.narrow->needs_flange = w.needs_flange;
+  }
   Selector select(w);
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Pointers(w.chosen), next);) {
     w.chosen.push_back(next);

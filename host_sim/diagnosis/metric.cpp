@@ -174,7 +174,8 @@ VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds) const {
     for (int j = 0; j < n; ++j) {
       const VectorXd local = map[j] * x;
       for (const auto& [begin, end] : fold_rows[static_cast<std::size_t>(f * n + j)])
-        error[f] += (y_[j].segment(begin, end - begin) - extended[j].middleRows(begin, end - begin) * local).squaredNorm();
+        error[f] +=
+            (y_[j].segment(begin, end - begin) - extended[j].middleRows(begin, end - begin) * local).squaredNorm();
     }
   }
   return error;

@@ -41,8 +41,8 @@ struct BaseRows {
   std::vector<Eigen::MatrixXd> design;    // [n] rows x columns[j]
   std::vector<Eigen::VectorXd> target;    // [n] tau minus the prior mean's torque
   std::vector<Bounded> bounded;
-  bool informative = true;                // z has unit prior
-  Eigen::MatrixXd L;                      // x - mean = L z
+  bool informative = true;  // z has unit prior
+  Eigen::MatrixXd L;        // x - mean = L z
   Eigen::VectorXd mean;
   int joints() const { return static_cast<int>(index.size()); }
   int coordinates() const { return static_cast<int>(L.cols()); }
@@ -55,7 +55,7 @@ class Metric {
   Gain Try(const Columns& c) const;
   // No bounded parameter of the joints given leaves its range at g (by more than 2 standard deviations).
   bool InBounds(const Gain& g, const std::vector<int>& joints) const;
-  Eigen::VectorXd RawResidual(int j) const;  // torque units
+  Eigen::VectorXd RawResidual(int j) const;                     // torque units
   Eigen::VectorXd ResidualWith(const Columns& c, int j) const;  // torque units, C fitted too
   const std::vector<NoiseModel>& noise() const { return noise_; }
   const Eigen::VectorXd& z() const { return z_; }

@@ -14,7 +14,8 @@ RunState MakeRunState(const Candidate& candidate, const std::vector<double>& eta
     out.variance_ps = 1 / train_s;
     return out;
   }
-  // A spline over time: its coefficients are the level's path from zero on, and its last column stands alone at the end.
+  // A spline over time: its coefficients are the level's path from zero on, and its last column stands alone at the
+  // end.
   const VectorXd& path = amplitude;
   double changes = path[0] * path[0];
   for (int k = 1; k < path.size(); ++k) changes += (path[k] - path[k - 1]) * (path[k] - path[k - 1]);

@@ -1,5 +1,5 @@
-// diagnosis - what a run-state term becomes on another run: a level that wanders, followed as the samples come; knows no
-// kind.
+// diagnosis - what a run-state term becomes on another run: a level that wanders, followed as the samples come; knows
+// no kind.
 #pragma once
 
 #include "host_sim/diagnosis/candidate.hpp"

@@ -265,8 +265,6 @@ double Score(const Found& found, double gain, const Evidence& evidence) {
          found.candidate->record().generic_penalty;
 }
 
-Found SearchCandidate(Candidate& candidate, const Ground& ground) {
-  return Searcher(candidate, ground).Run();
-}
+Found SearchCandidate(Candidate& candidate, const Ground& ground) { return Searcher(candidate, ground).Run(); }
 
 }  // namespace armcal::diagnosis

@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 
 namespace {
 constexpr int kPasses = 3;
-constexpr int kDelayRounds = 2;  // the rest after the first is of second order, after the second of fourth
+constexpr int kDelayRounds = 2;    // the rest after the first is of second order, after the second of fourth
 constexpr double kSettled = 1e-3;  // relative change of the residuals' spread after which nothing else moves
 }  // namespace
 
@@ -31,7 +31,8 @@ Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque&
   out.dtau_model = MatrixXd::Zero(samples, n);
   for (int k = 1; k + 1 < samples; ++k)  // central differences: the prediction carries no noise of the torque
     if (!out.restart[k] && !out.restart[k + 1])
-      out.dtau_model.row(k) = (out.tau_model.row(k + 1) - out.tau_model.row(k - 1)) / (data.s.t[k + 1] - data.s.t[k - 1]);
+      out.dtau_model.row(k) =
+          (out.tau_model.row(k + 1) - out.tau_model.row(k - 1)) / (data.s.t[k + 1] - data.s.t[k - 1]);
   if (flange) model.BodyColumns(data.s, n - 1, out.flange);
   return out;
 }
@@ -50,7 +51,12 @@ MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantitie
 
 Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalogue,
                       std::vector<const calibration::Dataset*> logs)
-    : model(m), arm(m), train(std::move(logs)), logged(train), prior(calibration::MakePrior(m)), candidates(MakeCandidates(catalogue, m)) {
+    : model(m),
+      arm(m),
+      train(std::move(logs)),
+      logged(train),
+      prior(calibration::MakePrior(m)),
+      candidates(MakeCandidates(catalogue, m)) {
   if (train.empty()) throw io::InputError("diagnose: expected at least one training log");
   declared = calibration::WeightedFit(model, train);
   estimate.x = declared.x;
@@ -79,6 +85,7 @@ void Diagnosis::Work::SetDelay(double delay_s) {
   for (const auto* d : logged) delayed.push_back(calibration::Delayed(*d, delay_s));
   for (std::size_t k = 0; k < train.size(); ++k) train[k] = &delayed[k];
   regressor.clear();
+  if (narrow) narrow->SetDelay(delay_s);
 }
 
 void Diagnosis::Work::ApplyDelay(std::vector<Chosen>& terms) {
@@ -134,8 +141,8 @@ void Diagnosis::Work::FillDeclared() {
     for (std::size_t i = 0; i < own.size(); ++i) {
       const int c = declared.active[own[i]];
       for (int k = 0; k < index.size(); ++k)
-        design(k, static_cast<Eigen::Index>(i)) =
-            c < columns ? regressor[index.dataset[k]][j](index.sample[k], c) : at_estimate[index.dataset[k]][index.sample[k]];
+        design(k, static_cast<Eigen::Index>(i)) = c < columns ? regressor[index.dataset[k]][j](index.sample[k], c)
+                                                              : at_estimate[index.dataset[k]][index.sample[k]];
     }
     for (int k = 0; k < index.size(); ++k)
       target[k] = train[index.dataset[k]]->tau(index.sample[k], j) - at_mean[index.dataset[k]][index.sample[k]];

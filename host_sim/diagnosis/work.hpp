@@ -53,8 +53,9 @@ struct Diagnosis::Work {
   Estimate estimate;
   std::vector<Chosen> chosen;
   std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept where it does not hang on the estimate
-  std::vector<std::string> standby;  // records compiled in, not yet estimated
+  std::vector<std::string> standby;                     // records compiled in, not yet estimated
   bool needs_flange = false;
+  std::unique_ptr<Work> narrow;  // the same logs at a lower bandwidth, without candidates of its own
 };
 
 // Model torque, its parts and body columns of one dataset at x.

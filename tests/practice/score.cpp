@@ -14,8 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr double kAllowed = 1.03;   // after over the RMS that the perfect model leaves
-constexpr double kAffected = 0.1;   // visible share of the noise from which a joint counts as affected
+constexpr double kAllowed = 1.03;  // after over the RMS that the perfect model leaves
+constexpr double kAffected = 0.1;  // visible share of the noise from which a joint counts as affected
 
 json Read(const fs::path& path) {
   std::ifstream in(path);

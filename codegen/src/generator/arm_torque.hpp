@@ -1,4 +1,5 @@
-// generator - rigid torque, gravity's part, mass matrix and the torque of tilted gravity over whole logs; knows no effect.
+// generator - rigid torque, gravity's part, mass matrix and the torque of tilted gravity over whole logs; knows no
+// effect.
 #pragma once
 
 #include "codegen/src/generator/model.hpp"
@@ -7,7 +8,7 @@ namespace armcal::codegen {
 
 // N samples, n joints.
 struct TorqueParts {
-  Eigen::MatrixXd rigid, gravity;                 // [N x n]
+  Eigen::MatrixXd rigid, gravity;                  // [N x n]
   std::vector<std::vector<Eigen::VectorXd>> mass;  // [row][joint] entry of M of (1)
   std::vector<std::vector<Eigen::VectorXd>> tilt;  // [row][axis] per m/s^2 of gravity along the base frame's x, y, z
 };

@@ -32,13 +32,18 @@ Dataset Derive(const codegen::Model& model, const io::Log& log, const Eigen::Vec
       if (d.s.qd(m, j) * d.s.qd(k, j) <= 0 || std::abs(d.s.qd(m, j)) <= model.robot().joint[j].v_min_radps) return true;
     return false;
   };
+  // A sign law that is smooth over more than v_min says that the joint does not stick: its friction is a function of
+  // speed at rest and near a turn, too.
+  const auto sticks = [&robot = model.robot()](int j) {
+    return robot.sign_law != "tanh" || robot.joint[j].v_min_radps > robot.sign_width_radps;
+  };
   const double begin = log.t[0] + kUnscored_s, end = log.t[samples - 1] - kUnscored_s;
   for (int k = 0; k < samples; ++k) {
     d.scored[k] = log.t[k] >= begin && log.t[k] <= end;
     for (int j = 0; j < n; ++j) {
       d.moving(k, j) = std::abs(d.s.qd(k, j)) > model.robot().joint[j].v_min_radps;
       const bool flagged = log.flags.cols() == n && (log.flags(k, j) & (kFlagSaturated | kFlagStale));
-      d.used(k, j) = d.moving(k, j) && derived.settled[k] && !flagged && !turning(k, j);
+      d.used(k, j) = derived.settled[k] && !flagged && (!sticks(j) || (d.moving(k, j) && !turning(k, j)));
     }
   }
   return d;

@@ -17,8 +17,10 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   const codegen::Model& model = *run->model;
   const LogReader read(model, o.channels);
   run->train = read.All(o.train);
+  const std::vector<calibration::Dataset> narrow = read.Narrow(o.train);
   const auto start = std::chrono::steady_clock::now();
-  run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, Pointers(run->train));
+  run->diagnosis =
+      std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, Pointers(run->train), Pointers(narrow));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const diagnosis::Finding& finding = run->diagnosis->finding();
 

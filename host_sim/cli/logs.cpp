@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include "host_sim/calibration/log_check.hpp"
 #include "host_sim/io/butterworth.hpp"
 #include "host_sim/io/channels.hpp"
 #include "host_sim/io/log.hpp"
@@ -14,7 +15,22 @@ io::Log LogReader::Raw(const std::string& path) const {
   return channels_.empty() ? io::ReadLog(path) : io::ReadLog(path, io::ReadChannelMap(channels_));
 }
 
-calibration::Dataset LogReader::One(const std::string& path) const { return calibration::Prepare(model_, Raw(path)); }
+calibration::Dataset LogReader::One(const std::string& path) const { return Checked(Raw(path)); }
+
+calibration::Dataset LogReader::Checked(const io::Log& log) const {
+  if (log.joints == model_.joints())  // Prepare names what is wrong otherwise
+    for (const std::string& note : calibration::CheckSignals(model_.robot(), log)) fmt::print(stderr, "{}\n", note);
+  calibration::Dataset data = calibration::Prepare(model_, log);
+  calibration::CheckAgainstModel(model_, data);
+  return data;
+}
+
+std::vector<calibration::Dataset> LogReader::Narrow(const std::vector<std::string>& paths) const {
+  constexpr double kNarrow = 0.62;  // of the chosen cut-off: half the noise of an acceleration
+  std::vector<calibration::Dataset> out;
+  for (const std::string& p : paths) out.push_back(calibration::Prepare(model_, Raw(p), kNarrow));
+  return out;
+}
 
 std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>& paths) const {
   std::vector<calibration::Dataset> out;

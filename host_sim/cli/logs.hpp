@@ -15,10 +15,15 @@ class LogReader {
   // channels: path of a channel map, empty for our own column names.
   LogReader(const codegen::Model& model, std::string channels) : model_(model), channels_(std::move(channels)) {}
   io::Log Raw(const std::string& path) const;
+  // Throws io::InputError where a log cannot be one of this arm; what is worth a line goes to stderr.
   calibration::Dataset One(const std::string& path) const;
   std::vector<calibration::Dataset> All(const std::vector<std::string>& paths) const;
+  // The same logs with speed and acceleration of a lower bandwidth.
+  std::vector<calibration::Dataset> Narrow(const std::vector<std::string>& paths) const;
 
  private:
+  calibration::Dataset Checked(const io::Log& log) const;
+
   const codegen::Model& model_;
   std::string channels_;
 };

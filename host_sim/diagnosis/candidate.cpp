@@ -2,8 +2,10 @@
 #include "host_sim/diagnosis/candidate.hpp"
 
 #include <algorithm>
-#include <map>
+#include <cstdio>
 #include <set>
+
+#include "codegen/src/generator/state_path.hpp"
 
 namespace armcal::diagnosis {
 
@@ -41,55 +43,70 @@ std::vector<double> Candidate::Initial() const {
   return eta;
 }
 
-void Candidate::Evaluate(const Quantities& quantities, const std::vector<double>& eta,
-                         std::vector<std::vector<VectorXd>>& value) const {
+namespace {
+
+// The log's column that a graph input stands for; null if the input is none of them.
+const double* ColumnOf(const Quantities& quantities, const std::string& name) {
   const codegen::Signals& s = quantities.data->s;
-  const auto column_of = [&](const std::string& name, codegen::Binding& b) {
-    const auto digits = name.find_first_of("0123456789");
-    if (name == "t") return b.column = s.t.data(), true;
-    if (name[0] == 'Y' && digits == 1) {
-      int row = 0, body = 0, p = 0;
-      std::sscanf(name.c_str(), "Y%d_%d_%d", &row, &body, &p);
-      return b.column = quantities.flange[row].col(p).data(), true;
-    }
-    if (digits == std::string::npos) return false;
-    const std::string quantity = name.substr(0, digits);
-    const int joint = std::atoi(name.c_str() + digits) - 1;
-    const Eigen::MatrixXd* m = quantity == "q"             ? &s.q
-                               : quantity == "qd"          ? &s.qd
-                               : quantity == "qdd"         ? &s.qdd
-                               : quantity == "temp"        ? &s.temp
-                               : quantity == "tau_rigid"   ? &quantities.tau_rigid
-                               : quantity == "tau_gravity" ? &quantities.tau_gravity
-                                                           : nullptr;
-    if (!m || joint < 0 || joint >= m->cols()) return false;
-    return b.column = m->col(joint).data(), true;
-  };
-  std::vector<codegen::Binding> bindings;
-  for (const std::string& input : graph_->inputs()) {
-    codegen::Binding b;
-    bool found = false;
-    for (std::size_t k = 0; k < unknowns().size(); ++k)
-      if (unknowns()[k].name == input) b.value = eta[k], found = true;
-    if (!found) column_of(input, b);
-    bindings.push_back(b);
+  if (name == "t") return s.t.data();
+  if (name == "dt") return quantities.dt.data();
+  const auto digits = name.find_first_of("0123456789");
+  if (digits == std::string::npos) return nullptr;
+  const std::string quantity = name.substr(0, digits);
+  int a = 0, b = 0, c = 0;
+  std::sscanf(name.c_str() + digits, "%d_%d_%d", &a, &b, &c);
+  if (quantity == "Y") return quantities.flange.at(a).col(c).data();
+  if (quantity == "M") return quantities.parts.mass[a][b].data();
+  if (quantity == "G") return quantities.parts.tilt[a][b].data();
+  const Eigen::MatrixXd* m = quantity == "q"             ? &s.q
+                             : quantity == "qd"          ? &s.qd
+                             : quantity == "qdd"         ? &s.qdd
+                             : quantity == "temp"        ? &s.temp
+                             : quantity == "tau_rigid"   ? &quantities.parts.rigid
+                             : quantity == "tau_gravity" ? &quantities.parts.gravity
+                             : quantity == "tau_model"   ? &quantities.tau_model
+                             : quantity == "dtau_model"  ? &quantities.dtau_model
+                                                         : nullptr;
+  return m && a >= 1 && a <= m->cols() ? m->col(a - 1).data() : nullptr;
+}
+
+}  // namespace
+
+void Candidate::Evaluate(const Quantities& quantities, const std::vector<double>& eta,
+                         std::vector<std::vector<VectorXd>>& value, std::optional<double> time_s) const {
+  const int samples = quantities.data->samples();
+  const auto& states = graph_->states();
+  std::vector<codegen::Binding> bindings(graph_->inputs().size());
+  for (std::size_t i = 0; i < bindings.size(); ++i) {
+    const std::string& input = graph_->inputs()[i];
+    const auto is_it = [&](const auto& u) { return u.name == input; };
+    const auto unknown = std::find_if(unknowns().begin(), unknowns().end(), is_it);
+    if (unknown != unknowns().end()) bindings[i].value = eta[static_cast<std::size_t>(unknown - unknowns().begin())];
+    else if (input == "t" && time_s) bindings[i].value = *time_s;
+    else if (std::none_of(states.begin(), states.end(), is_it)) bindings[i].column = ColumnOf(quantities, input);
+  }
+  Eigen::MatrixXd path;
+  if (!states.empty()) {
+    path = codegen::StatePath(*graph_, states.size(), bindings, samples, quantities.restart);
+    for (std::size_t k = 0; k < states.size(); ++k)
+      bindings[graph_->nodes()[states[k].value.id()].a].column = path.col(static_cast<Eigen::Index>(k)).data();
   }
   value.assign(columns(), std::vector<VectorXd>(rows_.size()));
   std::vector<double*> out;
   for (const auto& [c, r] : root_) {
-    value[c][r].resize(s.samples());
+    value[c][r].resize(samples);
     out.push_back(value[c][r].data());
   }
-  tape_->Evaluate(bindings, s.samples(), out);
+  tape_->Evaluate(bindings, samples, out);
 }
 
 namespace {
-// Whether the search has what this record reads: no memory from sample to sample, no quantity that it does not bind.
+// Whether the search binds what this record reads and knows how to look for it.
 bool CanBeTried(const codegen::EffectRecord& record) {
-  if (record.kind_class != "static" && record.kind_class != "run_state") return false;
   if (record.search.how == "none" || record.search.how == "window") return false;
-  if (record.search.signal == "t") return false;  // what a run did over time says nothing about another run
-  static const std::set<std::string> bound = {"q", "qd", "qdd", "temp", "t", "tau_rigid", "tau_gravity", "Y"};
+  static const std::set<std::string> bound = {"q",           "qd",         "qdd",        "temp", "t",
+                                              "dt",          "tau_rigid",  "tau_model",  "Y",    "M[:,j]",
+                                              "tau_gravity", "dtau_model", "dY/dgravity"};
   return std::all_of(record.inputs.begin(), record.inputs.end(), [](const auto& i) { return bound.contains(i); });
 }
 }  // namespace

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "codegen/src/generator/arm_torque.hpp"
 #include "codegen/src/generator/instance.hpp"
 #include "codegen/src/generator/tape.hpp"
 #include "host_sim/calibration/dataset.hpp"
@@ -15,8 +17,11 @@ namespace armcal::diagnosis {
 // one.
 struct Quantities {
   const calibration::Dataset* data = nullptr;
-  Eigen::MatrixXd tau_rigid, tau_gravity;  // [N x n]
-  std::vector<Eigen::MatrixXd> flange;     // [n] N x 10: rows of the last body's columns
+  codegen::TorqueParts parts;
+  Eigen::MatrixXd tau_model, dtau_model;  // [N x n] predicted torque and its rate
+  std::vector<Eigen::MatrixXd> flange;    // [n] N x 10: rows of the last body's columns
+  Eigen::VectorXd dt;                     // [N] time since the sample before
+  std::vector<char> restart;              // [N] 1: states start anew
 };
 
 // One candidate: a record on a set of joints. Columns are evaluated for given nonlinear parameters.
@@ -32,11 +37,13 @@ class Candidate {
   int columns() const { return static_cast<int>(instance_.columns.size()); }
   const std::vector<int>& rows() const { return rows_; }  // joints whose torque it touches
   bool reads(const std::string& input) const;
+  bool has_memory() const { return !graph_->states().empty(); }
   std::string name() const;  // "stribeck, joint 3"
 
-  // value[c][r]: column c in row rows()[r], N values (empty where the column does not touch that row).
+  // value[c][r]: column c in row rows()[r], N values (empty where the column does not touch that row). time_s: what the
+  // columns read as time for the whole log, instead of the log's own.
   void Evaluate(const Quantities& quantities, const std::vector<double>& eta,
-                std::vector<std::vector<Eigen::VectorXd>>& value) const;
+                std::vector<std::vector<Eigen::VectorXd>>& value, std::optional<double> time_s = {}) const;
 
   std::vector<double> Initial() const;
 

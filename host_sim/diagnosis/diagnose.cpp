@@ -3,7 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
+#include "host_sim/calibration/delay.hpp"
+#include "host_sim/diagnosis/grounds.hpp"
+#include "host_sim/diagnosis/run_state.hpp"
 #include "host_sim/diagnosis/work.hpp"
 
 namespace armcal::diagnosis {
@@ -19,15 +23,10 @@ constexpr double kAccept = 15;  // score: odds of about e^7 to one after all pen
 constexpr double kKeepsOutOfFold = 0.35;
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates another
-constexpr double kWorse = 1.005;           // held-out: a joint that gets worse by more than this refutes the term
-
-// Deviance of the candidate's joints without any new column.
-double DevianceWithout(const Metric& metric, const Columns& c, std::vector<NoiseModel>* noise = nullptr) {
-  Columns none;
-  none.joints = c.joints;
-  for (const MatrixXd& block : c.block) none.block.emplace_back(block.rows(), 0);
-  return metric.RefittedDeviance(none, noise);
-}
+constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
+constexpr int kSharpenings = 3;
+constexpr double kNothing = 10;   // a gain that no score above zero can come from
+constexpr double kWorse = 1.005;  // held-out: a joint that gets worse by more than this refutes the term
 
 bool SharesJoint(const Candidate& a, const Candidate& b) {
   return std::any_of(a.rows().begin(), a.rows().end(),
@@ -45,46 +44,65 @@ class Selector {
 
   // The best further term given those chosen; false if none is worth it.
   bool Next(const std::vector<const Chosen*>& terms, Chosen& out) {
-    w_.estimate = w_.Solve(terms);
-    w_.Prepare(terms);
-    const Metric white(w_.rows, w_.WhiteNoise());
-    std::vector<Ranked> ranked;
-    for (const auto& c : w_.candidates) {
-      if (AlreadyIn(*c, terms) || !IsExcited(*c, w_.evidence)) continue;
-      Found f = SearchCandidate(*c, w_.evidence, white);
-      if (f.score > 0) ranked.push_back({c.get(), f});
+    Grounds grounds(w_, terms);
+    std::vector<Candidate*> reach;
+    for (const auto& c : w_.candidates)
+      if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence)) reach.push_back(c.get());
+    std::vector<Ranked> ranked = Rank(reach, grounds);
+    // A strong effect passes for noise, and under so much noise others look as good. Once it is known what it leaves,
+    // those that may be meant are searched again.
+    for (int round = 0; round < kSharpenings && !ranked.empty(); ++round) {
+      if (!grounds.Sharpen(GatherColumns(*ranked[0].candidate, w_.evidence, ranked[0].found.eta))) break;
+      reach.clear();
+      for (const Ranked& r : ranked) reach.push_back(r.candidate);
+      ranked = Rank(reach, grounds);
     }
-    std::sort(ranked.begin(), ranked.end(),
-              [](const Ranked& a, const Ranked& b) { return a.found.score > b.found.score; });
-    if (ranked.size() > kRescored) ranked.resize(kRescored);
-    for (Ranked& r : ranked) {
-      const Columns c = GatherColumns(*r.candidate, w_.evidence, r.found.eta);
-      r.found.score = Score(r.found, DevianceWithout(white, c) - white.RefittedDeviance(c), w_.evidence);
-    }
+    for (Ranked& r : ranked) Rescore(grounds, r.found);
     std::sort(ranked.begin(), ranked.end(), [this](const Ranked& a, const Ranked& b) {
       // what is compiled in already wins among equals
       return a.found.score + Preference(a) > b.found.score + Preference(b);
     });
     for (std::size_t k = 0; k < ranked.size() && ranked[k].found.score > kAccept; ++k)
-      if (Accept(white, ranked, k, out)) return true;
+      if (Accept(grounds, terms, ranked, k, out)) return true;
     return false;
   }
 
   // Searches a chosen term again with the others in; false if it no longer earns its place.
   bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
-    w_.estimate = w_.Solve(others);
-    w_.Prepare(others);
-    const Metric white(w_.rows, w_.WhiteNoise());
-    Found f = SearchCandidate(*term.candidate, w_.evidence, white);
+    const Grounds grounds(w_, others);
+    Found f = SearchCandidate(*term.candidate, grounds.ground());
     if (f.gain.gain <= 0) return false;
-    const Columns c = GatherColumns(*term.candidate, w_.evidence, f.eta);
-    f.score = Score(f, DevianceWithout(white, c) - white.RefittedDeviance(c), w_.evidence);
+    Rescore(grounds, f);
     term.eta = f.eta;
     term.found = f;
     return f.score > kAccept;
   }
 
  private:
+  // The strongest candidates by white score.
+  std::vector<Ranked> Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds) {
+    std::vector<Ranked> ranked;
+    for (Candidate* c : candidates) {
+      const Found f = SearchCandidate(*c, grounds.ground());
+      gain_[c] = f.gain.gain;
+      if (f.score > 0) ranked.push_back({c, f});
+    }
+    const auto stronger = [](const Ranked& a, const Ranked& b) { return a.found.score > b.found.score; };
+    std::sort(ranked.begin(), ranked.end(), stronger);
+    if (ranked.size() > kRescored) ranked.resize(kRescored);
+    return ranked;
+  }
+  void Rescore(const Grounds& grounds, Found& f) const {
+    const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
+    const double with = grounds.metric().RefittedDeviance(c);
+    f.score = Score(f, grounds.DevianceWithout(c.joints) - with, w_.evidence);
+  }
+  // The latest term touches none of its joints, and there was nothing on them before.
+  bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const {
+    const auto known = gain_.find(&c);
+    return known != gain_.end() && !terms.empty() && known->second < kNothing &&
+           !SharesJoint(c, *terms.back()->candidate);
+  }
   double Preference(const Ranked& r) const {
     const auto& names = w_.standby;
     return std::find(names.begin(), names.end(), r.candidate->record().name) != names.end() ? 1e-3 : 0;
@@ -100,15 +118,28 @@ class Selector {
              (confusable && t->candidate->joints() == c.joints());
     });
   }
-  bool Accept(const Metric& white, const std::vector<Ranked>& ranked, std::size_t k, Chosen& out) {
+  // Delay, elasticity and backlash look like what a derivation of speed and acceleration leaves: a term that is real
+  // gains about as much when these are derived otherwise.
+  bool StaysAtLowerBandwidth(const Ranked& r, const std::vector<const Chosen*>& terms, double gain,
+                             const std::vector<NoiseModel>& noise) {
+    if (!w_.narrow) return true;
+    Diagnosis::Work& narrow = *w_.narrow;
+    narrow.estimate = w_.estimate;
+    narrow.Prepare(terms);
+    return Metric(narrow.rows, noise).Try(GatherColumns(*r.candidate, narrow.evidence, r.found.eta)).gain >
+           kStays * gain;
+  }
+  bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Ranked>& ranked,
+              std::size_t k, Chosen& out) {
     const Ranked& r = ranked[k];
     const Columns c = GatherColumns(*r.candidate, w_.evidence, r.found.eta);
     std::vector<NoiseModel> noise;
-    white.RefittedDeviance(c, &noise);
+    (void)grounds.metric().RefittedDeviance(c, &noise);
     const Metric metric(w_.rows, noise);
     const Gain gain = metric.Try(c);
-    const VectorXd folds = metric.CrossValidate(c, kBlocks, kFolds);
+    const VectorXd folds = metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds);
     if (folds.sum() < kKeepsOutOfFold * gain.gain || (folds.array() > 0).count() < kFoldsThatImprove) return false;
+    if (!StaysAtLowerBandwidth(r, terms, gain.gain, noise)) return false;
     out = Chosen{};
     out.candidate = r.candidate;
     out.eta = r.found.eta;
@@ -130,6 +161,7 @@ class Selector {
   }
 
   Diagnosis::Work& w_;
+  std::map<const Candidate*, double> gain_;  // as last searched
 };
 
 std::vector<const Chosen*> Pointers(const std::vector<Chosen>& chosen, const Chosen* without = nullptr) {
@@ -137,6 +169,18 @@ std::vector<const Chosen*> Pointers(const std::vector<Chosen>& chosen, const Cho
   for (const Chosen& c : chosen)
     if (&c != without && c.confirmed) out.push_back(&c);
   return out;
+}
+
+double TotalDelay_s(const std::vector<Chosen>& chosen) {
+  double sum = 0;
+  for (const Chosen& c : chosen) sum += c.confirmed ? c.delay_s : 0;
+  return sum;
+}
+
+// A log as the confirmed terms say that it was measured.
+calibration::Dataset AsTermsSay(const std::vector<Chosen>& chosen, const calibration::Dataset& log) {
+  const double delay_s = TotalDelay_s(chosen);
+  return delay_s != 0 ? calibration::Delayed(log, delay_s) : log;
 }
 
 void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
@@ -154,7 +198,10 @@ void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
     t.runner_up = c.runner_up, t.runner_up_score = c.runner_up_score;
     t.confirmed = c.confirmed;
     t.amplitude = VectorXd::Zero(c.candidate->columns()), t.sd = t.amplitude;
-    if (c.confirmed) t.amplitude = w.estimate.amplitude[k], t.sd = w.estimate.sd[k], ++k;
+    if (c.confirmed) {
+      t.amplitude = w.estimate.amplitude[k], t.sd = w.estimate.sd[k], ++k;
+      if (c.delay_s != 0) t.amplitude[0] += c.delay_s;
+    }
     finding.terms.push_back(std::move(t));
   }
   finding.x = w.estimate.x;
@@ -162,48 +209,24 @@ void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
   finding.innovation = w.estimate.innovation;
 }
 
-// One-step-ahead tracking of a run-state term's amplitudes on a log where they are not known: a Kalman filter whose
-// amplitudes wander as far in the length of the training log as the term was large there.
-MatrixXd Track(const Chosen& term, const VectorXd& amplitude, const Quantities& q, const MatrixXd& residual,
-               const VectorXd& sigma, double train_s) {
-  const auto& s = q.data->s;
-  std::vector<double> open(term.eta.size());
-  for (std::size_t k = 0; k < open.size(); ++k) open[k] = k == 0 ? s.t[0] - 1 : s.t[s.samples() - 1] + 1;
-  std::vector<std::vector<VectorXd>> value;
-  term.candidate->Evaluate(q, open, value);
-  const int k = term.candidate->columns();
-  VectorXd a = VectorXd::Zero(k);
-  MatrixXd P = amplitude.cwiseAbs2().asDiagonal();
-  MatrixXd predicted = MatrixXd::Zero(residual.rows(), residual.cols());
-  for (int i = 0; i < s.samples(); ++i) {
-    if (i > 0) P.diagonal() += amplitude.cwiseAbs2() * ((s.t[i] - s.t[i - 1]) / train_s);
-    const VectorXd before = a;
-    for (std::size_t r = 0; r < term.candidate->rows().size(); ++r) {
-      const int j = term.candidate->rows()[r];
-      VectorXd h(k);
-      for (int c = 0; c < k; ++c) h[c] = value[c][r].size() ? value[c][r][i] : 0;
-      predicted(i, j) = h.dot(before);
-      if (!q.data->used(i, j)) continue;
-      const VectorXd Ph = P * h;
-      const double variance = h.dot(Ph) + sigma[j] * sigma[j];
-      a += Ph * ((residual(i, j) - h.dot(a)) / variance);
-      P -= Ph * Ph.transpose() / variance;
-    }
-  }
-  return predicted;
-}
-
 }  // namespace
 
 Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
-                     std::vector<const calibration::Dataset*> train)
+                     std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow)
     : model_(model), work_(std::make_unique<Work>(model, catalogue, std::move(train))) {
   Work& w = *work_;
+  if (!narrow.empty()) {
+    w.narrow = std::make_unique<Work>(model, codegen::Catalogue{}, std::move(narrow));
+    w.narrow->needs_flange = w.needs_flange;
+  }
   Selector select(w);
-  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Pointers(w.chosen), next);)
+  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Pointers(w.chosen), next);) {
     w.chosen.push_back(next);
+    w.ApplyDelay(w.chosen);
+  }
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
-    if (select.StillEarns(w.chosen[k], Pointers(w.chosen, &w.chosen[k]))) ++k;
+    if (w.chosen[k].delay_s != 0) ++k;  // the logs are as it says now
+    else if (select.StillEarns(w.chosen[k], Pointers(w.chosen, &w.chosen[k]))) ++k;
     else w.chosen.erase(w.chosen.begin() + static_cast<long>(k));
   }
   std::sort(w.chosen.begin(), w.chosen.end(),
@@ -227,15 +250,17 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   const VectorXd before = calibration::Rms(test, out.before, true);
   for (;;) {
     w.estimate = w.Solve(Pointers(w.chosen));
-    const Quantities q = MakeQuantities(model_, test, w.estimate.x, w.declared.eta, w.needs_flange);
-    out.after = test.tau - calibration::Predict(model_, test, w.estimate.x, w.declared.eta);
+    const calibration::Dataset seen = AsTermsSay(w.chosen, test);
+    const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
+    out.after = test.tau - calibration::Predict(model_, seen, w.estimate.x, w.declared.eta);
     std::size_t k = 0;
     for (const Chosen& c : w.chosen) {
       if (!c.confirmed) continue;
       const VectorXd& amplitude = w.estimate.amplitude[k++];
       if (c.candidate->record().kind_class == "run_state") {
         const auto& t = w.train[0]->s.t;
-        out.after -= Track(c, amplitude, q, out.after, w.estimate.sigma, t[t.size() - 1] - t[0]);
+        const RunState state = MakeRunState(*c.candidate, c.eta, amplitude, t[t.size() - 1] - t[0]);
+        out.after -= Track(state, q, out.after, w.estimate.sigma);
         out.tracking = "run states followed one step ahead; delay one sample";
       } else {
         out.after -= CandidateTorque(*c.candidate, q, c.eta, amplitude);
@@ -248,6 +273,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
         if (c.confirmed && after[j] > kWorse * before[j]) refuted = &c;  // the weakest one: they are sorted
     if (!refuted) break;
     refuted->confirmed = false;
+    if (refuted->delay_s != 0) w.SetDelay(TotalDelay_s(w.chosen));
   }
   WriteTerms(w, finding_);
   return out;
@@ -255,12 +281,16 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
 
 std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
   const Work& w = *work_;
-  const Quantities q = MakeQuantities(model_, data, w.estimate.x, w.declared.eta, w.needs_flange);
+  const calibration::Dataset seen = AsTermsSay(w.chosen, data);
+  const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
   std::vector<MatrixXd> out;
   std::size_t k = 0;
-  for (const Chosen& c : w.chosen)
+  for (const Chosen& c : w.chosen) {
     out.push_back(c.confirmed ? CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[k++])
                               : MatrixXd::Zero(data.samples(), data.joints()));
+    if (c.confirmed && c.delay_s != 0)
+      out.back() += q.tau_model - calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
+  }
   return out;
 }
 

@@ -45,8 +45,10 @@ struct HeldOut {
 class Diagnosis {
  public:
   struct Work;  // work.hpp; the room's own
+  // narrow: the training logs once more, derived with a lower bandwidth; a term that hangs on the bandwidth is then
+  // refused. Empty: not looked at.
   Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
-            std::vector<const calibration::Dataset*> train);
+            std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow = {});
   ~Diagnosis();
 
   const Finding& finding() const { return finding_; }

@@ -44,129 +44,190 @@ MatrixXd WhitenAll(const NoiseModel& noise, const RowIndex& rows, const MatrixXd
   return out;
 }
 
-}  // namespace
-
-Metric::Metric(const BaseRows& rows, std::vector<NoiseModel> noise) : rows_(rows), noise_(std::move(noise)) {
-  const int n = static_cast<int>(rows.index.size()), d = rows.coordinates();
-  hessian_ = rows.informative ? MatrixXd(MatrixXd::Identity(d, d)) : MatrixXd(1e-9 * MatrixXd::Identity(d, d));
-  VectorXd right = VectorXd::Zero(d);
-  for (int j = 0; j < n; ++j) {
-    q_.push_back(WhitenAll(noise_[j], rows.index[j], rows.design[j]));
-    y_.push_back(Whiten(noise_[j], rows.index[j], rows.target[j]));
-    gram_.push_back(q_[j].transpose() * q_[j]);
-    hessian_ += gram_[j];
-    right += q_[j].transpose() * y_[j];
-  }
-  factor_.compute(hessian_);
-  z_ = factor_.solve(right);
-  for (int j = 0; j < n; ++j) residual_.push_back(y_[j] - q_[j] * z_);
+MatrixXd SelfProduct(const MatrixXd& m) {
+  MatrixXd out = MatrixXd::Zero(m.cols(), m.cols());
+  out.selfadjointView<Eigen::Lower>().rankUpdate(m.transpose());
+  out.triangularView<Eigen::StrictlyUpper>() = out.transpose();
+  return out;
 }
 
-VectorXd Metric::RawResidual(int j) const { return rows_.target[j] - rows_.design[j] * z_; }
+}  // namespace
+
+void Metric::WhitenJoint(int j) {
+  const auto& columns = rows_.columns[j];
+  map_[j].resize(static_cast<Eigen::Index>(columns.size()), rows_.L.cols());
+  for (std::size_t i = 0; i < columns.size(); ++i) map_[j].row(i) = rows_.L.row(columns[i]);
+  q_[j] = WhitenAll(noise_[j], rows_.index[j], rows_.design[j]);
+  y_[j] = Whiten(noise_[j], rows_.index[j], rows_.target[j]);
+  gram_[j] = SelfProduct(q_[j]);
+  right_[j] = q_[j].transpose() * y_[j];
+}
+
+void Metric::Solve() {
+  const int n = rows_.joints(), d = rows_.coordinates();
+  MatrixXd hessian = prior() * MatrixXd::Identity(d, d);
+  VectorXd right = VectorXd::Zero(d);
+  for (int j = 0; j < n; ++j) {
+    hessian += map_[j].transpose() * gram_[j] * map_[j];
+    right += map_[j].transpose() * right_[j];
+  }
+  factor_.compute(hessian);
+  z_ = factor_.solve(right);
+  for (int j = 0; j < n; ++j) residual_[j] = y_[j] - q_[j] * (map_[j] * z_);
+  bounded_sd_.resize(static_cast<Eigen::Index>(rows_.bounded.size()));
+  for (std::size_t k = 0; k < rows_.bounded.size(); ++k) {
+    const VectorXd row = rows_.L.row(rows_.bounded[k].coordinate).transpose();
+    bounded_sd_[static_cast<Eigen::Index>(k)] = std::sqrt(std::max(0.0, row.dot(factor_.solve(row))));
+  }
+}
+
+Metric::Metric(const BaseRows& rows, std::vector<NoiseModel> noise) : rows_(rows), noise_(std::move(noise)) {
+  const std::size_t n = rows.index.size();
+  map_.resize(n), q_.resize(n), y_.resize(n), gram_.resize(n), right_.resize(n), residual_.resize(n);
+  for (int j = 0; j < rows.joints(); ++j) WhitenJoint(j);
+  Solve();
+}
+
+bool Metric::InBounds(const Gain& g, const std::vector<int>& joints) const {
+  for (std::size_t k = 0; k < rows_.bounded.size(); ++k) {
+    const Bounded& b = rows_.bounded[k];
+    if (std::find(joints.begin(), joints.end(), b.joint) == joints.end()) continue;
+    const double x = rows_.mean[b.coordinate] + rows_.L.row(b.coordinate).dot(g.z);
+    const double slack = 2 * bounded_sd_[static_cast<Eigen::Index>(k)];
+    if (x < b.lower - slack || x > b.upper + slack) return false;
+  }
+  return true;
+}
+
+VectorXd Metric::RawResidual(int j) const { return rows_.target[j] - rows_.design[j] * (map_[j] * z_); }
+
+VectorXd Metric::ResidualWith(const Columns& c, int j) const {
+  const Gain g = Try(c);
+  VectorXd e = rows_.target[j] - rows_.design[j] * (map_[j] * g.z);
+  const auto at = std::find(c.joints.begin(), c.joints.end(), j);
+  if (at != c.joints.end()) e -= c.block[static_cast<std::size_t>(at - c.joints.begin())] * g.amplitude;
+  return e;
+}
 
 MatrixXd Metric::WhitenedColumns(const Columns& c, int r) const {
   return WhitenAll(noise_[c.joints[r]], rows_.index[c.joints[r]], c.block[r]);
 }
 
-Gain Metric::Try(const Columns& c) const {
+Metric::Projection Metric::Project(const Columns& c) const {
   const int k = c.count();
-  MatrixXd S = MatrixXd::Zero(k, k), B = MatrixXd::Zero(rows_.coordinates(), k);
-  VectorXd g = VectorXd::Zero(k);
+  Projection p{MatrixXd::Zero(k, k), MatrixXd::Zero(rows_.coordinates(), k), VectorXd::Zero(k), {}};
   for (std::size_t r = 0; r < c.joints.size(); ++r) {
+    const int j = c.joints[r];
     const MatrixXd w = WhitenedColumns(c, static_cast<int>(r));
-    S += w.transpose() * w;
-    B += q_[c.joints[r]].transpose() * w;
-    g += w.transpose() * residual_[c.joints[r]];
+    p.S += w.transpose() * w;
+    p.B += map_[j].transpose() * (q_[j].transpose() * w);
+    p.g += w.transpose() * residual_[j];
   }
-  const VectorXd norm2 = S.diagonal();
-  S -= B.transpose() * factor_.solve(B);
-  return SolveGain(S, g, norm2);
+  p.norm2 = p.S.diagonal();
+  p.S -= p.B.transpose() * factor_.solve(p.B);
+  return p;
 }
 
-VectorXd Metric::CrossValidate(const Columns& c, int blocks, int folds) const {
-  const int n = static_cast<int>(rows_.index.size()), d = rows_.coordinates(), k = c.count();
+Gain Metric::Try(const Columns& c) const {
+  const Projection p = Project(c);
+  Gain gain = SolveGain(p.S, p.g, p.norm2);
+  gain.z = z_ - factor_.solve(p.B * gain.amplitude);
+  return gain;
+}
+
+VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds) const {
+  const int n = rows_.joints(), d = rows_.coordinates(), k = c.count();
   std::vector<MatrixXd> gram(folds, MatrixXd::Zero(d + k, d + k));  // of each fold's own rows
   std::vector<VectorXd> right(folds, VectorXd::Zero(d + k));
-  VectorXd improvement = VectorXd::Zero(folds);
-  std::vector<MatrixXd> extended(n);
-  std::vector<std::vector<std::pair<int, int>>> fold_rows(folds * n);  // row ranges
+  std::vector<MatrixXd> extended(n), map(n);
+  std::vector<std::vector<std::pair<int, int>>> fold_rows(static_cast<std::size_t>(folds * n));  // row ranges
   for (int j = 0; j < n; ++j) {
     const auto at = std::find(c.joints.begin(), c.joints.end(), j);
-    extended[j] = MatrixXd::Zero(q_[j].rows(), d + k);
-    extended[j].leftCols(d) = q_[j];
-    if (at != c.joints.end()) extended[j].rightCols(k) = WhitenedColumns(c, static_cast<int>(at - c.joints.begin()));
+    const int r = static_cast<int>(q_[j].cols()), extra = at == c.joints.end() ? 0 : k;
     const int rows = static_cast<int>(q_[j].rows());
+    extended[j].resize(rows, r + extra);
+    extended[j].leftCols(r) = q_[j];
+    if (extra) extended[j].rightCols(k) = WhitenedColumns(c, static_cast<int>(at - c.joints.begin()));
+    map[j] = MatrixXd::Zero(r + extra, d + k);
+    map[j].topLeftCorner(r, d) = map_[j];
+    map[j].bottomRightCorner(extra, extra).setIdentity();
+    std::vector<MatrixXd> own(folds, MatrixXd::Zero(r + extra, r + extra));
     for (int b = 0; b < blocks; ++b) {
       const int begin = static_cast<int>(static_cast<long>(rows) * b / blocks),
                 end = static_cast<int>(static_cast<long>(rows) * (b + 1) / blocks);
       if (begin == end) continue;
-      const auto part = extended[j].middleRows(begin, end - begin);
-      gram[b % folds] += part.transpose() * part;
-      right[b % folds] += part.transpose() * y_[j].segment(begin, end - begin);
-      fold_rows[(b % folds) * n + j].emplace_back(begin, end);
+      const MatrixXd part = extended[j].middleRows(begin, end - begin);
+      own[b % folds] += SelfProduct(part);
+      right[b % folds] += map[j].transpose() * (part.transpose() * y_[j].segment(begin, end - begin));
+      fold_rows[static_cast<std::size_t>((b % folds) * n + j)].emplace_back(begin, end);
     }
+    for (int f = 0; f < folds; ++f) gram[f] += map[j].transpose() * own[f] * map[j];
   }
   MatrixXd total = MatrixXd::Zero(d + k, d + k);
-  VectorXd total_right = VectorXd::Zero(d + k);
+  VectorXd total_right = VectorXd::Zero(d + k), error = VectorXd::Zero(folds);
   for (int f = 0; f < folds; ++f) total += gram[f], total_right += right[f];
-  MatrixXd prior = MatrixXd::Zero(d + k, d + k);
-  prior.topLeftCorner(d, d).diagonal().setConstant(rows_.informative ? 1 : 1e-9);
-  prior.bottomRightCorner(k, k).diagonal() = 1e-9 * total.bottomRightCorner(k, k).diagonal();
+  MatrixXd ridge = MatrixXd::Zero(d + k, d + k);
+  ridge.topLeftCorner(d, d).diagonal().setConstant(prior());
+  ridge.bottomRightCorner(k, k).diagonal() = 1e-9 * total.bottomRightCorner(k, k).diagonal();
   for (int f = 0; f < folds; ++f) {
-    const MatrixXd H = total - gram[f] + prior;
-    const VectorXd g = total_right - right[f];
-    const VectorXd with = H.ldlt().solve(g);
-    const VectorXd without = H.topLeftCorner(d, d).ldlt().solve(g.head(d));
-    for (int j = 0; j < n; ++j)
-      for (const auto& [begin, end] : fold_rows[f * n + j]) {
-        const auto part = extended[j].middleRows(begin, end - begin);
-        const auto y = y_[j].segment(begin, end - begin);
-        improvement[f] += (y - part.leftCols(d) * without).squaredNorm() - (y - part * with).squaredNorm();
-      }
+    const VectorXd x = MatrixXd(total - gram[f] + ridge).ldlt().solve(total_right - right[f]);
+    for (int j = 0; j < n; ++j) {
+      const VectorXd local = map[j] * x;
+      for (const auto& [begin, end] : fold_rows[static_cast<std::size_t>(f * n + j)])
+        error[f] +=
+            (y_[j].segment(begin, end - begin) - extended[j].middleRows(begin, end - begin) * local).squaredNorm();
+    }
   }
-  return improvement;
+  return error;
 }
 
 double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_noise) const {
   const int d = rows_.coordinates(), k = c.count();
-  const auto place = [&](int j) {
-    return static_cast<int>(std::find(c.joints.begin(), c.joints.end(), j) - c.joints.begin());
-  };
-  MatrixXd H = MatrixXd::Zero(d + k, d + k);
-  H.topLeftCorner(d, d).diagonal().setConstant(rows_.informative ? 1 : 1e-9);
-  VectorXd g = VectorXd::Zero(d + k);
-  const int n = static_cast<int>(rows_.index.size());
-  for (int j = 0; j < n; ++j)
-    if (place(j) == static_cast<int>(c.joints.size()))
-      H.topLeftCorner(d, d) += gram_[j], g.head(d) += q_[j].transpose() * y_[j];
-  // Its own joints: white first, then with the noise that is left.
-  std::vector<NoiseModel> noise;
-  for (const int j : c.joints) noise.push_back(NoiseModel{VectorXd::Zero(kArOrder), noise_[j].innovation});
-  double deviance = 0;
-  VectorXd x;
-  for (int pass = 0; pass < 3; ++pass) {
-    MatrixXd h = H;
-    VectorXd b = g;
+  // The noise that this metric's own fit leaves; then one fit under that noise, and what it leaves.
+  VectorXd x = VectorXd::Zero(d + k);
+  x.head(d) = z_;
+  if (k > 0) {
+    const Projection p = Project(c);
+    x.tail(k) = SolveGain(p.S, p.g, p.norm2).amplitude;
+    x.head(d) -= factor_.solve(p.B * x.tail(k));
+  }
+  std::vector<NoiseModel> noise(c.joints.size());
+  const auto refit_noise = [&] {
+    double deviance = 0;
     for (std::size_t r = 0; r < c.joints.size(); ++r) {
       const int j = c.joints[r];
-      MatrixXd w(rows_.design[j].rows(), d + k);
-      // the base's whitened rows are known already if the noise is still the metric's
-      w.leftCols(d) = WhitenAll(noise[r], rows_.index[j], rows_.design[j]);
-      w.rightCols(k) = WhitenAll(noise[r], rows_.index[j], c.block[r]);
-      h += w.transpose() * w;
-      b += w.transpose() * Whiten(noise[r], rows_.index[j], rows_.target[j]);
-    }
-    if (k > 0) h.bottomRightCorner(k, k).diagonal() *= 1 + 1e-9;
-    x = h.ldlt().solve(b);
-    deviance = 0;
-    for (std::size_t r = 0; r < c.joints.size(); ++r) {
-      const int j = c.joints[r];
-      VectorXd e = rows_.target[j] - rows_.design[j] * x.head(d);
+      VectorXd e = rows_.target[j] - rows_.design[j] * (map_[j] * x.head(d));
       if (k > 0) e -= c.block[r] * x.tail(k);
       noise[r] = FitNoise(rows_.index[j], e);
       deviance += 2 * WhitenedRows(noise[r], rows_.index[j]) * std::log(noise[r].innovation);
     }
+    return deviance;
+  };
+  refit_noise();
+  MatrixXd h = MatrixXd::Zero(d + k, d + k);
+  VectorXd b = VectorXd::Zero(d + k);
+  h.topLeftCorner(d, d).diagonal().setConstant(prior());
+  for (int j = 0; j < rows_.joints(); ++j) {
+    const auto at = std::find(c.joints.begin(), c.joints.end(), j);
+    if (at == c.joints.end()) {
+      h.topLeftCorner(d, d) += map_[j].transpose() * gram_[j] * map_[j];
+      b.head(d) += map_[j].transpose() * right_[j];
+      continue;
+    }
+    const std::size_t r = static_cast<std::size_t>(at - c.joints.begin());
+    const int own = static_cast<int>(q_[j].cols());
+    MatrixXd w(rows_.design[j].rows(), own + k);
+    w.leftCols(own) = WhitenAll(noise[r], rows_.index[j], rows_.design[j]);
+    w.rightCols(k) = WhitenAll(noise[r], rows_.index[j], c.block[r]);
+    MatrixXd map = MatrixXd::Zero(own + k, d + k);
+    map.topLeftCorner(own, d) = map_[j];
+    map.bottomRightCorner(k, k).setIdentity();
+    h += map.transpose() * SelfProduct(w) * map;
+    b += map.transpose() * (w.transpose() * Whiten(noise[r], rows_.index[j], rows_.target[j]));
   }
+  if (k > 0) h.bottomRightCorner(k, k).diagonal() *= 1 + 1e-9;
+  x = h.ldlt().solve(b);
+  const double deviance = refit_noise();
   if (all_noise) {
     *all_noise = noise_;
     for (std::size_t r = 0; r < c.joints.size(); ++r) (*all_noise)[c.joints[r]] = noise[r];
@@ -175,31 +236,24 @@ double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_n
 }
 
 std::pair<double, double> Metric::Imitates(const Columns& other, const Columns& fitted, const VectorXd& a) const {
-  const int n = static_cast<int>(rows_.index.size()), k = other.count();
-  std::vector<VectorXd> trace(n);
+  std::vector<VectorXd> trace(rows_.index.size());
   VectorXd onto = VectorXd::Zero(rows_.coordinates());
   double own = 0;
   for (std::size_t r = 0; r < fitted.joints.size(); ++r) {
     const int j = fitted.joints[r];
     trace[j] = WhitenedColumns(fitted, static_cast<int>(r)) * a;
     own += trace[j].squaredNorm();
-    onto += q_[j].transpose() * trace[j];
+    onto += map_[j].transpose() * (q_[j].transpose() * trace[j]);
   }
   const VectorXd z = factor_.solve(onto);
   own -= onto.dot(z);
-  MatrixXd S = MatrixXd::Zero(k, k), B = MatrixXd::Zero(rows_.coordinates(), k);
-  VectorXd g = VectorXd::Zero(k);
+  Projection p = Project(other);
+  p.g = -p.B.transpose() * z;
   for (std::size_t r = 0; r < other.joints.size(); ++r) {
     const int j = other.joints[r];
-    const MatrixXd w = WhitenedColumns(other, static_cast<int>(r));
-    S += w.transpose() * w;
-    B += q_[j].transpose() * w;
-    g -= w.transpose() * (q_[j] * z);
-    if (trace[j].size()) g += w.transpose() * trace[j];
+    if (trace[j].size()) p.g += WhitenedColumns(other, static_cast<int>(r)).transpose() * trace[j];
   }
-  const VectorXd norm2 = S.diagonal();
-  S -= B.transpose() * factor_.solve(B);
-  return {SolveGain(S, g, norm2).gain, own};
+  return {SolveGain(p.S, p.g, p.norm2).gain, own};
 }
 
 MatrixXd Metric::Covariance() const {

@@ -25,16 +25,26 @@ struct Gain {
   double gain = 0;                // decrease of chi^2
   int rank = 0;                   // directions that the data see
   Eigen::VectorXd amplitude, sd;  // of the columns
+  Eigen::VectorXd z;              // of the base with the columns in
+};
+
+// A parameter of the base that cannot take every value, for instance a Coulomb level.
+struct Bounded {
+  int joint, coordinate;
+  double lower, upper;
 };
 
 // Raw (unwhitened) rows of the base model, shared by all metrics of one pass.
 struct BaseRows {
-  std::vector<RowIndex> index;          // [n]
-  std::vector<Eigen::MatrixXd> design;  // [n] rows x coordinates, in prior-whitened coordinates z (x = mean + L z)
-  std::vector<Eigen::VectorXd> target;  // [n] tau minus the prior mean's torque
-  bool informative = true;              // z has unit prior
-  Eigen::MatrixXd L;                    // x - mean = L z
+  std::vector<RowIndex> index;            // [n]
+  std::vector<std::vector<int>> columns;  // [n] the coordinates x that act on joint j
+  std::vector<Eigen::MatrixXd> design;    // [n] rows x columns[j]
+  std::vector<Eigen::VectorXd> target;    // [n] tau minus the prior mean's torque
+  std::vector<Bounded> bounded;
+  bool informative = true;  // z has unit prior
+  Eigen::MatrixXd L;        // x - mean = L z
   Eigen::VectorXd mean;
+  int joints() const { return static_cast<int>(index.size()); }
   int coordinates() const { return static_cast<int>(L.cols()); }
 };
 
@@ -43,19 +53,18 @@ class Metric {
   Metric(const BaseRows& rows, std::vector<NoiseModel> noise);
 
   Gain Try(const Columns& c) const;
-  // chi^2 of joint j's whitened residual after the base fit, and the number of its rows.
-  const Eigen::VectorXd& residual(int j) const { return residual_[j]; }  // whitened
-  Eigen::VectorXd RawResidual(int j) const;                              // torque units
+  // No bounded parameter of the joints given leaves its range at g (by more than 2 standard deviations).
+  bool InBounds(const Gain& g, const std::vector<int>& joints) const;
+  Eigen::VectorXd RawResidual(int j) const;                     // torque units
+  Eigen::VectorXd ResidualWith(const Columns& c, int j) const;  // torque units, C fitted too
   const std::vector<NoiseModel>& noise() const { return noise_; }
   const Eigen::VectorXd& z() const { return z_; }
-  const BaseRows& rows() const { return rows_; }
-  Eigen::MatrixXd WhitenedColumns(const Columns& c, int r) const;
 
-  // Out-of-fold improvement: chi^2 on each of `folds` interleaved folds of `blocks` blocks, without minus with C.
-  Eigen::VectorXd CrossValidate(const Columns& c, int blocks, int folds) const;
+  // chi^2 on each of `folds` interleaved folds of `blocks` blocks, of the base with C fitted to the other folds.
+  Eigen::VectorXd OutOfFold(const Columns& c, int blocks, int folds) const;
 
-  // -2 log likelihood (up to a constant) of all joints with C in the model and the noise of its joints fitted anew.
-  // If `noise` is given it receives the noise models of all joints, those of c's joints fitted with C in.
+  // -2 log likelihood (up to a constant) of C's joints with C in the model and their noise fitted anew. If `noise` is
+  // given it receives the noise models of all joints, those of C's joints fitted with C in.
   double RefittedDeviance(const Columns& c, std::vector<NoiseModel>* noise = nullptr) const;
 
   // Gain of `other` on the fitted trace of `fitted` (amplitudes a), and that trace's own chi^2 off the base.
@@ -65,14 +74,26 @@ class Metric {
   Eigen::MatrixXd Covariance() const;
 
  private:
+  // Columns against the base: S = C'C off the base, B = Q'C, g = C'r.
+  struct Projection {
+    Eigen::MatrixXd S, B;
+    Eigen::VectorXd g, norm2;
+  };
+  Projection Project(const Columns& c) const;
+  Eigen::MatrixXd WhitenedColumns(const Columns& c, int r) const;
+  void WhitenJoint(int j);
+  void Solve();
+  double prior() const { return rows_.informative ? 1 : 1e-9; }
+
   const BaseRows& rows_;
   std::vector<NoiseModel> noise_;
-  std::vector<Eigen::MatrixXd> q_;  // [n] whitened design
+  std::vector<Eigen::MatrixXd> map_;  // [n] rows of L of columns[j]
+  std::vector<Eigen::MatrixXd> q_;    // [n] whitened design
   std::vector<Eigen::VectorXd> residual_, y_;
-  std::vector<Eigen::MatrixXd> gram_;  // [n]
-  Eigen::MatrixXd hessian_;
+  std::vector<Eigen::MatrixXd> gram_;   // [n] of q_
+  std::vector<Eigen::VectorXd> right_;  // [n] q_' y_
   Eigen::LLT<Eigen::MatrixXd> factor_;
-  Eigen::VectorXd z_;
+  Eigen::VectorXd z_, bounded_sd_;
 };
 
 }  // namespace armcal::diagnosis

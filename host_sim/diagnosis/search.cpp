@@ -13,29 +13,8 @@ namespace armcal::diagnosis {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, const std::vector<double>& eta) {
-  Columns out;
-  out.joints = candidate.rows();
-  for (const int j : out.joints) out.block.emplace_back(MatrixXd::Zero(evidence.index[j].size(), candidate.columns()));
-  std::vector<std::vector<VectorXd>> value;
-  for (std::size_t log = 0; log < evidence.logs.size(); ++log) {
-    candidate.Evaluate(evidence.logs[log], eta, value);
-    for (std::size_t r = 0; r < out.joints.size(); ++r) {
-      const RowIndex& index = evidence.index[out.joints[r]];
-      for (int c = 0; c < candidate.columns(); ++c) {
-        const VectorXd& v = value[c][r];
-        if (v.size() == 0) continue;
-        for (int k = 0; k < index.size(); ++k)
-          if (index.dataset[k] == static_cast<int>(log)) out.block[r](k, c) = v[index.sample[k]];
-      }
-    }
-  }
-  return out;
-}
-
 namespace {
 
-// A signal of the candidate's own joint over its used rows.
 // A signal of the candidate's joint j ("q") or of its other one ("q[k]") in the rows of joint j.
 VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::string name) {
   int j = candidate.joints().empty() ? candidate.rows()[0] : candidate.joints()[0];
@@ -49,10 +28,11 @@ VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::st
     const Quantities& log = evidence.logs[index.dataset[k]];
     const auto& s = log.data->s;
     const int at = index.sample[k];
-    out[k] = name == "q"      ? s.q(at, j)
+    out[k] = name == "t"      ? s.t[at]
+             : name == "q"    ? s.q(at, j)
              : name == "qd"   ? s.qd(at, j)
              : name == "temp" ? (s.temp.cols() > j ? s.temp(at, j) : 0)
-                              : log.tau_rigid(at, j);
+                              : log.parts.rigid(at, j);
   }
   return out;
 }
@@ -66,10 +46,12 @@ bool InBounds(const Candidate& candidate, const Gain& gain) {
   return true;
 }
 
+constexpr int kSweeps = 4;           // of a pattern search at one step size
+constexpr double kWorthAStep = 0.3;  // of chi^2: less is below what noise moves it by
+
 class Searcher {
  public:
-  Searcher(Candidate& candidate, const Evidence& evidence, const Metric& metric)
-      : c_(candidate), e_(evidence), m_(metric) {
+  Searcher(Candidate& candidate, const Ground& ground) : c_(candidate), g_(ground), e_(ground.evidence) {
     best_.candidate = &candidate;
     best_.eta = candidate.Initial();
     best_.parameters = candidate.columns() + static_cast<int>(candidate.unknowns().size());
@@ -89,10 +71,34 @@ class Searcher {
 
  private:
   double Consider(const std::vector<double>& eta) {
-    const Gain g = m_.Try(GatherColumns(c_, e_, eta));
-    const double value = InBounds(c_, g) ? g.gain : 0;
-    if (value > best_.gain.gain) best_.gain = g, best_.eta = eta;
-    return value;
+    const Gain g = Value(g_.metric, GatherColumns(c_, e_, eta));
+    if (g.gain > best_.gain.gain) best_.gain = g, best_.eta = eta;
+    return g.gain;
+  }
+  double ConsiderThinned(const std::vector<double>& eta) const {
+    return Value(g_.thin_metric, g_.thinned.Gather(c_, eta)).gain;
+  }
+  // Amplitudes held, or out of bounds, are counted. A law that could take the declared one's place may stand beside it,
+  // as two frictions in one joint do, but not against it.
+  Gain Value(const Metric& metric, const Columns& columns) const {
+    Gain g = metric.Try(columns);
+    if (c_.columns() == 1 && c_.instance().columns[0].fixed_amplitude) HoldAmplitude(g);
+    const bool rival = !c_.record().replaces.empty();
+    if (!InBounds(c_, g) || (rival && !metric.InBounds(g, c_.rows()))) g.gain = 0;
+    return g;
+  }
+  // Half of what a score above zero needs: what a refinement may still bring.
+  bool Promising() const {
+    Found f = best_;
+    f.parameters = f.gain.rank + searched_;
+    return f.gain.gain > -0.5 * Score(f, 0, e_);
+  }
+  // What the column gains at its record's own amplitude: the parabola about the best one.
+  void HoldAmplitude(Gain& g) const {
+    if (g.rank == 0) return;
+    const double off = (c_.instance().columns[0].amplitude - g.amplitude[0]) / g.sd[0];
+    g.gain -= off * off;
+    g.rank = 0;
   }
   double FromUnit(int k, double u) const {
     const auto& p = c_.unknowns()[k];
@@ -102,18 +108,28 @@ class Searcher {
     const auto& p = c_.unknowns()[k];
     return p.logarithmic ? std::log(v / p.lower) / std::log(p.upper / p.lower) : (v - p.lower) / (p.upper - p.lower);
   }
-  // Pattern search in unit coordinates around the best so far; halves its steps.
-  void Refine(double step, int rounds) {
+  using Evaluator = std::function<double(const std::vector<double>&)>;
+  // Pattern search in unit coordinates from eta: steps while that helps, then halves them. Returns where it ends.
+  std::vector<double> Refine(std::vector<double> eta, double step, int rounds, const Evaluator& evaluate) const {
+    double value = evaluate(eta);
     for (int round = 0; round < rounds; ++round, step /= 2)
-      for (std::size_t k = 0; k < best_.eta.size(); ++k)
-        for (const double sign : {-1.0, 1.0}) {
-          std::vector<double> eta = best_.eta;
-          const double u = ToUnit(static_cast<int>(k), eta[k]) + sign * step;
-          if (u < 0 || u > 1) continue;
-          eta[k] = FromUnit(static_cast<int>(k), u);
-          Consider(eta);
-        }
+      for (int sweep = 0, better = 1; better && sweep < kSweeps; ++sweep) {
+        better = 0;
+        for (std::size_t k = 0; k < eta.size(); ++k)
+          for (const double sign : {-1.0, 1.0}) {
+            std::vector<double> next = eta;
+            const double u = ToUnit(static_cast<int>(k), eta[k]) + sign * step;
+            if (u < 0 || u > 1) continue;
+            next[k] = FromUnit(static_cast<int>(k), u);
+            if (const double v = evaluate(next); v > value + kWorthAStep) value = v, eta = next, better = 1;
+          }
+      }
+    return eta;
   }
+  void RefineBest(double step, int rounds) {
+    Refine(best_.eta, step, rounds, [this](const auto& eta) { return Consider(eta); });
+  }
+  // A coarse grid on the thinned rows; its best points, one of them refined there, are tried on all rows.
   void Profile() {
     const int count = static_cast<int>(c_.unknowns().size());
     std::vector<int> points(count, 4);
@@ -121,16 +137,21 @@ class Searcher {
     searched_ = count;
     best_.tried = 1;
     for (const int p : points) best_.tried *= p;
+    std::vector<std::pair<double, std::vector<double>>> tried;
     std::vector<double> eta(count);
     const std::function<void(int)> visit = [&](int k) {
-      if (k == count) return void(Consider(eta));
+      if (k == count) return void(tried.emplace_back(ConsiderThinned(eta), eta));
       for (int i = 0; i < points[k]; ++i) {
         eta[k] = FromUnit(k, points[k] > 1 ? static_cast<double>(i) / (points[k] - 1) : 0.5);
         visit(k + 1);
       }
     };
     visit(0);
-    Refine(0.5 / (points[0] - 1), 5);
+    std::sort(tried.rbegin(), tried.rend());
+    const double step = 0.5 / (points[0] - 1);
+    Consider(Refine(tried[0].second, step, 2, [this](const auto& e) { return ConsiderThinned(e); }));
+    for (std::size_t k = 0; k < 2 && k < tried.size(); ++k) Consider(tried[k].second);
+    if (Promising()) RefineBest(step, 5);
   }
   // The record's first column at frequency zero is what multiplies the harmonic; one FFT of residual x that over the
   // signal scans all frequencies.
@@ -141,7 +162,7 @@ class Searcher {
     if (range <= 0) return;
     const auto& k = c_.unknowns()[0];
     const Columns at_zero = GatherColumns(c_, e_, {1e-9});
-    const VectorXd residual = m_.RawResidual(at_zero.joints[0]);
+    const VectorXd residual = g_.metric.RawResidual(at_zero.joints[0]);
     int size = 256;
     while (size < 8 * k.upper * range / (2 * std::numbers::pi)) size *= 2;  // four cells a period at the upper end
     constexpr int kPadding = 4;
@@ -167,6 +188,7 @@ class Searcher {
     if (peaks.size() > static_cast<std::size_t>(c_.record().search.grid)) peaks.resize(c_.record().search.grid);
     for (const auto& [power, b] : peaks) {
       double centre = b * step, width = step, value = Consider({centre});
+      if (!Promising()) continue;
       for (int round = 0; round < 6; ++round, width /= 2)
         for (const double sign : {-1.0, 1.0}) {
           const double next = Consider({centre + sign * width});
@@ -178,6 +200,7 @@ class Searcher {
   void Spline() {
     const VectorXd signal = OwnSignal(c_, e_, c_.record().search.signal);
     if (signal.size() == 0 || signal.maxCoeff() - signal.minCoeff() <= 0) return;
+    if (c_.record().search.signal == "t" && e_.logs.size() != 1) return;  // each run has a time of its own
     Consider({signal.minCoeff(), signal.maxCoeff()});
   }
   // Windows [on, off] on a grid of the log's time, not shorter than the record's minimum; then refined.
@@ -189,20 +212,23 @@ class Searcher {
     constexpr int kGrid = 12;
     searched_ = 2;
     best_.tried = kGrid * kGrid / 2;
+    double most = 0;
+    std::vector<double> window;
     for (int i = 0; i <= kGrid; ++i)
       for (int k = i + 1; k <= kGrid + 1; ++k) {
         const double on = begin - 1 + (end - begin + 1) * i / kGrid,
                      off = k > kGrid ? end + 1 : begin + (end - begin) * k / kGrid;
         if (off - on < minimum || (i == 0 && k > kGrid)) continue;  // on all the time is no step
-        Consider({on, off});
+        if (const double value = ConsiderThinned({on, off}); value > most) most = value, window = {on, off};
       }
-    if (best_.gain.gain > 0) Refine(0.5 / kGrid, 6);
+    if (most > 0) Consider(window);
+    if (Promising()) RefineBest(0.5 / kGrid, 6);
     if (best_.eta[1] - best_.eta[0] < minimum) best_.gain = Gain{};
   }
 
   Candidate& c_;
+  const Ground& g_;
   const Evidence& e_;
-  const Metric& m_;
   Found best_;
   int searched_ = 0;
 };
@@ -239,8 +265,6 @@ double Score(const Found& found, double gain, const Evidence& evidence) {
          found.candidate->record().generic_penalty;
 }
 
-Found SearchCandidate(Candidate& candidate, const Evidence& evidence, const Metric& metric) {
-  return Searcher(candidate, evidence, metric).Run();
-}
+Found SearchCandidate(Candidate& candidate, const Ground& ground) { return Searcher(candidate, ground).Run(); }
 
 }  // namespace armcal::diagnosis

@@ -17,6 +17,30 @@ struct Evidence {
 // The candidate's columns at eta over the used rows of its joints.
 Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, const std::vector<double>& eta);
 
+// Every m-th sample of the evidence, for coarse grids.
+struct Thinned {
+  // Keeps about `rows` samples a log.
+  Thinned(const Evidence& evidence, int rows);
+  Columns Gather(const Candidate& candidate, const std::vector<double>& eta) const;
+  BaseRows Pick(const BaseRows& all) const;
+
+  const Evidence& all;
+  int every = 1;
+  std::vector<std::unique_ptr<calibration::Dataset>> data;
+  std::vector<Quantities> logs;
+  std::vector<std::vector<int>> kept;  // [n] places in all.index[j]
+  std::vector<RowIndex> index;         // [n] of the shorter logs; in_all: the same rows in the whole ones
+  std::vector<RowIndex> in_all;
+};
+
+// The base model on all rows and on the thinned ones.
+struct Ground {
+  const Evidence& evidence;
+  const Thinned& thinned;
+  const Metric& metric;
+  const Metric& thin_metric;
+};
+
 // The excitation the record asks for is in the logs.
 bool IsExcited(const Candidate& candidate, const Evidence& evidence);
 
@@ -33,6 +57,6 @@ struct Found {
 double Score(const Found& found, double gain, const Evidence& evidence);
 
 // Amplitudes outside the record's bounds gain nothing.
-Found SearchCandidate(Candidate& candidate, const Evidence& evidence, const Metric& metric);
+Found SearchCandidate(Candidate& candidate, const Ground& ground);
 
 }  // namespace armcal::diagnosis

@@ -2,8 +2,11 @@
 #include "host_sim/diagnosis/work.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
+#include "codegen/src/generator/state_path.hpp"
+#include "host_sim/calibration/delay.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::diagnosis {
@@ -11,18 +14,25 @@ namespace armcal::diagnosis {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, const VectorXd& x,
-                          const std::vector<double>& eta, bool flange) {
+namespace {
+constexpr int kPasses = 3;
+constexpr int kDelayRounds = 2;    // the rest after the first is of second order, after the second of fourth
+constexpr double kSettled = 1e-3;  // relative change of the residuals' spread after which nothing else moves
+}  // namespace
+
+Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque& arm, const calibration::Dataset& data,
+                          const VectorXd& x, const std::vector<double>& eta, bool flange) {
   Quantities out;
   out.data = &data;
-  const int n = model.joints(), front = model.front(), rigid = model.rigid();
-  std::vector<MatrixXd> row;
-  model.Regressor(data.s, {x.data(), static_cast<std::size_t>(model.columns())}, eta, row);
-  out.tau_rigid.resize(data.samples(), n);
-  for (int j = 0; j < n; ++j) out.tau_rigid.col(j) = row[j].middleCols(front, rigid) * x.segment(front, rigid);
-  model.GravityRegressor(data.s, row);
-  out.tau_gravity.resize(data.samples(), n);
-  for (int j = 0; j < n; ++j) out.tau_gravity.col(j) = row[j] * x.segment(front, rigid);
+  const int n = model.joints(), samples = data.samples();
+  out.parts = arm.Evaluate(data.s, {x.data() + model.front(), static_cast<std::size_t>(model.rigid())});
+  out.tau_model = calibration::Predict(model, data, x, eta);
+  out.dt = codegen::SampleSteps(data.s.t, samples, 0, out.restart);
+  out.dtau_model = MatrixXd::Zero(samples, n);
+  for (int k = 1; k + 1 < samples; ++k)  // central differences: the prediction carries no noise of the torque
+    if (!out.restart[k] && !out.restart[k + 1])
+      out.dtau_model.row(k) =
+          (out.tau_model.row(k + 1) - out.tau_model.row(k - 1)) / (data.s.t[k + 1] - data.s.t[k - 1]);
   if (flange) model.BodyColumns(data.s, n - 1, out.flange);
   return out;
 }
@@ -41,7 +51,12 @@ MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantitie
 
 Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalogue,
                       std::vector<const calibration::Dataset*> logs)
-    : model(m), train(std::move(logs)), prior(calibration::MakePrior(m)), candidates(MakeCandidates(catalogue, m)) {
+    : model(m),
+      arm(m),
+      train(std::move(logs)),
+      logged(train),
+      prior(calibration::MakePrior(m)),
+      candidates(MakeCandidates(catalogue, m)) {
   if (train.empty()) throw io::InputError("diagnose: expected at least one training log");
   declared = calibration::WeightedFit(model, train);
   estimate.x = declared.x;
@@ -65,60 +80,127 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
     }
 }
 
+void Diagnosis::Work::SetDelay(double delay_s) {
+  delayed.clear();
+  for (const auto* d : logged) delayed.push_back(calibration::Delayed(*d, delay_s));
+  for (std::size_t k = 0; k < train.size(); ++k) train[k] = &delayed[k];
+  regressor.clear();
+  if (narrow) narrow->SetDelay(delay_s);
+}
+
+void Diagnosis::Work::ApplyDelay(std::vector<Chosen>& terms) {
+  for (int round = 0; round < kDelayRounds; ++round) {
+    std::vector<const Chosen*> confirmed;
+    for (const Chosen& c : terms)
+      if (c.confirmed) confirmed.push_back(&c);
+    estimate = Solve(confirmed);
+    double total_s = 0;
+    bool any = false;
+    std::size_t k = 0;
+    for (Chosen& c : terms) {
+      if (!c.confirmed) continue;
+      const double amplitude = estimate.amplitude[k++][0];
+      if (c.candidate->record().apply.how != "delay") continue;
+      c.delay_s += amplitude;
+      total_s += c.delay_s;
+      any = true;
+    }
+    if (!any) return;
+    SetDelay(total_s);
+  }
+}
+
 std::vector<NoiseModel> Diagnosis::Work::WhiteNoise() const {
   std::vector<NoiseModel> noise(model.joints());
   for (int j = 0; j < model.joints(); ++j) noise[j].innovation = estimate.sigma[j];
   return noise;
 }
 
+// The declared model's rows over the used samples, coordinates declared.active.
+void Diagnosis::Work::FillDeclared() {
+  const int n = model.joints(), columns = model.columns(), active = static_cast<int>(declared.active.size());
+  const VectorXd mean = prior.mean.head(columns), x = estimate.x.head(columns);
+  if (model.depends_on_estimate() || regressor.empty()) {
+    regressor.resize(train.size());
+    for (std::size_t log = 0; log < train.size(); ++log)
+      model.Regressor(train[log]->s, {x.data(), static_cast<std::size_t>(columns)}, declared.eta, regressor[log]);
+  }
+  rows.mean.resize(active);
+  for (int a = 0; a < active; ++a) rows.mean[a] = prior.mean[declared.active[a]];
+  for (int j = 0; j < n; ++j) {
+    const RowIndex& index = rows.index[j];
+    std::vector<int> own;
+    for (int a = 0; a < active; ++a) {
+      const int c = declared.active[a];
+      if (c == columns + j || (c < columns && !model.rows()[j][c].IsZero())) own.push_back(a);
+    }
+    MatrixXd design(index.size(), static_cast<Eigen::Index>(own.size()));
+    VectorXd target(index.size());
+    std::vector<VectorXd> at_estimate, at_mean;
+    for (const auto& row : regressor) at_estimate.push_back(row[j] * x), at_mean.push_back(row[j] * mean);
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      const int c = declared.active[own[i]];
+      for (int k = 0; k < index.size(); ++k)
+        design(k, static_cast<Eigen::Index>(i)) = c < columns ? regressor[index.dataset[k]][j](index.sample[k], c)
+                                                              : at_estimate[index.dataset[k]][index.sample[k]];
+    }
+    for (int k = 0; k < index.size(); ++k)
+      target[k] = train[index.dataset[k]]->tau(index.sample[k], j) - at_mean[index.dataset[k]][index.sample[k]];
+    for (const int a : own) {
+      const int c = declared.active[a];
+      if (c >= columns || model.is_rigid(c) || model.column_joint(c) != j) continue;
+      const auto& p = model.table()[model.table_index(c)];
+      if (std::isfinite(p.lower) || std::isfinite(p.upper)) rows.bounded.push_back({j, a, p.lower, p.upper});
+    }
+    rows.columns.push_back(std::move(own));
+    rows.design.push_back(std::move(design));
+    rows.target.push_back(std::move(target));
+  }
+}
+
 void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
-  const int n = model.joints(), columns = model.columns();
+  const int active = static_cast<int>(declared.active.size());
   evidence.logs.clear();
   for (const auto* d : train)
-    evidence.logs.push_back(MakeQuantities(model, *d, estimate.x, declared.eta, needs_flange));
+    evidence.logs.push_back(MakeQuantities(model, arm, *d, estimate.x, declared.eta, needs_flange));
   rows = BaseRows{};
   rows.index = evidence.index;
   rows.informative = prior.informative;
-  const int active = static_cast<int>(declared.active.size());
-  std::vector<Columns> term_columns;
-  int extra = 0;
+  FillDeclared();
+  int size = active;
   for (const Chosen* t : terms) {
-    term_columns.push_back(GatherColumns(*t->candidate, evidence, t->eta));
-    extra += term_columns.back().count();
-  }
-  // raw design in x coordinates: active columns, gains, then the terms
-  std::vector<MatrixXd> raw(n);
-  for (int j = 0; j < n; ++j) {
-    raw[j] = MatrixXd::Zero(evidence.index[j].size(), active + extra);
-    rows.target.emplace_back(evidence.index[j].size());
-  }
-  for (std::size_t log = 0; log < train.size(); ++log) {
-    std::vector<MatrixXd> row;
-    model.Regressor(train[log]->s, {estimate.x.data(), static_cast<std::size_t>(columns)}, declared.eta, row);
-    for (int j = 0; j < n; ++j) {
-      const VectorXd at_estimate = row[j] * estimate.x.head(columns), at_mean = row[j] * prior.mean.head(columns);
-      const RowIndex& index = evidence.index[j];
-      for (int k = 0; k < index.size(); ++k) {
-        if (index.dataset[k] != static_cast<int>(log)) continue;
-        const int s = index.sample[k];
-        for (int a = 0; a < active; ++a) {
-          const int c = declared.active[a];
-          raw[j](k, a) = c < columns ? row[j](s, c) : (c == columns + j ? at_estimate[s] : 0);
-        }
-        rows.target[j][k] = train[log]->tau(s, j) - at_mean[s];
-      }
+    const Columns c = GatherColumns(*t->candidate, evidence, t->eta);
+    for (std::size_t r = 0; r < c.joints.size(); ++r) {
+      const int j = c.joints[r];
+      const Eigen::Index before = rows.design[j].cols();
+      rows.design[j].conservativeResize(Eigen::NoChange, before + c.count());
+      rows.design[j].rightCols(c.count()) = c.block[r];
+      for (int i = 0; i < c.count(); ++i) rows.columns[j].push_back(size + i);
     }
+    size += c.count();
   }
-  int at = active;
-  for (const Columns& c : term_columns) {
-    for (std::size_t r = 0; r < c.joints.size(); ++r) raw[c.joints[r]].middleCols(at, c.count()) = c.block[r];
-    at += c.count();
-  }
-  // coordinates z in which the prior is unit and directions that nobody sees are left out
-  rows.mean = prior.mean;
-  const int size = active + extra;
+  rows.mean.conservativeResize(size);
+  rows.mean.tail(size - active).setZero();
+  MakeCoordinates(size);
+}
+
+// Coordinates z in which the prior is unit and directions that nobody sees are left out.
+void Diagnosis::Work::MakeCoordinates(int size) {
+  const int active = static_cast<int>(declared.active.size());
   MatrixXd H = MatrixXd::Zero(size, size);
-  for (int j = 0; j < n; ++j) H += raw[j].transpose() * raw[j] / (estimate.sigma[j] * estimate.sigma[j]);
+  for (int j = 0; j < model.joints(); ++j) {
+    const auto& columns = rows.columns[j];
+    const double weight = 1 / (estimate.sigma[j] * estimate.sigma[j]);
+    if (prior.informative) {
+      for (std::size_t i = 0; i < columns.size(); ++i)
+        H(columns[i], columns[i]) += weight * rows.design[j].col(static_cast<Eigen::Index>(i)).squaredNorm();
+      continue;
+    }
+    const MatrixXd gram = weight * rows.design[j].transpose() * rows.design[j];
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      for (std::size_t k = 0; k < columns.size(); ++k)
+        H(columns[i], columns[k]) += gram(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+  }
   VectorXd scale(size);
   for (int i = 0; i < size; ++i) scale[i] = H(i, i) > 0 ? 1 / std::sqrt(H(i, i)) : 0;
   if (prior.informative) {
@@ -131,18 +213,17 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
     rows.L = MatrixXd::Zero(size, size);
     rows.L.topLeftCorner(active, active) =
         sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-    // a term has no prior worth the name: a million times what one whitened unit of it would need
+    // a term has no prior worth the name: a thousand times what one whitened unit in every row of it would need
     for (int i = active; i < size; ++i)
       rows.L(i, i) = 1e3 * scale[i] * std::sqrt(static_cast<double>(evidence.index[0].size()));
-  } else {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(scale.asDiagonal() * H * scale.asDiagonal()));
-    const double floor = 1e-10 * eigen.eigenvalues()[size - 1];
-    int keep = 0;
-    for (int i = 0; i < size; ++i) keep += eigen.eigenvalues()[i] > floor;
-    rows.L = scale.asDiagonal() * eigen.eigenvectors().rightCols(keep) *
-             eigen.eigenvalues().tail(keep).cwiseSqrt().cwiseInverse().asDiagonal();
+    return;
   }
-  for (int j = 0; j < n; ++j) rows.design.push_back(raw[j] * rows.L);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(scale.asDiagonal() * H * scale.asDiagonal()));
+  const double floor = 1e-10 * eigen.eigenvalues()[size - 1];
+  int keep = 0;
+  for (int i = 0; i < size; ++i) keep += eigen.eigenvalues()[i] > floor;
+  rows.L = scale.asDiagonal() * eigen.eigenvectors().rightCols(keep) *
+           eigen.eigenvalues().tail(keep).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
 Diagnosis::Work::Estimate Diagnosis::Work::Solve(const std::vector<const Chosen*>& terms) {
@@ -150,14 +231,14 @@ Diagnosis::Work::Estimate Diagnosis::Work::Solve(const std::vector<const Chosen*
   estimate.x = declared.x;
   estimate.sigma = declared.sigma;
   Estimate out;
-  for (int pass = 0; pass < 3; ++pass) {  // model torque and weights depend on the estimate
+  for (int pass = 0; pass < kPasses; ++pass) {  // model torque and weights depend on the estimate
     Prepare(terms);
     const Metric metric(rows, WhiteNoise());
     const VectorXd v = rows.L * metric.z();
     const MatrixXd P = rows.L * metric.Covariance() * rows.L.transpose();
     out = Estimate{};
     out.x = prior.mean;
-    for (int a = 0; a < active; ++a) out.x[declared.active[a]] += v[a];
+    for (int a = 0; a < active; ++a) out.x[declared.active[a]] = rows.mean[a] + v[a];
     int at = active;
     for (const Chosen* t : terms) {
       out.amplitude.push_back(v.segment(at, t->candidate->columns()));
@@ -172,7 +253,9 @@ Diagnosis::Work::Estimate Diagnosis::Work::Solve(const std::vector<const Chosen*
       out.innovation[j] = FitNoise(rows.index[j], e).innovation;
     }
     if (terms.empty()) out.x = declared.x, out.sigma = declared.sigma;  // `before` and `after` are then the same fit
+    const bool settled = (out.sigma - estimate.sigma).cwiseQuotient(out.sigma).cwiseAbs().maxCoeff() < kSettled;
     estimate = out;
+    if (settled) break;
   }
   return out;
 }

@@ -15,6 +15,7 @@ struct Chosen {
   std::string runner_up;
   double runner_up_score = 0;
   bool confirmed = true;
+  double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
 };
 
 struct Diagnosis::Work {
@@ -32,9 +33,18 @@ struct Diagnosis::Work {
   // Refreshes model torque and base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
   std::vector<NoiseModel> WhiteNoise() const;
+  // Reads the logs' motion that much before their torque, from now on.
+  void SetDelay(double delay_s);
+  // Applies exactly what terms say of the measurement; their columns then hold the rest.
+  void ApplyDelay(std::vector<Chosen>& terms);
+  void FillDeclared();
+  void MakeCoordinates(int size);
 
   const codegen::Model& model;
+  codegen::ArmTorque arm;
   std::vector<const calibration::Dataset*> train;
+  std::vector<const calibration::Dataset*> logged;  // as given
+  std::vector<calibration::Dataset> delayed;        // train points here once a delay has been applied
   calibration::Prior prior;
   calibration::Fit declared;
   std::vector<std::unique_ptr<Candidate>> candidates;
@@ -42,13 +52,15 @@ struct Diagnosis::Work {
   BaseRows rows;
   Estimate estimate;
   std::vector<Chosen> chosen;
-  std::vector<std::string> standby;  // records compiled in, not yet estimated
+  std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept where it does not hang on the estimate
+  std::vector<std::string> standby;                     // records compiled in, not yet estimated
   bool needs_flange = false;
+  std::unique_ptr<Work> narrow;  // the same logs at a lower bandwidth, without candidates of its own
 };
 
-// Model torque and body columns of one dataset at x.
-Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, const Eigen::VectorXd& x,
-                          const std::vector<double>& eta, bool flange);
+// Model torque, its parts and body columns of one dataset at x.
+Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque& arm, const calibration::Dataset& data,
+                          const Eigen::VectorXd& x, const std::vector<double>& eta, bool flange);
 
 // Torque of a candidate with given parameters on a dataset, N x n.
 Eigen::MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities,

@@ -1,5 +1,4 @@
 // generator - a model over whole logs: inputs bound to columns, states run first; knows no output format.
-#include <algorithm>
 #include <map>
 
 #include "codegen/src/generator/model.hpp"
@@ -12,26 +11,6 @@ struct Model::Bound {
   Eigen::VectorXd dt;
   Eigen::MatrixXd state;
 };
-
-namespace {
-// Time since the sample before; where it is no ordinary step, a new stretch begins and the ordinary step stands in.
-Eigen::VectorXd Steps(const Eigen::VectorXd& t, int samples, double usual, std::vector<char>& restart) {
-  restart.assign(samples, 0);
-  if (t.size() > 1) {
-    std::vector<double> all;
-    for (int k = 1; k < samples; ++k) all.push_back(t[k] - t[k - 1]);
-    std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
-    usual = all[all.size() / 2];
-  }
-  Eigen::VectorXd dt = Eigen::VectorXd::Constant(samples, usual);
-  for (int k = 1; k < samples && t.size(); ++k) {
-    const double step = t[k] - t[k - 1];
-    if (step > 0 && step < 1.5 * usual) dt[k] = step;
-    else restart[k] = 1;
-  }
-  return dt;
-}
-}  // namespace
 
 // states: how many of the graph's states the roots need.
 Model::Bound Model::Bind(const Signals& s, std::span<const double> committed, std::span<const double> eta,
@@ -51,7 +30,7 @@ Model::Bound Model::Bind(const Signals& s, std::span<const double> committed, st
   Bound bound;
   std::vector<char> restart;
   if (states > 0) {
-    bound.dt = Steps(s.t, s.samples(), robot_.sample_ticks / robot_.tick_rate_Hz, restart);
+    bound.dt = SampleSteps(s.t, s.samples(), robot_.sample_ticks / robot_.tick_rate_Hz, restart);
     value["dt"].column = bound.dt.data();
   }
   const auto in_order = [&] {

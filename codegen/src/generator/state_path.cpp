@@ -1,6 +1,8 @@
 // generator - sample by sample, since every state needs the one before.
 #include "codegen/src/generator/state_path.hpp"
 
+#include <algorithm>
+
 #include "codegen/src/generator/derivative.hpp"
 
 namespace armcal::codegen {
@@ -13,6 +15,23 @@ std::vector<Expr> InitialValues(const Graph& graph, std::size_t count) {
     known.emplace(graph.states()[k].value.id(), out.back());
   }
   return out;
+}
+
+Eigen::VectorXd SampleSteps(const Eigen::VectorXd& t, int samples, double usual, std::vector<char>& restart) {
+  restart.assign(samples, 0);
+  if (t.size() > 1) {
+    std::vector<double> all;
+    for (int k = 1; k < samples; ++k) all.push_back(t[k] - t[k - 1]);
+    std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+    usual = all[all.size() / 2];
+  }
+  Eigen::VectorXd dt = Eigen::VectorXd::Constant(samples, usual);
+  for (int k = 1; k < samples && t.size(); ++k) {
+    const double step = t[k] - t[k - 1];
+    if (step > 0 && step < 1.5 * usual) dt[k] = step;
+    else restart[k] = 1;
+  }
+  return dt;
 }
 
 Eigen::MatrixXd StatePath(const Graph& graph, std::size_t count, std::span<const Binding> bindings, int samples,

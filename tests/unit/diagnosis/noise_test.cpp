@@ -120,6 +120,7 @@ TEST(Metric, GainOfColumns_IsTheDropOfChiSquareInARefit) {
   std::vector<NoiseModel> noise(3);
   for (int j = 0; j < 3; ++j) {
     rows.index.push_back(Rows(400, 400));
+    rows.columns.push_back({0, 1, 2, 3, 4, 5, 6});
     rows.design.push_back(MatrixXd::Random(400, 7));
     rows.target.push_back(rows.design[j] * z + 0.2 * VectorXd::Random(400));
     noise[j].innovation = 0.1 * (j + 1);
@@ -150,6 +151,7 @@ TEST(Metric, AColumnOfTheBase_HasNoDirectionOfItsOwn) {
   rows.mean = VectorXd::Zero(3);
   rows.informative = false;
   rows.index = {Rows(400, 400)};
+  rows.columns = {{0, 1, 2}};
   rows.design = {MatrixXd::Random(400, 3)};
   rows.target = {VectorXd::Random(400)};
   Columns c;

@@ -1,0 +1,112 @@
+// calibration tests - a good log of a simulated arm passes; each planted fault is refused and named.
+#include "host_sim/calibration/log_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host_sim/io/input_error.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::calibration {
+namespace {
+
+using tests::SyntheticArm;
+
+class LogCheck : public testing::Test {
+ protected:
+  LogCheck() : arm_(codegen::ReadRobot("codegen/robots/two_link.toml"), 1), data_(arm_.Run(20, 2)) {
+    log_.joints = 2;
+    log_.source = "run.csv";
+    log_.t = data_.s.t, log_.q = data_.s.q, log_.tau = data_.tau;
+  }
+  std::string Said() const {
+    try {
+      (void)CheckSignals(arm_.model().robot(), log_);
+      CheckAgainstModel(arm_.model(), data_);
+    } catch (const io::InputError& e) {
+      return e.what();
+    }
+    return "";
+  }
+  void ExpectRefused(const std::string& named) const {
+    const std::string said = Said();
+    EXPECT_NE(said.find("run.csv"), std::string::npos) << said;
+    EXPECT_NE(said.find(named), std::string::npos) << said << " expected to name " << named;
+    EXPECT_EQ(said.find('\n'), std::string::npos) << said;
+  }
+  SyntheticArm arm_;
+  Dataset data_;
+  io::Log log_;
+};
+
+TEST_F(LogCheck, OfAGoodLog_SaysNothing) { EXPECT_EQ(Said(), ""); }
+
+TEST_F(LogCheck, OfOneSecond_AsksForMore) {
+  log_.t.conservativeResize(125);
+  log_.q.conservativeResize(125, 2), log_.tau.conservativeResize(125, 2);
+  ExpectRefused("expected at least 3 s");
+}
+
+TEST_F(LogCheck, OfDegrees_NamesThem) {
+  log_.q *= 57.29577951308232;
+  ExpectRefused("degrees");
+}
+
+TEST_F(LogCheck, OfMillinewtons_NamesThem) {
+  log_.tau *= 1000;
+  ExpectRefused("mN m");
+}
+
+TEST_F(LogCheck, OfAJointWithoutTorque_NamesIt) {
+  log_.tau.col(1).setZero();
+  ExpectRefused("joint 2: torque is zero");
+}
+
+TEST_F(LogCheck, OfAnEncoderThatNeverMoves_NamesIt) {
+  log_.q.col(1).setConstant(0.3);
+  ExpectRefused("joint 2: position never changes");
+}
+
+TEST_F(LogCheck, OfAnEncoderThatSticksForASecond_NamesIt) {
+  Eigen::Index fastest = 0;
+  (void)data_.s.qd.col(0).segment(500, 1000).cwiseAbs().maxCoeff(&fastest);
+  const Eigen::Index from = 500 + fastest;
+  log_.q.col(0).segment(from, 125).setConstant(log_.q(from, 0));
+  ExpectRefused("joint 1: ");
+}
+
+TEST_F(LogCheck, OfAClockThatJumps_NamesTheLine) {
+  Eigen::Index fastest = 0;
+  (void)data_.s.qd.col(0).segment(500, 1000).cwiseAbs().maxCoeff(&fastest);
+  const Eigen::Index from = 500 + fastest;
+  log_.t.tail(log_.t.size() - from - 1).array() += 3;
+  log_.gaps = {static_cast<int>(from)};
+  ExpectRefused("time jumps by 3");
+}
+
+TEST_F(LogCheck, OfAFewMissingSamples_IsALineAndOfManyARefusal) {
+  const auto without = [this](int first, int count) {
+    io::Log cut = log_;
+    const Eigen::Index rest = log_.t.size() - first - count;
+    cut.t.segment(first, rest) = log_.t.tail(rest);
+    cut.q.middleRows(first, rest) = log_.q.bottomRows(rest);
+    cut.tau.middleRows(first, rest) = log_.tau.bottomRows(rest);
+    cut.t.conservativeResize(first + rest);
+    cut.q.conservativeResize(first + rest, 2), cut.tau.conservativeResize(first + rest, 2);
+    cut.gaps = {first - 1};
+    return cut;
+  };
+  const std::vector<std::string> notes = CheckSignals(arm_.model().robot(), without(1000, 20));
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("20 samples are missing"), std::string::npos) << notes[0];
+  log_ = without(1000, 600);
+  ExpectRefused("600 samples are missing");
+}
+
+TEST_F(LogCheck, OfExchangedTorqueColumns_NamesThem) {
+  data_.source = "run.csv";
+  data_.tau.col(0).swap(data_.tau.col(1));
+  ExpectRefused("tau1 and tau2");
+}
+
+}  // namespace
+}  // namespace armcal::calibration

@@ -88,7 +88,7 @@ bool AnyConfirmed(const diagnosis::Finding& f) {
 std::string JointName(const Term& t) {
   if (t.joints.size() == 1) return std::to_string(t.joints[0] + 1);
   if (t.joints.size() == 2) return fmt::format("{}-{}", t.joints[0] + 1, t.joints[1] + 1);
-  return t.record->scope == "body" ? "flange" : "all";
+  return t.record->place;
 }
 
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {

@@ -45,7 +45,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options);
 // At least one term held on the held-out log.
 bool AnyConfirmed(const diagnosis::Finding& finding);
 
-// "3", "5-6", "all", "flange": how a report names the joints of a term.
+// "3", "5-6", "all", "base", "flange": how a report names the joints of a term.
 std::string JointName(const diagnosis::Term& term);
 
 // The JSON of design.md section 7.

@@ -82,6 +82,7 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
                 "inputs",
                 "signals",
                 "let",
+                "place",
                 "state",
                 "linear",
                 "nonlinear",
@@ -108,6 +109,7 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
               std::initializer_list<const char*>{"static", "stateful", "run_state", "sensor"});
   r.scope = in.Text("scope");
   MustBeOneOf(in, "scope", r.scope, std::initializer_list<const char*>{"joint", "pair", "arm", "body"});
+  r.place = in.Text("place", r.scope == "body" ? "flange" : "all");
   r.inputs = in.Texts("inputs");
   for (const std::string& input : r.inputs) MustBeOneOf(in, "inputs", input, kInputs);
   r.signals = in.Texts("signals");

@@ -49,6 +49,7 @@ struct EffectRecord {
   std::string name, title, source, path, text;
   std::string kind_class;  // static | stateful | run_state | sensor
   std::string scope;       // joint | pair | arm | body
+  std::string place;       // what a report calls the joints of an effect of the arm or a body: "all", "base", "flange"
   std::vector<std::string> inputs, signals, let, confusable_with, needs;
   std::vector<LinearParameter> linear;
   std::vector<NonlinearParameter> nonlinear;

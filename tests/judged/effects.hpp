@@ -1,0 +1,30 @@
+// judged set - what a declared model may lack, from physics; knows no effect record and no estimator.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/judged/arm.hpp"
+
+namespace armcal::judged {
+
+// One effect of one draw: its torque along any motion of the arm, before it is scaled to a size.
+struct Effect {
+  std::string kind;
+  nlohmann::json joint;                      // 3, "5-6", "all", "flange", "base"
+  std::vector<std::string> accept, signals;  // names that say the same; what it depends on
+  bool held_by_a_record = true;              // false: no record has this form exactly
+  bool needs_temperature = false, run_state = false;
+  int seen_on = 0;  // the joint whose visible part is scaled
+  // links: LinkTorque of the motion, [samples x joints].
+  std::function<Eigen::MatrixXd(const Motion& motion, const Eigen::MatrixXd& links)> torque;
+};
+
+// Kinds that DrawEffect knows.
+const std::vector<std::string>& Kinds();
+Effect DrawEffect(const std::string& kind, const Arm& arm, plant::Random& random);
+// One that no record holds: a bump of speed, a product of two joints' positions, ...
+Effect DrawUnknown(const Arm& arm, plant::Random& random);
+
+}  // namespace armcal::judged

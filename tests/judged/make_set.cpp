@@ -1,0 +1,193 @@
+// judged set - writes cases with a known truth: CASES/robots/*.json, CASES/<case>/{case.json,truth.json,*.csv.gz}.
+//   judged_set FOLDER SEED controls|singles|pairs|unknowns|detection COUNT
+// Shares nothing with the records and the regressor that a diagnosis uses: KDL, finite physics, its own random numbers.
+#include <fmt/core.h>
+#include <zlib.h>
+
+#include <Eigen/QR>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "tests/judged/effects.hpp"
+#include "tests/judged/noise.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace armcal::judged;
+using armcal::plant::Random;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+
+constexpr double kRate_Hz = 250, kTrain_s = 40, kTest_s = 30, kIgnored_s = 0.5;
+constexpr int kThin = 10;  // every tenth sample decides what the declared model absorbs
+
+struct Case {
+  std::string name, noise_class = "white";
+  std::vector<Effect> effects;
+  std::vector<double> size;  // visible RMS over the torque noise, of each effect on its joint
+};
+
+// RMS of what the declared model leaves of a torque, per joint, over the noise.
+VectorXd Visible(const Arm& arm, const Motion& train, const MatrixXd& torque, const VectorXd& sigma, Random& random) {
+  const Motion thin = Every(train, kThin);
+  const auto rows = DeclaredRows(arm, thin, random);
+  const int n = arm.joints(), samples = thin.samples();
+  MatrixXd A(samples * n, rows[0].cols());
+  VectorXd b(samples * n);
+  for (int j = 0; j < n; ++j) {
+    A.middleRows(j * samples, samples) = rows[static_cast<std::size_t>(j)] / sigma[j];
+    for (int k = 0; k < samples; ++k) b[j * samples + k] = torque(kThin * k, j) / sigma[j];
+  }
+  const VectorXd scale = A.colwise().norm().cwiseMax(1e-12);
+  A = A * scale.cwiseInverse().asDiagonal();
+  Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
+  qr.setThreshold(1e-9);
+  const VectorXd rest = b - A * qr.solve(b);
+  VectorXd out(n);
+  for (int j = 0; j < n; ++j) out[j] = std::sqrt(rest.segment(j * samples, samples).squaredNorm() / samples);
+  return out;
+}
+
+MatrixXd DeclaredTorque(const Arm& arm, const Motion& m, const MatrixXd& links) {
+  MatrixXd tau = links;
+  for (int j = 0; j < arm.joints(); ++j)
+    tau.col(j).array() +=
+        arm.rotor[j] * m.qdd.col(j).array() + arm.coulomb[j] * Sign(m.qd.col(j)) + arm.viscous[j] * m.qd.col(j).array();
+  return tau;
+}
+
+void WriteLog(const fs::path& path, const Motion& m, const MatrixXd& q, const MatrixXd& tau, bool temperature) {
+  const auto n = q.cols();
+  std::string text = "t";
+  const auto header = [&](const char* name) {
+    for (Eigen::Index j = 1; j <= n; ++j) text += fmt::format(",{}{}", name, j);
+  };
+  header("q"), header("tau");
+  if (temperature) header("temp");
+  text += "\n";
+  for (int k = 0; k < m.samples(); ++k) {
+    text += fmt::format("{:.6f}", m.t[k]);
+    for (Eigen::Index j = 0; j < n; ++j) text += fmt::format(",{:.9f}", q(k, j));
+    for (Eigen::Index j = 0; j < n; ++j) text += fmt::format(",{:.6g}", tau(k, j));
+    for (Eigen::Index j = 0; temperature && j < n; ++j) text += fmt::format(",{:.3f}", m.temp(k, j));
+    text += "\n";
+  }
+  gzFile file = gzopen(path.c_str(), "wb1");
+  if (!file || gzwrite(file, text.data(), static_cast<unsigned>(text.size())) == 0 || gzclose(file) != Z_OK)
+    throw std::runtime_error(path.string() + ": cannot be written");
+}
+
+void Write(const fs::path& path, const json& content) { std::ofstream(path) << content.dump(1) << "\n"; }
+
+void MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& random) {
+  const fs::path home = folder / c.name;
+  fs::create_directories(home);
+  fs::create_directories(folder / "robots");
+  Write(folder / "robots" / (arm.name + ".json"), RobotJson(arm));
+  const Motion motion[] = {DrawMotion(arm, kTrain_s, kRate_Hz, random), DrawMotion(arm, kTest_s, kRate_Hz, random)};
+  const VectorXd sigma = arm.sigma_Nm * (c.noise_class == "quiet" ? 0.1 : 1.0);
+  const MatrixXd links[] = {LinkTorque(arm, motion[0]), LinkTorque(arm, motion[1])};
+  json effects = json::array();
+  bool temperature = random.Uniform(0, 1) < 0.3;
+  std::vector<double> gain;
+  for (std::size_t e = 0; e < c.effects.size(); ++e) {
+    const Effect& effect = c.effects[e];
+    const VectorXd seen = Visible(arm, motion[0], effect.torque(motion[0], links[0]), sigma, random);
+    // Effects of the whole arm count where they are seen best.
+    const bool one_joint = !effect.joint.is_string();
+    gain.push_back(c.size[e] / (one_joint ? seen[effect.seen_on] : seen.maxCoeff()));
+    temperature = temperature || effect.needs_temperature;
+    const VectorXd ratio = gain.back() * seen;
+    effects.push_back({{"kind", effect.kind},
+                       {"joint", effect.joint},
+                       {"accept_kinds", effect.accept},
+                       {"depends_on", effect.signals},
+                       {"run_state", effect.run_state},
+                       {"held_by_a_record", effect.held_by_a_record},
+                       {"size", c.size[e]},
+                       {"visible_ratio", std::vector<double>(ratio.begin(), ratio.end())}});
+  }
+  std::vector<double> floor;
+  const char* const file[] = {"train.csv.gz", "test.csv.gz"};
+  for (int part = 0; part < 2; ++part) {
+    const Motion& m = motion[part];
+    MatrixXd tau = DeclaredTorque(arm, m, links[part]), q = m.q;
+    for (std::size_t e = 0; e < c.effects.size(); ++e) tau += gain[e] * c.effects[e].torque(m, links[part]);
+    const int edge = static_cast<int>(kIgnored_s * kRate_Hz);
+    for (int j = 0; j < arm.joints(); ++j) {
+      const VectorXd noise = DrawNoise(c.noise_class, m.samples(), arm.sigma_Nm[j], kRate_Hz, random);
+      tau.col(j) += noise;
+      const double step = 2 * M_PI / (EncoderCounts(c.noise_class) * arm.gear[j]);
+      q.col(j) = step * (q.col(j).array() / step).round();
+      const auto scored = noise.segment(edge, noise.size() - 2 * edge);
+      if (part == 1) floor.push_back(std::sqrt(scored.squaredNorm() / static_cast<double>(scored.size())));
+    }
+    WriteLog(home / file[part], m, q, tau, temperature);
+  }
+  Write(home / "truth.json", {{"verdict", effects.empty() ? "none" : "effect"},
+                              {"effects", effects},
+                              {"noise_class", c.noise_class},
+                              {"test_floor_noise", floor},
+                              {"test_floor_derived", floor}});
+  Write(home / "case.json", {{"robot", arm.name},
+                             {"fs", kRate_Hz},
+                             {"declared_model",
+                              {{"rigid_body", true},
+                               {"coulomb", true},
+                               {"viscous", true},
+                               {"offset", false},
+                               {"rotor_inertia", true},
+                               {"coulomb_smoothing_velocity", 0.005}}},
+                             {"files", {{"train", file[0]}, {"test", file[1]}}}});
+}
+
+// Sizes 0.1 to 2 x noise, evenly on a logarithmic scale.
+double DrawSize(Random& random) { return 0.1 * std::pow(20, random.Uniform(0, 1)); }
+
+Case DrawCase(const std::string& what, int number, const Arm& arm, Random& random) {
+  Case c;
+  c.name = fmt::format("{}_{:04}", what, number);
+  const auto& classes = NoiseClasses();
+  const auto& kinds = Kinds();
+  c.noise_class = what == "detection" ? "white" : classes[static_cast<std::size_t>(number) % classes.size()];
+  const auto kind = [&](int k) { return kinds[static_cast<std::size_t>(k) % kinds.size()]; };
+  if (what == "singles" || what == "detection") {
+    c.effects = {DrawEffect(kind(number), arm, random)};
+    c.size = {what == "detection" ? 0.1 : DrawSize(random)};
+  } else if (what == "unknowns") {
+    c.effects = {DrawUnknown(arm, random)};
+    c.size = {0.3 * std::pow(6, random.Uniform(0, 1))};
+  } else if (what == "pairs") {
+    c.effects = {DrawEffect(kind(number), arm, random)};
+    for (int k = 1; c.effects.size() < 2; ++k) {
+      Effect other = DrawEffect(kind(number + 7 * k), arm, random);
+      if (other.kind != c.effects[0].kind && other.joint != c.effects[0].joint) c.effects.push_back(other);
+    }
+    c.size = {0.3 * std::pow(5, random.Uniform(0, 1)), 0.3 * std::pow(5, random.Uniform(0, 1))};
+  } else if (what != "controls") {
+    throw std::runtime_error(what + ": expected controls, singles, pairs, unknowns or detection");
+  }
+  return c;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc != 5)
+    throw std::runtime_error("usage: judged_set FOLDER SEED controls|singles|pairs|unknowns|detection COUNT");
+  const std::string what = argv[3];
+  for (int k = 0; k < std::stoi(argv[4]); ++k) {
+    Random random(1000003ULL * std::stoull(argv[2]) + 7919ULL * static_cast<unsigned>(k) +
+                  std::hash<std::string>{}(what));
+    const Arm arm = DrawArm(random, 0.15);
+    MakeCase(argv[1], DrawCase(what, k, arm, random), arm, random);
+  }
+  return 0;
+} catch (const std::exception& e) {
+  fmt::print(stderr, "judged_set: {}\n", e.what());
+  return 2;
+}

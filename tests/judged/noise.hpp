@@ -1,0 +1,21 @@
+// judged set - torque noise and encoders; knows no arm.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "host_sim/plant/random.hpp"
+
+namespace armcal::judged {
+
+// "white", "coloured", "heavy_tailed", "resonant", "coarse_encoder", "quiet"
+const std::vector<std::string>& NoiseClasses();
+
+// Of standard deviation `sigma` at each sample; quiet: a tenth of it.
+Eigen::VectorXd DrawNoise(const std::string& noise_class, int samples, double sigma, double rate_Hz,
+                          plant::Random& random);
+// Counts per motor turn.
+double EncoderCounts(const std::string& noise_class);
+
+}  // namespace armcal::judged

@@ -110,6 +110,13 @@ Problem MakeProblem(const codegen::Model& model, std::vector<const Dataset*> tra
   return p;
 }
 
+Problem Along(const Problem& problem, const std::vector<Dataset>& logs) {
+  Problem other = problem;
+  other.train.clear();
+  for (const Dataset& log : logs) other.train.push_back(&log);
+  return other;
+}
+
 Rows StackRows(const Problem& problem, const VectorXd& z) {
   const codegen::Model& model = *problem.model;
   const int columns = model.columns();

@@ -71,6 +71,9 @@ Solution Solve(const Method& method, const Problem& problem);
 // Prior mean, covariance and ranges from the model's table; ranges: +-3 prior standard deviations, cut to the bounds.
 Problem MakeProblem(const codegen::Model& model, std::vector<const Dataset*> train);
 
+// The same problem along other logs, which must outlive it.
+Problem Along(const Problem& problem, const std::vector<Dataset>& logs);
+
 // Rows of all used samples at eta: K [rows x columns], tau [rows], joint and sample of each row. For methods that look
 // at everything at once; online methods take sample by sample.
 struct Rows {

@@ -1,12 +1,11 @@
 // cli - armcal excite: searches an excitation trajectory, checks it against the limits, writes it; plays nothing.
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 
 #include <unistd.h>
 
+#include "host_sim/cli/interrupt.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/excitation/compose.hpp"
 #include "host_sim/excitation/optimise.hpp"
@@ -25,21 +24,6 @@ struct Options {
 };
 
 constexpr int kTrainPeriods = 4, kTestPeriods = 2, kTrainSpeeds = 6, kTestSpeeds = 2;
-
-std::atomic<bool> interrupted{false};
-static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may set it
-
-// While it lives, Ctrl-C ends the search and not the program.
-class InterruptGuard {
- public:
-  InterruptGuard() : before_(std::signal(SIGINT, [](int) { interrupted = true; })) {}
-  ~InterruptGuard() { std::signal(SIGINT, before_); }
-  InterruptGuard(const InterruptGuard&) = delete;
-  InterruptGuard& operator=(const InterruptGuard&) = delete;
-
- private:
-  void (*before_)(int);
-};
 
 excitation::Target MakeTarget(const codegen::Robot& robot, const Options& o) {
   using Kind = excitation::Criterion::Kind;
@@ -62,7 +46,7 @@ excitation::Optimum Search(const excitation::Target& target, const Options& o) {
   s.seconds = o.seconds;
   if (o.starts > 0) s.starts = o.starts;
   s.seed = 2 * o.seed + (o.purpose == "test" ? 1 : 0);  // one seed, two different trajectories
-  s.stop = &interrupted;
+  s.stop = &InterruptGuard::interrupted();
   if (isatty(STDERR_FILENO))
     s.progress = [&](int starts, double figure) {
       fmt::print(stderr, "\r{} searches, {} {:.4g}  ", starts, excitation::Name(target.criterion().kind), figure);
@@ -150,7 +134,7 @@ int Run(const Options& o) {
 
   const auto columns = observation.columns().size();
   fmt::print("{}: cond(K) {:.3f} over one period, {:.3f} over the whole trajectory ({} searches, seed {}{})\n",
-             robot.name, condition, whole, best.starts, o.seed, interrupted ? ", interrupted" : "");
+             robot.name, condition, whole, best.starts, o.seed, InterruptGuard::interrupted() ? ", interrupted" : "");
   fmt::print(
       "  columns: the {} filter coordinates that are estimated (rigid base, friction, effects); rows divided by the "
       "joint's torque "
@@ -181,7 +165,7 @@ int Run(const Options& o) {
                      {"purpose", o.purpose},
                      {"seed", o.seed},
                      {"searches", best.starts},
-                     {"interrupted", interrupted.load()},
+                     {"interrupted", InterruptGuard::interrupted().load()},
                      {"cond_period", condition},
                      {"cond_whole", whole},
                      {"cond_period_without_rotors", rigid_only},

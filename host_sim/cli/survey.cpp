@@ -1,11 +1,10 @@
 // cli - armcal survey: reproduces the survey's tables and figures, with better methods beside them.
 #include <fmt/core.h>
 
-#include <atomic>
-#include <csignal>
 #include <cstdlib>
 #include <memory>
 
+#include "host_sim/cli/interrupt.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/io/files.hpp"
 #include "host_sim/io/input_error.hpp"
@@ -23,9 +22,6 @@ struct Options {
   std::uint64_t seed = 1;
   double search_s = 55;
 };
-
-std::atomic<bool> stop_asked{false};
-static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may set it
 
 // Folder of measured logs: the option, or the one below ARMCAL_DATA; empty where there is none.
 std::string MeasuredLogs(const Options& o) {
@@ -49,16 +45,15 @@ int Run(const Options& o) {
   s.measured = MeasuredLogs(o);
   s.tables = o.tables, s.draws = o.draws, s.slow_draws = o.slow_draws, s.seed = o.seed, s.search_s = o.search_s;
   s.cad_feedforward = o.feedforward == "cad";
-  s.stop = &stop_asked;
+  s.stop = &InterruptGuard::interrupted();
   std::string task;
   std::unique_ptr<report::Progress> line;
   s.progress = [&](const std::string& what, double share) {
     if (what != task) line.reset(), line = std::make_unique<report::Progress>(what), task = what;
     line->Set(share);
   };
-  const auto before = std::signal(SIGINT, [](int) { stop_asked = true; });  // what is there by then is shown
+  const InterruptGuard guard;  // what is there by then is shown
   const survey::Findings found = survey::RunSurvey(s);
-  std::signal(SIGINT, before);
   line.reset();
   for (const survey::Sheet& sheet : found.sheets) {
     fmt::print("\nTable {}\n{}", sheet.number, report::Text(survey::TableOf(sheet)));
@@ -68,7 +63,7 @@ int Run(const Options& o) {
   fmt::print("\n{}", survey::GoalLines(found));
   if (!o.json.empty()) io::AtomicWrite(o.json, survey::Json(found, s));
   if (!o.report.empty()) io::AtomicWrite(o.report, survey::Html(found, s));
-  return stop_asked ? kPartial : kOk;
+  return InterruptGuard::interrupted() ? kPartial : kOk;
 }
 
 }  // namespace

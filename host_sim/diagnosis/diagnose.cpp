@@ -164,13 +164,6 @@ class Selector {
   std::map<const Candidate*, double> gain_;  // as last searched
 };
 
-std::vector<const Chosen*> Pointers(const std::vector<Chosen>& chosen, const Chosen* without = nullptr) {
-  std::vector<const Chosen*> out;
-  for (const Chosen& c : chosen)
-    if (&c != without && c.confirmed) out.push_back(&c);
-  return out;
-}
-
 double TotalDelay_s(const std::vector<Chosen>& chosen) {
   double sum = 0;
   for (const Chosen& c : chosen) sum += c.confirmed ? c.delay_s : 0;
@@ -220,18 +213,18 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
     w.narrow->needs_flange = w.needs_flange;
   }
   Selector select(w);
-  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Pointers(w.chosen), next);) {
+  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);
-    w.ApplyDelay(w.chosen);
+    w.ApplyDelay();
   }
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
     if (w.chosen[k].delay_s != 0) ++k;  // the logs are as it says now
-    else if (select.StillEarns(w.chosen[k], Pointers(w.chosen, &w.chosen[k]))) ++k;
+    else if (select.StillEarns(w.chosen[k], Confirmed(w.chosen, &w.chosen[k]))) ++k;
     else w.chosen.erase(w.chosen.begin() + static_cast<long>(k));
   }
   std::sort(w.chosen.begin(), w.chosen.end(),
             [](const Chosen& a, const Chosen& b) { return a.found.score > b.found.score; });
-  w.estimate = w.Solve(Pointers(w.chosen));
+  w.estimate = w.Solve(Confirmed(w.chosen));
   finding_.declared = w.declared;
   WriteTerms(w, finding_);
   finding_.smallest.resize(model.joints());
@@ -249,7 +242,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
   const VectorXd before = calibration::Rms(test, out.before, true);
   for (;;) {
-    w.estimate = w.Solve(Pointers(w.chosen));
+    w.estimate = w.Solve(Confirmed(w.chosen));
     const calibration::Dataset seen = AsTermsSay(w.chosen, test);
     const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
     out.after = test.tau - calibration::Predict(model_, seen, w.estimate.x, w.declared.eta);

@@ -20,6 +20,13 @@ constexpr int kDelayRounds = 2;    // the rest after the first is of second orde
 constexpr double kSettled = 1e-3;  // relative change of the residuals' spread after which nothing else moves
 }  // namespace
 
+std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Chosen* without) {
+  std::vector<const Chosen*> out;
+  for (const Chosen& c : chosen)
+    if (&c != without && c.confirmed) out.push_back(&c);
+  return out;
+}
+
 Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque& arm, const calibration::Dataset& data,
                           const VectorXd& x, const std::vector<double>& eta, bool flange) {
   Quantities out;
@@ -88,16 +95,13 @@ void Diagnosis::Work::SetDelay(double delay_s) {
   if (narrow) narrow->SetDelay(delay_s);
 }
 
-void Diagnosis::Work::ApplyDelay(std::vector<Chosen>& terms) {
+void Diagnosis::Work::ApplyDelay() {
   for (int round = 0; round < kDelayRounds; ++round) {
-    std::vector<const Chosen*> confirmed;
-    for (const Chosen& c : terms)
-      if (c.confirmed) confirmed.push_back(&c);
-    estimate = Solve(confirmed);
+    estimate = Solve(Confirmed(chosen));
     double total_s = 0;
     bool any = false;
     std::size_t k = 0;
-    for (Chosen& c : terms) {
+    for (Chosen& c : chosen) {
       if (!c.confirmed) continue;
       const double amplitude = estimate.amplitude[k++][0];
       if (c.candidate->record().apply.how != "delay") continue;

@@ -18,6 +18,9 @@ struct Chosen {
   double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
 };
 
+// Those that are, but for `without`.
+std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Chosen* without = nullptr);
+
 struct Diagnosis::Work {
   Work(const codegen::Model& model, const codegen::Catalogue& catalogue,
        std::vector<const calibration::Dataset*> train);
@@ -35,8 +38,8 @@ struct Diagnosis::Work {
   std::vector<NoiseModel> WhiteNoise() const;
   // Reads the logs' motion that much before their torque, from now on.
   void SetDelay(double delay_s);
-  // Applies exactly what terms say of the measurement; their columns then hold the rest.
-  void ApplyDelay(std::vector<Chosen>& terms);
+  // Applies exactly what the chosen terms say of the measurement; their columns then hold the rest.
+  void ApplyDelay();
   void FillDeclared();
   void MakeCoordinates(int size);
 

@@ -54,11 +54,10 @@ double SmoothCondition(const Axes& a, const MatrixXd& gram, MatrixXd& derivative
 }  // namespace
 
 double Figure(const Criterion& criterion, const MatrixXd& gram) {
-  const Axes a = AxesOf(gram);
-  if (!a.ok) return kInfinity;
-  if (criterion.kind == Criterion::Kind::kCondition) return std::sqrt(a.value[a.value.size() - 1] / a.value[0]);
   MatrixXd unused;
-  return std::exp(SmoothFigure(criterion, gram, unused));
+  if (criterion.kind != Criterion::Kind::kCondition) return std::exp(SmoothFigure(criterion, gram, unused));
+  const Axes a = AxesOf(gram);
+  return a.ok ? std::sqrt(a.value[a.value.size() - 1] / a.value[0]) : kInfinity;
 }
 
 double SmoothFigure(const Criterion& criterion, const MatrixXd& gram, MatrixXd& derivative) {

@@ -1,6 +1,5 @@
 // survey - tier 2 of the platform: what noise in q does to least squares, by how its derivatives are taken.
 #include "host_sim/calibration/methods/fourier_fit.hpp"
-#include "host_sim/search/parallel.hpp"
 #include "host_sim/survey/platform.hpp"
 #include "host_sim/survey/tables.hpp"
 
@@ -37,8 +36,7 @@ void ShowDifferentiation(const Settings& settings, const Motions& motions, Findi
   const std::unique_ptr<Truth> truth =
       MakeTruth(settings, motions, Law::kCoulombViscous, SetStribeck(settings.robot.joints()));
   std::vector<std::vector<Cells>> of_draw(static_cast<std::size_t>(draws));
-  search::InParallel(draws, 0, [&](int d) {
-    if (settings.Stopped()) return;
+  ForEachDraw(settings, "table 10, tier 2", draws, [&](int d) {
     std::vector<Cells>& cells = of_draw[static_cast<std::size_t>(d)];
     cells.resize(std::size(kNoise_rad) * std::size(kSignals));
     const auto seed = settings.seed * 653 + 4 * static_cast<std::uint64_t>(d);

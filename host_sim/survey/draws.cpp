@@ -2,7 +2,6 @@
 #include "host_sim/survey/draws.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <mutex>
 
@@ -112,15 +111,23 @@ std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motion
       Sampled(motions.other));
 }
 
+void ForEachDraw(const Settings& settings, const std::string& what, int count, const std::function<void(int)>& work) {
+  int done = 0;
+  std::mutex line;
+  search::InParallel(count, 0, [&](int d) {
+    if (settings.Stopped()) return;
+    work(d);
+    const std::lock_guard lock(line);
+    settings.progress(what, static_cast<double>(++done) / count);
+  });
+}
+
 std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, const DrawSettings& draws,
                               const std::vector<std::string>& methods) {
   const int joints = settings.robot.joints();
   const std::unique_ptr<Truth> set = MakeTruth(settings, motions, draws.law, SetStribeck(joints));
   std::vector<std::vector<Solved>> solved(static_cast<std::size_t>(draws.draws));
-  std::atomic<int> done{0};
-  std::mutex line;
-  search::InParallel(draws.draws, 0, [&](int d) {
-    if (settings.Stopped()) return;
+  ForEachDraw(settings, LawName(draws.law) + ", " + PriorName(draws.prior), draws.draws, [&](int d) {
     // What CAD says about friction's Stribeck part is centred on the set values, or, for drawn truths, on their range.
     Stribeck believed = SetStribeck(joints);
     std::unique_ptr<Truth> drawn;
@@ -142,8 +149,6 @@ std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, 
       if (d > 0) one.solution[0] = one.solution[1] = {};  // only the first is shown
       solved[static_cast<std::size_t>(d)].push_back(std::move(one));
     }
-    const std::lock_guard lock(line);
-    settings.progress(LawName(draws.law) + ", " + PriorName(draws.prior), static_cast<double>(++done) / draws.draws);
   });
   std::vector<Outcome> out;
   for (std::size_t m = 0; m < methods.size(); ++m) {

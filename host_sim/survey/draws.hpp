@@ -63,6 +63,9 @@ struct Outcome {
 // The Truth of the first draw (all draws, unless random_truth).
 std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck);
 
+// work(0) .. work(count - 1) on all cores, unless stopped, with a line of progress.
+void ForEachDraw(const Settings& settings, const std::string& what, int count, const std::function<void(int)>& work);
+
 // On all cores. The methods of (25) take seconds each and get `slow_draws`.
 std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, const DrawSettings& draws,
                               const std::vector<std::string>& methods);

@@ -18,11 +18,6 @@ constexpr Index kIndices[] = {{"e_d", &Score::e_d, 0},
                               {"J_e", &Score::J_e, 4}};
 constexpr std::size_t kWithNoise = 5, kDelta = 10;
 
-Cell Delta(const std::vector<double>& values) {
-  const Statistic s = Summarise(values);
-  return {s.mean, s.low, s.high};
-}
-
 Sheet AsPrinted(const std::string& number, const std::vector<Outcome>& outcomes, const Printed& printed) {
   Sheet sheet{
       number, "errors with and without noise, the survey's indices", {"method", "(eq.)", "torque", "draws"}, {}, {}};
@@ -37,7 +32,7 @@ Sheet AsPrinted(const std::string& number, const std::vector<Outcome>& outcomes,
         row.push_back(Mean(scores, i.of));
         row.emplace_back(printed.At("table" + number, o.name, i.printed + (noise ? kWithNoise : 0)));
       }
-      row.push_back(noise ? Delta(o.delta) : Cell("-"));
+      row.push_back(noise ? Mean(o.delta) : Cell("-"));
       row.push_back(noise ? Cell(printed.At("table" + number, o.name, kDelta)) : Cell("-"));
       std::string remark = scores.empty() ? o.why : scores.front().remark;
       if (o.failed && !scores.empty())
@@ -68,7 +63,7 @@ Sheet Judged(const std::string& number, const std::vector<Outcome>& outcomes) {
       sheet.rows.push_back({o.title, noise ? "with noise" : "without noise", Mean(scores, &Score::e_d_over_prior),
                             Mean(scores, &Score::e_base), Mean(scores, &Score::coverage),
                             Mean(scores, &Score::physical), Mean(scores, &Score::J_true),
-                            noise ? Delta(o.delta_true) : Cell("-"), Mean(scores, &Score::e_T_printed),
+                            noise ? Mean(o.delta_true) : Cell("-"), Mean(scores, &Score::e_T_printed),
                             Mean(scores, &Score::e_T_std_printed), Mean(scores, &Score::from_prior),
                             Mean(scores, &Score::seconds), Mean(scores, &Score::memory_bytes)});
     }

@@ -1,10 +1,6 @@
 // survey - Table 10: noise in the position, the pseudo-inverse (15) against instruments (17), in the closed loop.
-#include <atomic>
-#include <mutex>
-
 #include "host_sim/calibration/closed_loop.hpp"
 #include "host_sim/calibration/methods/fourier_fit.hpp"
-#include "host_sim/search/parallel.hpp"
 #include "host_sim/survey/platform.hpp"
 #include "host_sim/survey/tables.hpp"
 
@@ -95,11 +91,6 @@ class Bench {
   std::unique_ptr<Truth> truth_;
 };
 
-Cell MeanOf(const std::vector<double>& v) {
-  const Statistic s = Summarise(v);
-  return {s.mean, s.low, s.high};
-}
-
 std::vector<Cell> RowOf(const Settings& settings, const Contender& c, const Result& r) {
   const auto printed = [&](std::size_t place) {
     return c.prior ? Cell("-") : Cell(settings.printed.At("table10", c.method, place));
@@ -111,7 +102,7 @@ std::vector<Cell> RowOf(const Settings& settings, const Contender& c, const Resu
           printed(0),
           Mean(plain, &Score::J_e),
           printed(1),
-          MeanOf(r.growth),
+          Mean(r.growth),
           printed(2),
           Mean(fourier, &Score::J_e),
           Mean(plain, &Score::e_d_over_prior),
@@ -150,10 +141,7 @@ void ShowInstruments(const Settings& settings, const Motions& motions, Findings&
   const Bench bench(settings, motions);
   const int draws = std::min(kDraws, settings.draws);
   std::vector<std::vector<Result>> of_draw(static_cast<std::size_t>(draws));
-  std::atomic<int> done{0};
-  std::mutex line;
-  search::InParallel(draws, 0, [&](int d) {
-    if (settings.Stopped()) return;
+  ForEachDraw(settings, "table 10", draws, [&](int d) {
     const Draw draw = bench.At(d);
     for (const Contender& c : kContenders) {
       Result r;
@@ -161,8 +149,6 @@ void ShowInstruments(const Settings& settings, const Motions& motions, Findings&
         if (const auto score = bench.Solve(draw, signal, c, r.why)) r.score[signal].push_back(*score);
       of_draw[static_cast<std::size_t>(d)].push_back(std::move(r));
     }
-    const std::lock_guard lock(line);
-    settings.progress("table 10", static_cast<double>(++done) / draws);
   });
   for (std::size_t k = 0; k < std::size(kContenders); ++k) {
     Result all;

@@ -79,18 +79,14 @@ void Simulated(const Settings& settings, const Motions& motions, Findings& out) 
       nested = nested && d < static_cast<int>(reference.size()) &&
                train.back() <= reference[static_cast<std::size_t>(d)] * (law == Law::kSechTanh ? 1.01 : 1 + 1e-6);
     }
-    const auto cell = [](const std::vector<double>& v) {
-      const Statistic s = Summarise(v);
-      return Cell(s.mean, s.low, s.high);
-    };
     if (train.empty()) {
       sheet.rows.push_back({LawName(law), why, "-", "-", "-", "-", "-", "-", "-"});
       continue;
     }
     all_nested = all_nested && nested;
     means[law] = Summarise(train).mean;
-    sheet.rows.push_back({LawName(law), by, cell(train), cell(held_out), cell(mean),
-                          settings.printed.At("table12", PrintedRow(law), 0), cell(spread),
+    sheet.rows.push_back({LawName(law), by, Mean(train), Mean(held_out), Mean(mean),
+                          settings.printed.At("table12", PrintedRow(law), 0), Mean(spread),
                           settings.printed.At("table12", PrintedRow(law), 1), nested ? "yes" : "no"});
   }
   out.goals.push_back(

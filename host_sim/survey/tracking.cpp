@@ -1,11 +1,8 @@
 // survey - Figure 4: friction that changes while the filter runs; who follows it.
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
-#include <mutex>
 
-#include "host_sim/search/parallel.hpp"
 #include "host_sim/survey/platform.hpp"
 #include "host_sim/survey/tables.hpp"
 
@@ -113,15 +110,10 @@ void ShowTracking(const Settings& settings, const Motions& motions, Evidence& ev
   const auto place = [](int filter, int profile, int draw) {
     return static_cast<std::size_t>((filter * kProfileCount + profile) * kDraws + draw);
   };
-  std::atomic<int> done{0};
-  std::mutex line;
-  search::InParallel(static_cast<int>(runs.size()), 0, [&](int k) {
-    if (settings.Stopped()) return;
+  ForEachDraw(settings, "figure 4", static_cast<int>(runs.size()), [&](int k) {
     const int f = k / (kProfileCount * kDraws), p = k / kDraws % kProfileCount;
     runs[static_cast<std::size_t>(k)] =
         Track(settings, motions, calibration::FindMethod(kFilters[f].method), kFilters[f].mu, kProfiles[p], k % kDraws);
-    const std::lock_guard lock(line);
-    settings.progress("figure 4", static_cast<double>(++done) / static_cast<double>(runs.size()));
   });
   std::map<std::pair<std::string, std::string>, Run> shown;  // (profile, filter) -> the first draw
   for (int k = 0; k < kFilterCount; ++k) {

@@ -86,4 +86,9 @@ Cell Mean(const std::vector<Score>& scores, double Score::*index) {
   return {s.mean, s.low, s.high};
 }
 
+Cell Mean(const std::vector<double>& values) {
+  const Statistic s = Summarise(values);
+  return {s.mean, s.low, s.high};
+}
+
 }  // namespace armcal::survey

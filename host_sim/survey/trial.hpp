@@ -53,6 +53,7 @@ calibration::Problem WithPrior(const codegen::Model& model, std::vector<const ca
 
 // Mean of one index over draws as a cell with its interval.
 Cell Mean(const std::vector<Score>& scores, double Score::*index);
+Cell Mean(const std::vector<double>& values);
 Statistic Over(const std::vector<Score>& scores, double Score::*index);
 
 }  // namespace armcal::survey

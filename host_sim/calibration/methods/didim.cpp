@@ -16,29 +16,13 @@ constexpr int kIterations = 10;
 }  // namespace
 
 Solution Didim(const Problem& problem) {
-  const double began = CpuSeconds();
-  LoopLogs simulation(problem, "didim");
-  Solution solution;
-  VectorXd z = problem.start;
-  ClampEta(problem, z);
-  solution.converged = false;
-  for (; solution.iterations < kIterations && !solution.converged && !Stopped(problem); ++solution.iterations) {
-    solution.remark = ShareRemark(simulation.Simulate(z));
-    const Linearised sim = Linearise(Along(problem, simulation.logs()), z);
-    VectorXd next = SolveRegularised(problem, sim.A.transpose() * sim.A, sim.A.transpose() * (sim.residual + sim.A * z),
-                                     &solution.covariance);
-    ClampEta(problem, next);
-    const double change = LargestChange(z, next, solution.covariance);
-    solution.converged = change < kSettledChange;
-    z = next;
-    solution.memory_bytes = 2 * static_cast<std::size_t>(sim.A.size()) * sizeof(double);
-    if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / kIterations, change);
-  }
-  solution.z = z;
-  if (!solution.converged && solution.remark.empty())
-    solution.remark = "still moving after " + std::to_string(solution.iterations) + " simulations";
-  Finish(problem, began, solution);
-  return solution;
+  return IterateOnLoop(problem, "didim", kIterations,
+                       [&](const std::vector<Dataset>& simulated, const VectorXd& z, Solution& solution) {
+                         const Linearised sim = Linearise(Along(problem, simulated), z);
+                         solution.memory_bytes = 2 * static_cast<std::size_t>(sim.A.size()) * sizeof(double);
+                         return SolveRegularised(problem, sim.A.transpose() * sim.A,
+                                                 sim.A.transpose() * (sim.residual + sim.A * z), &solution.covariance);
+                       });
 }
 
 }  // namespace armcal::calibration

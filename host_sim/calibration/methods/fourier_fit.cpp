@@ -8,7 +8,6 @@
 
 #include "host_sim/calibration/methods/better_methods.hpp"
 #include "host_sim/calibration/methods/linearised.hpp"
-#include "host_sim/calibration/methods/simulated_logs.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::calibration {

@@ -62,30 +62,13 @@ VectorXd Step(const Problem& problem, const VectorXd& z, const Linearised& K, co
 }  // namespace
 
 Solution InstrumentalVariable(const Problem& problem) {
-  const double began = CpuSeconds();
-  LoopLogs simulation(problem, "instrumental_variable");
-  Solution solution;
-  // The first instrument is the start's: least squares may be so biased that its arm cannot be simulated.
-  VectorXd z = problem.start;
-  ClampEta(problem, z);
-  Linearised measured;
-  solution.converged = false;
-  for (; solution.iterations < kIterations && !solution.converged && !Stopped(problem); ++solution.iterations) {
-    solution.remark = ShareRemark(simulation.Simulate(z));
-    measured = Linearise(problem, z);
-    VectorXd next = Step(problem, z, measured, Linearise(Along(problem, simulation.logs()), z), solution.covariance);
-    ClampEta(problem, next);
-    const double change = LargestChange(z, next, solution.covariance);
-    solution.converged = change < kSettledChange;
-    z = next;
-    if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / kIterations, change);
-  }
-  solution.z = z;
-  if (!solution.converged && solution.remark.empty())
-    solution.remark = "still moving after " + std::to_string(solution.iterations) + " simulations";
-  solution.memory_bytes = 4 * static_cast<std::size_t>(measured.A.size()) * sizeof(double);
-  Finish(problem, began, solution);
-  return solution;
+  return IterateOnLoop(problem, "instrumental_variable", kIterations,
+                       [&](const std::vector<Dataset>& simulated, const VectorXd& z, Solution& solution) {
+                         const Linearised measured = Linearise(problem, z);
+                         solution.memory_bytes = 4 * static_cast<std::size_t>(measured.A.size()) * sizeof(double);
+                         return Step(problem, z, measured, Linearise(Along(problem, simulated), z),
+                                     solution.covariance);
+                       });
 }
 
 }  // namespace armcal::calibration

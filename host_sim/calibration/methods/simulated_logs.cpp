@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_sim/calibration/methods/linearised.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::calibration {
@@ -56,24 +57,49 @@ double LoopLogs::Simulate(const VectorXd& z) {
   return share_ = 0;
 }
 
+namespace {
+
+constexpr double kSettledChange = 0.02;  // standard deviations: the simulations say nothing new
+
+// What a reader must know of the share that the last round used; empty if it was 1.
 std::string ShareRemark(double share) {
   return share == 1 ? ""
                     : "simulated at " + std::to_string(static_cast<int>(100 * share)) +
                           " % of the way from the start to the estimate, whose own arm runs away";
 }
 
-Problem Along(const Problem& problem, const std::vector<Dataset>& logs) {
-  Problem other = problem;
-  other.train.clear();
-  for (const Dataset& log : logs) other.train.push_back(&log);
-  return other;
-}
-
+// Largest change of a coordinate in its standard deviations.
 double LargestChange(const VectorXd& before, const VectorXd& after, const Eigen::MatrixXd& covariance) {
   double change = 0;
   for (Eigen::Index c = 0; c < before.size(); ++c)
     if (covariance(c, c) > 0) change = std::max(change, std::abs(after[c] - before[c]) / std::sqrt(covariance(c, c)));
   return change;
+}
+
+}  // namespace
+
+Solution IterateOnLoop(const Problem& problem, const char* method, int most, const LoopRound& round) {
+  const double began = CpuSeconds();
+  LoopLogs simulation(problem, method);
+  Solution solution;
+  // The first simulation is the start's: least squares may be so biased that its arm cannot be simulated.
+  VectorXd z = problem.start;
+  ClampEta(problem, z);
+  solution.converged = false;
+  for (; solution.iterations < most && !solution.converged && !Stopped(problem); ++solution.iterations) {
+    solution.remark = ShareRemark(simulation.Simulate(z));
+    VectorXd next = round(simulation.logs(), z, solution);
+    ClampEta(problem, next);
+    const double change = LargestChange(z, next, solution.covariance);
+    solution.converged = change < kSettledChange;
+    z = next;
+    if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / most, change);
+  }
+  solution.z = z;
+  if (!solution.converged && solution.remark.empty())
+    solution.remark = "still moving after " + std::to_string(solution.iterations) + " simulations";
+  Finish(problem, began, solution);
+  return solution;
 }
 
 }  // namespace armcal::calibration

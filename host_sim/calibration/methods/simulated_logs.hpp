@@ -1,7 +1,7 @@
 // calibration methods - what methods that simulate the closed loop share; knows no single method.
 #pragma once
 
-#include <string>
+#include <functional>
 #include <vector>
 
 #include "host_sim/calibration/method.hpp"
@@ -30,15 +30,11 @@ class LoopLogs {
   double share_ = 1;
 };
 
-// What a reader must know of the share that the last round used; empty if it was 1.
-std::string ShareRemark(double share);
+// One round of a method: from the simulated logs at z to the next z, and its covariance.
+using LoopRound =
+    std::function<Eigen::VectorXd(const std::vector<Dataset>& simulated, const Eigen::VectorXd& z, Solution& solution)>;
 
-// The same problem along other logs, which must outlive it.
-Problem Along(const Problem& problem, const std::vector<Dataset>& logs);
-
-// Largest change of a coordinate in its standard deviations.
-double LargestChange(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::MatrixXd& covariance);
-
-inline constexpr double kSettledChange = 0.02;  // a LargestChange below it: the simulations say nothing new
+// Simulates and takes a round until no coordinate changes by more than a fiftieth of its standard deviation.
+Solution IterateOnLoop(const Problem& problem, const char* method, int most, const LoopRound& round);
 
 }  // namespace armcal::calibration

@@ -14,10 +14,15 @@ constexpr int kFlagSaturated = 2, kFlagStale = 4;
 // A joint that has just stopped or is about to turn may stick while its smoothed speed is already above v_min: rows
 // this close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
 constexpr int kTurn = 2;
+constexpr int kPoses = 8;  // at a single one an entry of the mass matrix may vanish
 // Signals and masks for given inertias.
-Dataset Derive(const codegen::Model& model, const io::Log& log, const Eigen::VectorXd& inertia, double cutoff_scale) {
+Dataset Derive(const codegen::Model& model, const io::Log& log, const Eigen::MatrixXd& inertia, double cutoff_scale) {
   const int n = model.joints(), samples = static_cast<int>(log.samples());
-  const io::Derivatives derived = io::DeriveSignals(log, inertia, cutoff_scale);
+  Eigen::VectorXd sign_width(n);
+  for (int j = 0; j < n; ++j)
+    sign_width[j] =
+        model.robot().sign_law == "tanh" ? model.robot().sign_width_radps : model.robot().joint[j].v_min_radps;
+  const io::Derivatives derived = io::DeriveSignals(log, {inertia, sign_width}, cutoff_scale);
   Dataset d;
   d.source = log.source;
   d.s.t = log.t;
@@ -51,23 +56,29 @@ Dataset Derive(const codegen::Model& model, const io::Log& log, const Eigen::Vec
 
 }  // namespace
 
-Eigen::VectorXd TypicalInertia(const codegen::Model& model, const Eigen::VectorXd& base) {
-  const int n = model.joints();
-  codegen::Signals s;  // unit accelerations, one joint a sample, at mid-range; the last sample, at rest, is gravity
-  s.q.setZero(n + 1, n), s.qd.setZero(n + 1, n), s.qdd.setZero(n + 1, n);
-  for (int j = 0; j < n; ++j) {
-    const auto& limits = model.robot().joint[j].position_limit_rad;
-    s.q.col(j).setConstant(0.5 * (limits[0] + limits[1]));
-    s.qdd(j, j) = 1;
-  }
+Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& base) {
+  const int n = model.joints(), per_pose = n + 1;
+  codegen::Signals s;  // unit accelerations, one joint a sample, at each pose; the last sample, at rest, is gravity
+  s.q.resize(kPoses * per_pose, n), s.qd.setZero(kPoses * per_pose, n), s.qdd = s.qd;
+  for (int pose = 0; pose < kPoses; ++pose)
+    for (int j = 0; j < n; ++j) {
+      // the middle half of each range, evenly filled by multiples of irrational numbers
+      const double turns = 0.5 + pose * std::sqrt(2 + j * (j + 3));
+      const double share = 0.25 + 0.5 * (turns - std::floor(turns));
+      const auto& limits = model.robot().joint[j].position_limit_rad;
+      s.q.col(j).segment(pose * per_pose, per_pose).setConstant(limits[0] + share * (limits[1] - limits[0]));
+      s.qdd(pose * per_pose + j, j) = 1;
+    }
   std::vector<Eigen::MatrixXd> row;
   model.Regressor(s, {}, {}, row);
-  Eigen::VectorXd inertia(n);
-  for (int j = 0; j < n; ++j) {
-    const auto rigid = row[j].middleCols(model.front(), model.rigid());
-    inertia[j] = (rigid.row(j) - rigid.row(n)).dot(base);
+  Eigen::MatrixXd square = Eigen::MatrixXd::Zero(n, n);
+  for (int r = 0; r < n; ++r) {
+    const Eigen::VectorXd torque = row[r].middleCols(model.front(), model.rigid()) * base;
+    for (int pose = 0; pose < kPoses; ++pose)
+      for (int j = 0; j < n; ++j)
+        square(r, j) += std::pow(torque[pose * per_pose + j] - torque[pose * per_pose + n], 2) / kPoses;
   }
-  return inertia;
+  return square.cwiseSqrt();
 }
 
 Dataset Prepare(const codegen::Model& model, const io::Log& log, double cutoff_scale) {
@@ -75,20 +86,20 @@ Dataset Prepare(const codegen::Model& model, const io::Log& log, double cutoff_s
   if (log.joints != n)
     throw io::InputError(log.source + ": " + std::to_string(log.joints) + " joints, expected " + std::to_string(n) +
                          " (robot " + model.robot().name + ")");
-  Eigen::VectorXd inertia(n);
+  Eigen::MatrixXd inertia = Eigen::MatrixXd::Zero(n, n);
   if (model.robot().has_prior) {
     Eigen::VectorXd bodies(model.body_parameters());
     for (int k = 0; k < bodies.size(); ++k) bodies[k] = model.table()[k].mean;
-    inertia = TypicalInertia(model, model.base_map() * bodies);
+    inertia = TypicalMass(model, model.base_map() * bodies);
   } else {
     // A joint's torque limit over its acceleration limit is a heavy guess: a low cut-off, good enough for a first fit.
     for (int j = 0; j < n; ++j)
-      inertia[j] = model.robot().joint[j].torque_limit_Nm / model.robot().joint[j].acceleration_limit_radps2;
+      inertia(j, j) = model.robot().joint[j].torque_limit_Nm / model.robot().joint[j].acceleration_limit_radps2;
     const Dataset rough = Derive(model, log, inertia, 1);
     const Fit fit = WeightedFit(model, {&rough});
-    const Eigen::VectorXd fitted = TypicalInertia(model, fit.x.segment(model.front(), model.rigid()));
-    for (int j = 0; j < n; ++j)
-      if (fitted[j] > 0) inertia[j] = std::min(inertia[j], fitted[j]);
+    const Eigen::VectorXd guess = inertia.diagonal();
+    inertia = TypicalMass(model, fit.x.segment(model.front(), model.rigid()));
+    for (int j = 0; j < n; ++j) inertia(j, j) = std::min(inertia(j, j), guess[j]);
   }
   return Derive(model, log, inertia, cutoff_scale);
 }

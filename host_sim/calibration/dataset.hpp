@@ -26,8 +26,8 @@ struct Dataset {
 // The cut-off depends on the arm's inertia: from the prior, or, without one, from a first fit of this very log.
 Dataset Prepare(const codegen::Model& model, const io::Log& log, double cutoff_scale = 1);
 
-// Diagonal of the mass matrix in the middle of the joints' ranges, for given base parameters.
-Eigen::VectorXd TypicalInertia(const codegen::Model& model, const Eigen::VectorXd& base);
+// RMS over some poses of each entry of the mass matrix [n x n], for given base parameters.
+Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& base);
 
 // Root mean square of residual[:, j] over scored samples of each joint; moving_only: where that joint moves.
 Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only);

@@ -68,10 +68,11 @@ void CheckPosition(const codegen::Robot& robot, const io::Log& log, int j) {
                                      degrees ? " looks like degrees" : "", lower, upper, angle ? "rad" : "m"));
   }
   if (low == high) Fail(log, Joint(j) + "position never changes, expected motion (is the encoder stuck?)");
+  const double step_s = log.step_s();
   int held = 0;  // samples for which it has stayed the same
   for (Index k = 1; k < log.samples(); ++k) {
     const double dt = log.t[k] - log.t[k - 1], step = log.q(k, j) - log.q(k - 1, j);
-    if (dt > 1.5 * log.step_s()) {
+    if (dt > 1.5 * step_s) {
       held = 0;
       continue;
     }

@@ -16,6 +16,9 @@ using Eigen::VectorXd;
 
 namespace {
 
+// Of a curve that names no cause the joint is the one whose torque it changes; the other is among the signals.
+bool IsUnknown(const Term& t) { return t.record->kind != t.record->name; }
+
 std::string Amplitudes(const Term& t) {
   std::string out;
   for (std::size_t k = 0; k < t.eta.size(); ++k)
@@ -45,6 +48,8 @@ std::pair<std::string, VectorXd> Abscissa(const DiagnosisView& v, const Term& t)
   const int j = t.joints.empty() ? v.model->joints() - 1 : t.joints[0];
   const std::string& signal = t.record->signals.empty() ? "qd" : t.record->signals[0];
   const std::string number = std::to_string(j + 1);
+  if (signal == "qd[k]")
+    return {"speed of joint " + std::to_string(t.joints.at(1) + 1) + " / rad/s", s.qd.col(t.joints.at(1))};
   if (signal == "q[k]") return {"q" + std::to_string(t.joints.at(1) + 1) + " / rad", s.q.col(t.joints.at(1))};
   if (signal == "q") return {"q" + number + " / rad", s.q.col(j)};
   if (signal == "temp" && s.temp.cols() > j) return {"temperature " + number + " / deg C", s.temp.col(j)};
@@ -86,7 +91,7 @@ bool AnyConfirmed(const diagnosis::Finding& f) {
 }
 
 std::string JointName(const Term& t) {
-  if (t.joints.size() == 1) return std::to_string(t.joints[0] + 1);
+  if (t.joints.size() == 1 || IsUnknown(t)) return std::to_string(t.joints[0] + 1);
   if (t.joints.size() == 2) return fmt::format("{}-{}", t.joints[0] + 1, t.joints[1] + 1);
   return t.record->place;
 }
@@ -98,8 +103,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["joint_base"] = 1;
   j["terms"] = nlohmann::ordered_json::array();
   for (const Term& t : f.terms) {
-    nlohmann::ordered_json term{{"kind", t.record->name}};
-    if (t.joints.size() == 1) term["joint"] = t.joints[0] + 1;
+    nlohmann::ordered_json term{{"kind", t.record->kind}, {"record", t.record->name}};
+    if (t.joints.size() == 1 || IsUnknown(t)) term["joint"] = t.joints[0] + 1;
     else term["joint"] = JointName(t);
     term["signals"] = Signals(t);
     nlohmann::ordered_json parameters, deviations;
@@ -145,7 +150,7 @@ std::string DiagnosisText(const DiagnosisView& v) {
             ? "verdict: effect\n"
             : "verdict: none. What the training logs suggested did not hold on the held-out log:\n";
   for (const Term& t : v.finding->terms) {
-    out += fmt::format("  {}, joint {}{}: {}\n", t.record->name, JointName(t),
+    out += fmt::format("  {}, joint {}{}: {}\n", t.record->kind, JointName(t),
                        t.confirmed ? "" : " (NOT CONFIRMED on the held-out log)", t.record->title);
     if (t.confirmed) out += fmt::format("    {}\n", Amplitudes(t));
     for (const std::string& other : t.also_fits) out += fmt::format("    fits equally: {}\n", other);
@@ -166,7 +171,7 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
     std::string list;
     for (const Term& t : f.terms)
       list += (list.empty() ? "" : "; ") +
-              fmt::format("{} on joint {}{}", t.record->name, JointName(t), t.confirmed ? "" : " (not confirmed)");
+              fmt::format("{} on joint {}{}", t.record->kind, JointName(t), t.confirmed ? "" : " (not confirmed)");
     page.Box(report::Tone::kWarning, "The model lacks: " + list, f.terms[0].record->title);
   }
   page.Section("Error on the held-out log");
@@ -186,7 +191,7 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
   if (!v.held_out->tracking.empty()) page.Text(v.held_out->tracking + ".");
   for (std::size_t k = 0; k < f.terms.size(); ++k) {
     const Term& t = f.terms[k];
-    page.Section(fmt::format("{}, joint {}", t.record->name, JointName(t)));
+    page.Section(fmt::format("{}, joint {}", t.record->kind, JointName(t)));
     page.Text(t.record->title + ". " + t.record->source + ".");
     page.Facts(
         {{"parameters", Amplitudes(t)},

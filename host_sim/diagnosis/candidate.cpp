@@ -18,9 +18,10 @@ Candidate::Candidate(const codegen::EffectRecord& record, const codegen::Robot& 
   for (const auto& column : instance_.columns)
     for (const auto& [row, e] : column.rows) rows.insert(row);
   rows_.assign(rows.begin(), rows.end());
-  for (int c = 0; c < columns(); ++c)
+  for (std::size_t c = 0; c < instance_.columns.size(); ++c)
     for (const auto& [row, e] : instance_.columns[c].rows) {
-      root_.emplace_back(c, static_cast<int>(std::find(rows_.begin(), rows_.end(), row) - rows_.begin()));
+      root_.emplace_back(static_cast<int>(c),
+                         static_cast<int>(std::find(rows_.begin(), rows_.end(), row) - rows_.begin()));
       roots.push_back(e);
     }
   tape_ = std::make_unique<codegen::Tape>(*graph_, roots);
@@ -74,6 +75,13 @@ const double* ColumnOf(const Quantities& quantities, const std::string& name) {
 
 void Candidate::Evaluate(const Quantities& quantities, const std::vector<double>& eta,
                          std::vector<std::vector<VectorXd>>& value, std::optional<double> time_s) const {
+  value.assign(columns(eta), std::vector<VectorXd>(rows_.size()));
+  for (std::size_t first = 0, at = 0; first < value.size(); first += instance_.columns.size(), at += unknowns().size())
+    EvaluateUse(quantities, eta.data() + at, time_s, &value[first]);
+}
+
+void Candidate::EvaluateUse(const Quantities& quantities, const double* eta, std::optional<double> time_s,
+                            std::vector<VectorXd>* value) const {
   const int samples = quantities.data->samples();
   const auto& states = graph_->states();
   std::vector<codegen::Binding> bindings(graph_->inputs().size());
@@ -91,7 +99,6 @@ void Candidate::Evaluate(const Quantities& quantities, const std::vector<double>
     for (std::size_t k = 0; k < states.size(); ++k)
       bindings[graph_->nodes()[states[k].value.id()].a].column = path.col(static_cast<Eigen::Index>(k)).data();
   }
-  value.assign(columns(), std::vector<VectorXd>(rows_.size()));
   std::vector<double*> out;
   for (const auto& [c, r] : root_) {
     value[c][r].resize(samples);
@@ -103,7 +110,7 @@ void Candidate::Evaluate(const Quantities& quantities, const std::vector<double>
 namespace {
 // Whether the search binds what this record reads and knows how to look for it.
 bool CanBeTried(const codegen::EffectRecord& record) {
-  if (record.search.how == "none" || record.search.how == "window") return false;
+  if (record.search.how == "none") return false;
   static const std::set<std::string> bound = {"q",           "qd",         "qdd",        "temp", "t",
                                               "dt",          "tau_rigid",  "tau_model",  "Y",    "M[:,j]",
                                               "tau_gravity", "dtau_model", "dY/dgravity"};
@@ -125,6 +132,7 @@ std::vector<std::unique_ptr<Candidate>> MakeCandidates(const codegen::Catalogue&
       if (!estimated.contains({name, joints}))
         out.push_back(std::make_unique<Candidate>(record, model.robot(), joints));
   }
+  std::stable_partition(out.begin(), out.end(), [](const auto& c) { return c->record().search.after.empty(); });
   return out;
 }
 

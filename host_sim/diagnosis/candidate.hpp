@@ -34,20 +34,28 @@ class Candidate {
   const codegen::EffectInstance& instance() const { return instance_; }
   const std::vector<codegen::EffectUnknown>& unknowns() const { return instance_.unknowns; }
   std::vector<codegen::EffectUnknown>& unknowns() { return instance_.unknowns; }
-  int columns() const { return static_cast<int>(instance_.columns.size()); }
+  // The values of the unknowns may stand there several times: so many uses of the record, with columns of their own.
+  int columns(const std::vector<double>& eta) const {
+    return static_cast<int>(instance_.columns.size() * (unknowns().empty() ? 1 : eta.size() / unknowns().size()));
+  }
+  const codegen::EffectColumn& column(int c) const { return instance_.columns[c % instance_.columns.size()]; }
   const std::vector<int>& rows() const { return rows_; }  // joints whose torque it touches
   bool reads(const std::string& input) const;
+  bool is_curve() const { return record().generic_penalty > 0; }  // fits a form, names no cause
   bool has_memory() const { return !graph_->states().empty(); }
   std::string name() const;  // "stribeck, joint 3"
 
-  // value[c][r]: column c in row rows()[r], N values (empty where the column does not touch that row). time_s: what the
-  // columns read as time for the whole log, instead of the log's own.
+  // value[c][r]: column c (all of the first use, then all of the next) in row rows()[r], N values (empty where the
+  // column does not touch that row). time_s: what the columns read as time for the whole log, instead of the log's own.
   void Evaluate(const Quantities& quantities, const std::vector<double>& eta,
                 std::vector<std::vector<Eigen::VectorXd>>& value, std::optional<double> time_s = {}) const;
 
   std::vector<double> Initial() const;
 
  private:
+  void EvaluateUse(const Quantities& quantities, const double* eta, std::optional<double> time_s,
+                   std::vector<Eigen::VectorXd>* value) const;
+
   std::unique_ptr<codegen::Graph> graph_ = std::make_unique<codegen::Graph>();
   codegen::EffectInstance instance_;
   std::vector<int> rows_;

@@ -14,13 +14,13 @@ Columns Gather(const Candidate& candidate, const std::vector<Quantities>& logs, 
                const std::vector<double>& eta) {
   Columns out;
   out.joints = candidate.rows();
-  for (const int j : out.joints) out.block.emplace_back(MatrixXd::Zero(rows[j].size(), candidate.columns()));
+  for (const int j : out.joints) out.block.emplace_back(MatrixXd::Zero(rows[j].size(), candidate.columns(eta)));
   std::vector<std::vector<VectorXd>> value;
   for (std::size_t log = 0; log < logs.size(); ++log) {
     candidate.Evaluate(logs[log], eta, value);
     for (std::size_t r = 0; r < out.joints.size(); ++r) {
       const RowIndex& index = rows[out.joints[r]];
-      for (int c = 0; c < candidate.columns(); ++c) {
+      for (int c = 0; c < candidate.columns(eta); ++c) {
         const VectorXd& v = value[c][r];
         if (v.size() == 0) continue;
         for (int k = 0; k < index.size(); ++k)

@@ -16,9 +16,11 @@ namespace {
 // round-off.
 constexpr double kVisible = 2e-7;
 
-// g' S^+ g with directions judged against the columns' own size.
-Gain SolveGain(const MatrixXd& S, const VectorXd& g, const VectorXd& norm2) {
-  const int k = static_cast<int>(g.size());
+// g' S^+ g with S = C'C - B' base^-1 B, directions judged against the columns' own size.
+Gain SolveGain(const Eigen::LLT<MatrixXd>& base, const Projection& p) {
+  const int k = static_cast<int>(p.g.size());
+  const VectorXd &g = p.g, norm2 = p.gram.diagonal();
+  const MatrixXd S = p.gram - p.B.transpose() * base.solve(p.B);
   Gain out;
   out.amplitude = VectorXd::Zero(k), out.sd = VectorXd::Zero(k);
   VectorXd scale(k);
@@ -113,24 +115,22 @@ MatrixXd Metric::WhitenedColumns(const Columns& c, int r) const {
   return WhitenAll(noise_[c.joints[r]], rows_.index[c.joints[r]], c.block[r]);
 }
 
-Metric::Projection Metric::Project(const Columns& c) const {
+Projection Metric::Project(const Columns& c) const {
   const int k = c.count();
-  Projection p{MatrixXd::Zero(k, k), MatrixXd::Zero(rows_.coordinates(), k), VectorXd::Zero(k), {}};
+  Projection p{MatrixXd::Zero(k, k), MatrixXd::Zero(rows_.coordinates(), k), VectorXd::Zero(k)};
   for (std::size_t r = 0; r < c.joints.size(); ++r) {
     const int j = c.joints[r];
     const MatrixXd w = WhitenedColumns(c, static_cast<int>(r));
-    p.S += w.transpose() * w;
-    p.B += map_[j].transpose() * (q_[j].transpose() * w);
+    p.gram += SelfProduct(w);
+    for (int i = 0; i < k; ++i)  // column by column: a product of so few columns would spend its time copying q
+      p.B.col(i) += map_[j].transpose() * (q_[j].transpose() * w.col(i));
     p.g += w.transpose() * residual_[j];
   }
-  p.norm2 = p.S.diagonal();
-  p.S -= p.B.transpose() * factor_.solve(p.B);
   return p;
 }
 
-Gain Metric::Try(const Columns& c) const {
-  const Projection p = Project(c);
-  Gain gain = SolveGain(p.S, p.g, p.norm2);
+Gain Metric::Try(const Projection& p) const {
+  Gain gain = SolveGain(factor_, p);
   gain.z = z_ - factor_.solve(p.B * gain.amplitude);
   return gain;
 }
@@ -188,7 +188,7 @@ double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_n
   x.head(d) = z_;
   if (k > 0) {
     const Projection p = Project(c);
-    x.tail(k) = SolveGain(p.S, p.g, p.norm2).amplitude;
+    x.tail(k) = SolveGain(factor_, p).amplitude;
     x.head(d) -= factor_.solve(p.B * x.tail(k));
   }
   std::vector<NoiseModel> noise(c.joints.size());
@@ -253,7 +253,7 @@ std::pair<double, double> Metric::Imitates(const Columns& other, const Columns& 
     const int j = other.joints[r];
     if (trace[j].size()) p.g += WhitenedColumns(other, static_cast<int>(r)).transpose() * trace[j];
   }
-  return {SolveGain(p.S, p.g, p.norm2).gain, own};
+  return {SolveGain(factor_, p).gain, own};
 }
 
 MatrixXd Metric::Covariance() const {

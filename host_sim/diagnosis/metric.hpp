@@ -48,11 +48,24 @@ struct BaseRows {
   int coordinates() const { return static_cast<int>(L.cols()); }
 };
 
+// Columns against the base: their own products, B = Q'C, g = C'r. Those of columns that are nowhere at the same time
+// add up.
+struct Projection {
+  Eigen::MatrixXd gram, B;
+  Eigen::VectorXd g;
+  Projection& operator+=(const Projection& other) {
+    gram += other.gram, B += other.B, g += other.g;
+    return *this;
+  }
+};
+
 class Metric {
  public:
   Metric(const BaseRows& rows, std::vector<NoiseModel> noise);
 
-  Gain Try(const Columns& c) const;
+  Projection Project(const Columns& c) const;
+  Gain Try(const Projection& p) const;
+  Gain Try(const Columns& c) const { return Try(Project(c)); }
   // No bounded parameter of the joints given leaves its range at g (by more than 2 standard deviations).
   bool InBounds(const Gain& g, const std::vector<int>& joints) const;
   Eigen::VectorXd RawResidual(int j) const;                     // torque units
@@ -74,12 +87,6 @@ class Metric {
   Eigen::MatrixXd Covariance() const;
 
  private:
-  // Columns against the base: S = C'C off the base, B = Q'C, g = C'r.
-  struct Projection {
-    Eigen::MatrixXd S, B;
-    Eigen::VectorXd g, norm2;
-  };
-  Projection Project(const Columns& c) const;
   Eigen::MatrixXd WhitenedColumns(const Columns& c, int r) const;
   void WhitenJoint(int j);
   void Solve();

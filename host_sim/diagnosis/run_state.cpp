@@ -32,7 +32,7 @@ MatrixXd Track(const RunState& state, const Quantities& q, const MatrixXd& resid
   const auto& rows = state.candidate->rows();
   MatrixXd shape = MatrixXd::Zero(residual.rows(), residual.cols());
   for (std::size_t r = 0; r < rows.size(); ++r)
-    for (int c = 0; c < state.candidate->columns(); ++c)
+    for (int c = 0; c < state.candidate->columns(state.eta); ++c)
       if (value[c][r].size()) shape.col(rows[r]) += state.amplitude[c] * value[c][r];
   MatrixXd predicted = MatrixXd::Zero(residual.rows(), residual.cols());
   double level = 0, variance = state.level_sd * state.level_sd;

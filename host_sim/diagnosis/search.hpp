@@ -45,10 +45,10 @@ struct Ground {
 bool IsExcited(const Candidate& candidate, const Evidence& evidence);
 
 struct Found {
-  const Candidate* candidate = nullptr;
+  Candidate* candidate = nullptr;
   std::vector<double> eta;
   Gain gain;
-  int tried = 1;       // members of the grid: many tries find something by chance
+  double tried = 1;    // members of the grid: many tries find something by chance
   int parameters = 0;  // linear directions + nonlinear parameters that were searched
   double score = 0;
 };

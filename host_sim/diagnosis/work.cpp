@@ -50,7 +50,7 @@ MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantitie
   MatrixXd tau = MatrixXd::Zero(s.samples(), s.q.cols());
   std::vector<std::vector<VectorXd>> value;
   candidate.Evaluate(quantities, eta, value);
-  for (int c = 0; c < candidate.columns(); ++c)
+  for (int c = 0; c < candidate.columns(eta); ++c)
     for (std::size_t r = 0; r < candidate.rows().size(); ++r)
       if (value[c][r].size()) tau.col(candidate.rows()[r]) += amplitude[c] * value[c][r];
   return tau;
@@ -245,9 +245,9 @@ Diagnosis::Work::Estimate Diagnosis::Work::Solve(const std::vector<const Chosen*
     for (int a = 0; a < active; ++a) out.x[declared.active[a]] = rows.mean[a] + v[a];
     int at = active;
     for (const Chosen* t : terms) {
-      out.amplitude.push_back(v.segment(at, t->candidate->columns()));
-      out.sd.push_back(P.diagonal().segment(at, t->candidate->columns()).cwiseMax(0).cwiseSqrt());
-      at += t->candidate->columns();
+      out.amplitude.push_back(v.segment(at, t->candidate->columns(t->eta)));
+      out.sd.push_back(P.diagonal().segment(at, t->candidate->columns(t->eta)).cwiseMax(0).cwiseSqrt());
+      at += t->candidate->columns(t->eta);
     }
     out.sigma.resize(n), out.innovation.resize(n);
     for (int j = 0; j < n; ++j) {

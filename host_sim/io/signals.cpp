@@ -9,6 +9,7 @@
 
 #include "host_sim/io/butterworth.hpp"
 #include "host_sim/io/input_error.hpp"
+#include "host_sim/io/motion_band.hpp"
 #include "host_sim/io/quintic_spline.hpp"
 
 namespace armcal::io {
@@ -17,10 +18,13 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kLowest_Hz = 20;        // an arm's motion lies below
-constexpr double kHighest_Hz = 60;       // above, the current loop no longer follows
+constexpr double kLowest_Hz = 20;  // an arm's motion lies below; how far below, its position shows
+constexpr double kAboveMotion =
+    1.5;                            // of the motion's band: the filter takes 4 % of what is seen there, and less below
+constexpr double kHighest_Hz = 60;  // above, the current loop no longer follows
 constexpr double kHighestOfRate = 0.4;   // the filter needs room below half the rate
 constexpr double kShareOfJitter = 0.07;  // encoder noise adds 0.25 % to the torque's noise power at this share
+constexpr double kShareOfWidth = 0.05;   // friction is a hundred times the noise, and a slow joint is within the width often
 constexpr double kWideGap = 5;           // sample times over which a spline may still bridge
 constexpr double kIrregular = 1e-4;      // time jitter over sample time below which a grid counts as uniform
 constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
@@ -118,36 +122,55 @@ JointNoise EstimateNoise(const Log& log, int joint) {
   const VectorXd q = log.q.col(joint).segment(longest.first, longest.count);
   const VectorXd tau = log.tau.col(joint).segment(longest.first, longest.count);
   // Orders: q moves smoothly over six samples, torque over two; beyond that the difference shows the noise alone.
-  return {std::max(SmallestStep(q) / std::sqrt(12.0), NoiseUnderSmooth(OnEvenGrid(t, q), 6)), NoiseUnderSmooth(tau, 2)};
+  const VectorXd even = OnEvenGrid(t, q);
+  const double noise = std::max(SmallestStep(q) / std::sqrt(12.0), NoiseUnderSmooth(even, 6));
+  const double rate_Hz = static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]);
+  return {noise, NoiseUnderSmooth(tau, 2), MotionBand_Hz(even, noise, rate_Hz)};
 }
 
-double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz) {
-  // White noise s in q has the density 2 s^2 / rate; through gain 1 / (1 + (f/c)^8) and two derivatives its variance is
-  // s^2 (2 pi)^4 c^5 (2 / rate) x 0.1594, the integral of x^4 / (1 + x^8)^2 over x > 0.
-  constexpr double kIntegral = 0.1594;
-  const double highest_Hz = std::min(kHighest_Hz, kHighestOfRate * rate_Hz);
-  const double unit =
-      inertia * noise.position_rad * std::pow(2 * std::numbers::pi, 2) * std::sqrt(2 * kIntegral / rate_Hz);
-  if (unit <= 0) return highest_Hz;
-  const double cutoff_Hz = std::pow(kShareOfJitter * noise.torque_Nm / unit, 2.0 / 5);
-  return std::min(std::max(cutoff_Hz, kLowest_Hz), highest_Hz);
+double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, double sign_width_radps) {
+  // White noise s in q has the density 2 s^2 / rate; through gain 1 / (1 + (f/c)^8) and k derivatives its variance is
+  // s^2 (2 pi)^2k c^(2k + 1) (2 / rate) times the integral of x^2k / (1 + x^8)^2 over x > 0.
+  constexpr double kIntegral[] = {0.2657, 0.1594};  // of one derivative, of two
+  constexpr double kTwoPi = 2 * std::numbers::pi;
+  const double s = noise.position_rad * std::sqrt(2 / rate_Hz),
+               highest_Hz = std::min(kHighest_Hz, kHighestOfRate * rate_Hz);
+  const double speed = s * kTwoPi * std::sqrt(kIntegral[0]),
+               torque = inertia * s * std::pow(kTwoPi, 2) * std::sqrt(kIntegral[1]);
+  double cutoff_Hz = highest_Hz;
+  if (torque > 0) cutoff_Hz = std::min(cutoff_Hz, std::pow(kShareOfJitter * noise.torque_Nm / torque, 2.0 / 5));
+  if (speed > 0) cutoff_Hz = std::min(cutoff_Hz, std::pow(kShareOfWidth * sign_width_radps / speed, 2.0 / 3));
+  return std::min(std::max(cutoff_Hz, std::min(kLowest_Hz, kAboveMotion * noise.band_Hz)), highest_Hz);
 }
 
-Derivatives DeriveSignals(const Log& log, const VectorXd& inertia_per_joint, double cutoff_scale) {
-  if (inertia_per_joint.size() != log.joints) {
+// The most sensitive of the joints' torques decides.
+static VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity) {
+  const double rate_Hz = 1 / log.step_s();
+  std::vector<JointNoise> noise;
+  for (int j = 0; j < log.joints; ++j) noise.push_back(EstimateNoise(log, j));
+  VectorXd out = VectorXd::Constant(log.joints, INFINITY);
+  for (int j = 0; j < log.joints; ++j) {
+    const double width = sensitivity.sign_width_radps.size() ? sensitivity.sign_width_radps[j] : INFINITY;
+    for (int row = 0; row < log.joints; ++row) {
+      const JointNoise seen{noise[j].position_rad, noise[row].torque_Nm, noise[j].band_Hz};
+      out[j] = std::min(out[j], ChooseCutoff_Hz(seen, std::abs(sensitivity.inertia(row, j)), rate_Hz, width));
+    }
+  }
+  return out;
+}
+
+Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, double cutoff_scale) {
+  const Eigen::MatrixXd& inertia = sensitivity.inertia;
+  if (inertia.rows() != log.joints || inertia.cols() != log.joints) {
     throw InputError(log.source + ": has " + std::to_string(log.joints) + " joints, the model has " +
-                     std::to_string(inertia_per_joint.size()));
+                     std::to_string(inertia.cols()));
   }
   if (log.samples() < QuinticSpline::kMinSamples) throw InputError(log.source + ": too few samples for derivatives");
-  const double rate_Hz = 1 / log.step_s();
   Derivatives out;
   out.q = log.q;
   out.qd = out.qdd = Eigen::MatrixXd::Zero(log.samples(), log.joints);
   out.settled = Eigen::VectorXi::Zero(log.samples());
-  out.cutoff_Hz.resize(log.joints);
-  for (int j = 0; j < log.joints; ++j) {
-    out.cutoff_Hz[j] = cutoff_scale * ChooseCutoff_Hz(EstimateNoise(log, j), inertia_per_joint[j], rate_Hz);
-  }
+  out.cutoff_Hz = ChooseCutoffs_Hz(log, sensitivity) * cutoff_scale;
   for (const Piece& piece : Pieces(log)) {
     if (piece.count < QuinticSpline::kMinSamples) continue;
     DerivePiece(log.t.segment(piece.first, piece.count), log.q.middleRows(piece.first, piece.count), piece, out);

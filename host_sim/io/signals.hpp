@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 
 #include "host_sim/io/log.hpp"
 
@@ -19,18 +20,27 @@ struct Derivatives {
 struct JointNoise {
   double position_rad = 0;  // standard deviation of q's sample noise (encoder step / sqrt 12, or more if q is noisier)
   double torque_Nm = 0;     // sample-to-sample jitter of the torque (standard deviation)
+  double band_Hz = std::numeric_limits<double>::infinity();  // up to which q moves more than its noise
 };
 JointNoise EstimateNoise(const Log& log, int joint);
 
-// The highest cut-off in 20-60 Hz, and below 0.4 of the sample rate, at which inertia x (noise of qdd that the encoder
-// causes) stays below 0.07 of the torque's jitter. inertia: joint side, kg m^2 (kg).
-double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz);
+// What the noise of derived signals must stay small against.
+struct Sensitivity {
+  Eigen::MatrixXd inertia;                // [n x n] a typical mass matrix, kg m^2 (kg)
+  Eigen::VectorXd sign_width_radps = {};  // [n] speed over which friction changes its sign; empty: not looked at
+};
+
+// The highest cut-off below 60 Hz and 0.4 of the sample rate at which inertia x (noise of qdd that the encoder causes)
+// stays below 0.07 of the torque's jitter and the noise of qd below 0.05 of the speed over which friction changes sign;
+// but not below 20 Hz or, where that is less, 1.5 times the motion's band. inertia: joint side, kg m^2 (kg).
+double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz,
+                       double sign_width_radps = std::numeric_limits<double>::infinity());
 
 // q through a zero-phase Butterworth of order 4 (run forward and backward), then derivatives of a quintic spline.
 // An irregular grid is resampled by a quintic spline first. Positions are never carried across a gap of more than five
 // sample times; a piece too short for the spline keeps its q and has zero derivatives (settled = 0).
-// inertia_per_joint: [n], a typical diagonal of the mass matrix; cutoff_scale multiplies every chosen cut-off (0.62
-// shows which findings hang on it). InputError: wrong number of inertias, fewer than 8 samples.
-Derivatives DeriveSignals(const Log& log, const Eigen::VectorXd& inertia_per_joint, double cutoff_scale = 1);
+// One joint's acceleration is in every joint's torque: the most sensitive one decides. cutoff_scale multiplies every
+// chosen cut-off (0.62 shows which findings hang on it). InputError: wrong number of inertias, fewer than 8 samples.
+Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, double cutoff_scale = 1);
 
 }  // namespace armcal::io

@@ -71,17 +71,20 @@ ArrayXd Bristles(const Motion& m, int j, double length_rad, double power) {
 }
 
 // Second-order low-pass of frequency w (rad/s), damping d, by small steps.
+// Before the start u runs as its own mirror image does, until what the beginning rang has died out.
 ArrayXd LowPass(const ArrayXd& u, double step_s, double w, double d) {
   ArrayXd y(u.size());
-  double x = u[0], v = 0;
-  for (Index k = 0; k < u.size(); ++k) {
+  const Index before = std::min(u.size() - 1, static_cast<Index>(8 / (d * w * step_s)));
+  double x = 2 * u[0] - u[before], v = 0;
+  for (Index k = -before; k < u.size(); ++k) {
+    const double now = k < 0 ? 2 * u[0] - u[-k] : u[k];
     constexpr int kParts = 10;
     for (int i = 0; i < kParts; ++i) {
       const double h = step_s / kParts;
-      v += h * (w * w * (u[k] - x) - 2 * d * w * v);
+      v += h * (w * w * (now - x) - 2 * d * w * v);
       x += h * v;
     }
-    y[k] = x;
+    if (k >= 0) y[k] = x;
   }
   return y;
 }
@@ -304,13 +307,20 @@ const std::map<std::string, Maker>& Makers() {
            return MatrixXd(LinkTorque(a, m, turned) - links);
          };
        }},
-      {"belt_elasticity",
+      {"belt_elasticity",  // the link follows the motor, whose position is logged, through a spring
        [](const Arm& a, plant::Random& r, Effect& e) {
-         e.accept = {"belt_elasticity", "time_delay"}, e.signals = {"qdd"};
+         const int j = static_cast<int>(r.Uniform(0, 5.999));
          const double hertz = r.Uniform(8, 18);
-         OnJoint(a, r, e, [hertz](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
-           return LowPass(links.col(j), m.t[1] - m.t[0], 2 * kPi * hertz, 0.05) - links.col(j).array();
-         });
+         e.accept = {"belt_elasticity", "time_delay"}, e.joint = j + 1, e.seen_on = j;
+         e.signals = {Signal("qdd", j)};
+         e.torque = [&a, j, hertz](const Motion& m, const MatrixXd& links) {
+           Motion moved = m;
+           const double h = m.t[1] - m.t[0], w = 2 * kPi * hertz;
+           moved.q.col(j) = LowPass(Q(m, j), h, w, 0.05);
+           moved.qd.col(j) = LowPass(V(m, j), h, w, 0.05);
+           moved.qdd.col(j) = LowPass(m.qdd.col(j), h, w, 0.05);
+           return MatrixXd(LinkTorque(a, moved) - links);
+         };
        }},
       {"torque_saturation",
        [](const Arm& a, plant::Random& r, Effect& e) {
@@ -421,7 +431,7 @@ Effect DrawUnknown(const Arm& arm, plant::Random& random) {
       e.signals = {"load"};
       OnJoint(arm, random, e, [place](const Motion&, const MatrixXd& links, int j) -> ArrayXd {
         const ArrayXd u = links.col(j).array() / links.col(j).cwiseAbs().maxCoeff();
-        return (u - place).max(0) * u.abs();
+        return (u.abs() - place).max(0) * u;
       });
       break;
     default:  // a detent: sharp steps of position

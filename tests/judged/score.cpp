@@ -99,7 +99,7 @@ void Judge(const std::string& name, const json& truth, const json& verdict, Shar
       run_state = run_state || e.at("run_state").get<bool>();
     }
     if (affected && !run_state)
-      over.push_back(verdict.at("after")[j].get<double>() / truth.at("test_floor_noise")[j].get<double>());
+      over.push_back(verdict.at("after")[j].get<double>() / truth.at("test_floor_derived")[j].get<double>());
   }
 }
 

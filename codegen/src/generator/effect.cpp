@@ -83,6 +83,7 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
                 "signals",
                 "let",
                 "place",
+                "kind",
                 "state",
                 "linear",
                 "nonlinear",
@@ -102,6 +103,7 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
   r.text.assign(std::istreambuf_iterator<char>(file), {});
   r.name = in.Text("name");
   if (r.name != path.stem().string()) in.Fail("name", "the file's own name, \"" + path.stem().string() + "\"");
+  r.kind = in.Text("kind", r.name);
   r.title = in.Text("title");
   r.source = in.Text("source", "");
   r.kind_class = in.Text("class");
@@ -147,7 +149,7 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
   r.needs = in.Texts("needs");
   if (in.Has("search")) {
     const TomlReader s = in.Table("search");
-    s.AllowOnly({"how", "signal", "grid", "minimum_s"});
+    s.AllowOnly({"how", "signal", "grid", "minimum_s", "after"});
     r.search.how = s.Text("how");
     MustBeOneOf(s, "how", r.search.how,
                 std::initializer_list<const char*>{"linear", "profile", "spectral", "spline", "onset", "window",
@@ -155,6 +157,7 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
     r.search.signal = s.Text("signal", "");
     r.search.grid = static_cast<int>(s.Number("grid", 10));
     r.search.minimum_s = s.Number("minimum_s", 0);
+    r.search.after = s.Text("after", "");
   }
   return r;
 }

@@ -43,10 +43,12 @@ struct Search {
   std::string signal;          // spectral, spline: over which signal
   int grid = 10;               // profile: points per nonlinear parameter
   double minimum_s = 0;        // onset: shortest stretch
+  std::string after;           // a simpler record: tried only where that one finds something on the same joints
 };
 
 struct EffectRecord {
   std::string name, title, source, path, text;
+  std::string kind;        // what a verdict calls it: its name, or "unknown" for a curve that names no cause
   std::string kind_class;  // static | stateful | run_state | sensor
   std::string scope;       // joint | pair | arm | body
   std::string place;       // what a report calls the joints of an effect of the arm or a body: "all", "base", "flange"

@@ -32,7 +32,7 @@ TEST(Measured, Kr300_LoadsInJointCoordinates) {
   EXPECT_NEAR(log.step_s(), 0.004, 1e-6);
   EXPECT_NEAR(log.q(0, 1), -1.5707, 1e-3);  // home: upper arm upright
   EXPECT_NEAR(log.tau(0, 0), 2.09807038 * 1798 / 7, 1e-4);
-  const Derivatives d = DeriveSignals(log, Eigen::VectorXd::Constant(6, 100.0));
+  const Derivatives d = DeriveSignals(log, {100.0 * Eigen::MatrixXd::Identity(6, 6)});
   EXPECT_LT(d.qd.cwiseAbs().maxCoeff(), 0.8);  // the data set's README: slow, up to 0.76 rad/s
 }
 
@@ -43,7 +43,7 @@ TEST(Measured, Emps_PublishedInertiaAndFrictionExplainTheForce) {
   ASSERT_EQ(log.joints, 1);
   EXPECT_EQ(log.samples(), 24841);
   EXPECT_EQ(log.ext.size(), 0);
-  const Derivatives d = DeriveSignals(log, Eigen::VectorXd::Constant(1, 95.0));
+  const Derivatives d = DeriveSignals(log, {95.0 * Eigen::MatrixXd::Identity(1, 1)});
   double error = 0, force = 0;
   for (Eigen::Index k = 500; k + 500 < log.samples(); ++k) {
     const double qd = d.qd(k, 0);
@@ -60,7 +60,7 @@ TEST(Measured, EmpsPulses_AreACommandInsideTheForce_NotAnExternalForce) {
   SKIP_WITHOUT(path);
   const Log log = ReadLog(path, ReadChannelMap("host_sim/io/channels/emps.toml"));
   ASSERT_EQ(log.tauff.cols(), 1);
-  const Derivatives d = DeriveSignals(log, Eigen::VectorXd::Constant(1, 95.0));
+  const Derivatives d = DeriveSignals(log, {95.0 * Eigen::MatrixXd::Identity(1, 1)});
   const Eigen::Index count = log.samples() - 1000;
   Eigen::MatrixXd balance(count, 5), control(count, 4);
   Eigen::VectorXd force(count);

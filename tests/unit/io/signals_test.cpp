@@ -78,7 +78,7 @@ TEST(Signals, MultiSineWithEncoder_AccelerationHasUnitGainAndNoPhaseBelowTenHert
   const MultiSine motion{{0.3, 1.1, 2.7, 5.2, 7.9, 9.8}};
   const VectorXd t = Uniform(40, 250);
   const Log log = MakeLog(motion, t, kTau / (131072 * 100), 3.0);
-  const Derivatives d = DeriveSignals(log, VectorXd::Constant(1, 40.0));
+  const Derivatives d = DeriveSignals(log, {40.0 * Eigen::MatrixXd::Identity(1, 1)});
   EXPECT_GT(d.cutoff_Hz[0], 40);
   for (int order = 1; order <= 2; ++order) {
     VectorXd truth(t.size());
@@ -108,7 +108,7 @@ TEST(Signals, JitteringTimeGrid_IsDerivedAtItsOwnTimes) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> jitter(-0.0005, 0.0005);
   for (Index k = 1; k + 1 < t.size(); ++k) t[k] += jitter(random);
-  const Derivatives d = DeriveSignals(MakeLog(motion, t, 0, 1.0), VectorXd::Constant(1, 1.0));
+  const Derivatives d = DeriveSignals(MakeLog(motion, t, 0, 1.0), {1.0 * Eigen::MatrixXd::Identity(1, 1)});
   double worst = 0;
   for (Index k = 0; k < t.size(); ++k) {
     if (d.settled[k]) worst = std::max(worst, std::abs(d.qdd(k, 0) - motion.Value(t[k], 2)));
@@ -123,7 +123,7 @@ TEST(Signals, WideGap_IsNotBridged) {
   t.tail(t.size() - cut).array() += 0.31;  // the motion goes on during the gap
   Log log = MakeLog(motion, t, 0, 1.0);
   log.gaps = {static_cast<int>(cut - 1)};
-  const Derivatives d = DeriveSignals(log, VectorXd::Constant(1, 1.0));
+  const Derivatives d = DeriveSignals(log, {1.0 * Eigen::MatrixXd::Identity(1, 1)});
   EXPECT_EQ(d.settled[cut - 1], 0);
   EXPECT_EQ(d.settled[cut], 0);
   for (Index k = 0; k < t.size(); ++k) {
@@ -168,9 +168,9 @@ TEST(Signals, NoiseOfEncoderAndTorque_AreFoundUnderMotion) {
 
 TEST(Signals, CutoffScale_ScalesAndChangesNothingElse) {
   const Log log = MakeLog({{0.3, 1.1}}, Uniform(10, 250), 1e-5, 3.0);
-  const VectorXd inertia = VectorXd::Constant(1, 40.0);
+  const Sensitivity inertia{40.0 * Eigen::MatrixXd::Identity(1, 1)};
   EXPECT_DOUBLE_EQ(DeriveSignals(log, inertia, 0.62).cutoff_Hz[0], 0.62 * DeriveSignals(log, inertia).cutoff_Hz[0]);
-  EXPECT_THROW(DeriveSignals(log, VectorXd::Constant(2, 40.0)), InputError);
+  EXPECT_THROW(DeriveSignals(log, {40.0 * Eigen::MatrixXd::Identity(2, 2)}), InputError);
 }
 
 TEST(Butterworth, GainIsTheSquareOfOrderFour_AndLinesPassUnchanged) {

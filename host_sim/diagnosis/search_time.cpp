@@ -1,0 +1,111 @@
+// diagnosis - searches over a run's time: one window that a term is on, and short windows that stand alone.
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/diagnosis/searcher.hpp"
+
+namespace armcal::diagnosis {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kMostWindows = 6;  // more are no isolated events
+constexpr int kDurations = 6;    // tried, from the shortest on, each 1.6 times the one before
+constexpr double kLonger = 1.6;
+constexpr int kStepsPerWindow = 8;
+constexpr double kSeen = 0.7;  // share of a window's samples that are used at least
+
+struct Window {
+  double gain = 0, on = 0, off = 0;
+};
+
+}  // namespace
+
+// Windows [on, off] on a grid of the log's time, not shorter than the record's minimum; then refined.
+void Searcher::Onset() {
+  const auto& t = e_.logs[0].data->s.t;
+  const double begin = t[0], end = t[t.size() - 1], minimum = c_.record().search.minimum_s;
+  if (e_.logs.size() != 1 || end - begin < 2 * minimum) return;  // times of several logs have no common origin
+  for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
+  constexpr int kGrid = 12;
+  searched_ = 2;
+  best_.tried = kGrid * kGrid / 2;
+  // Each cell of time once; a window is the sum of its cells.
+  std::vector<double> edge{begin - 1};
+  for (int k = 1; k < kGrid; ++k) edge.push_back(begin + (end - begin) * k / kGrid);
+  edge.push_back(end + 1);
+  std::vector<Projection> cell;
+  for (int k = 0; k < kGrid; ++k) cell.push_back(g_.thin_metric.Project(g_.thinned.Gather(c_, {edge[k], edge[k + 1]})));
+  double most = 0;
+  std::vector<double> window;
+  for (int i = 0; i < kGrid; ++i) {
+    Projection sum = cell[i];
+    for (int k = i; k < kGrid; ++k) {
+      if (k > i) sum += cell[k];
+      if (edge[k + 1] - edge[i] < minimum || k - i + 1 == kGrid) continue;  // on all the time is no step
+      const double value = Value(g_.thin_metric, sum).gain;
+      if (value > most) most = value, window = {edge[i], edge[k + 1]};
+    }
+  }
+  if (most > 0) Consider(window);
+  if (Promising()) {
+    Consider(Refine(window, 0.5 / kGrid, 5, [this](const auto& eta) { return ConsiderThinned(eta); }));
+    RefineBest(0.5 / kGrid / 32, 2);
+  }
+  if (best_.eta[1] - best_.eta[0] < minimum) best_.gain = Gain{};
+}
+
+// Isolated windows one after the other, each where the shape that the record gives fits best what the ones before have
+// left.
+void Searcher::Windows() {
+  if (e_.logs.size() != 1) return;
+  const auto& time = e_.logs[0].data->s.t;
+  const int row = c_.rows()[0], samples = static_cast<int>(time.size());
+  const RowIndex& index = e_.index[row];
+  const double begin = time[0], end = time[samples - 1], step_s = (end - begin) / (samples - 1);
+  for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
+  std::vector<VectorXd> shapes;
+  for (int d = 0; d < kDurations; ++d) {
+    const double span = c_.record().search.minimum_s * std::pow(kLonger, d), from = 0.5 * (begin + end);
+    const int length = static_cast<int>(span / step_s);
+    std::vector<std::vector<VectorXd>> value;
+    c_.Evaluate(e_.logs[0], {from, from + span}, value);
+    shapes.push_back(value[0][0].segment(static_cast<int>((from - begin) / step_s), std::min(length, samples / 4)));
+  }
+  VectorXd residual = g_.metric.RawResidual(row);
+  std::vector<double> found;
+  for (int windows = 1; windows <= kMostWindows; ++windows) {
+    VectorXd dense = VectorXd::Zero(samples), used = dense;
+    for (int i = 0; i < index.size(); ++i) dense[index.sample[i]] = residual[i], used[index.sample[i]] = 1;
+    Window best;
+    double tried = 0;
+    for (const VectorXd& shape : shapes) {
+      const int length = static_cast<int>(shape.size()), stride = std::max(1, length / kStepsPerWindow);
+      for (int at = 0; at + length <= samples; at += stride, ++tried) {
+        const auto seen = used.segment(at, length);
+        if (seen.sum() < kSeen * length) continue;
+        const double fit = shape.dot(dense.segment(at, length)), norm = (shape.array().square() * seen.array()).sum();
+        if (fit * fit > best.gain * norm) best = {fit * fit / norm, time[at], time[at] + length * step_s};
+      }
+    }
+    const double noise = g_.metric.noise()[row].innovation;
+    Found one = best_;
+    one.parameters = 3, one.tried = tried;
+    if (best.gain < -Score(one, 0, e_) * noise * noise) break;
+    searched_ = 2 * windows;
+    best_.tried = std::pow(tried, windows);
+    const auto with = [&](const std::vector<double>& last) {
+      if (last[1] - last[0] < c_.record().search.minimum_s) return 0.0;
+      std::vector<double> all = found;
+      all.insert(all.end(), last.begin(), last.end());
+      return Consider(all);
+    };
+    const double width = (best.off - best.on) / (end - begin + 2);
+    const std::vector<double> last = Refine({best.on, best.off}, 0.25 * width, 4, with);
+    found.insert(found.end(), last.begin(), last.end());
+    residual = g_.metric.ResidualWith(GatherColumns(c_, e_, found), row);
+  }
+}
+
+}  // namespace armcal::diagnosis

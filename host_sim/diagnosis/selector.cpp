@@ -1,0 +1,156 @@
+// diagnosis - which candidate is the next term, and whether one still earns its place.
+#include "host_sim/diagnosis/selector.hpp"
+
+#include <algorithm>
+
+namespace armcal::diagnosis {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kRescored = 14;  // candidates whose likelihood is computed with their own noise model
+constexpr double kKeepsOutOfFold = 0.35;
+constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
+constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates another
+constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
+constexpr int kSharpenings = 3;
+constexpr double kNothing = 10;         // a gain that no score above zero can come from
+constexpr double kCurveIsWorth = 0.85;  // of its score, beside a named cause: forms differ a little from any record
+constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
+
+bool SharesJoint(const Candidate& a, const Candidate& b) {
+  return std::any_of(a.rows().begin(), a.rows().end(),
+                     [&](int j) { return std::find(b.rows().begin(), b.rows().end(), j) != b.rows().end(); });
+}
+
+// Isolated events: what one part of a log shows of them says nothing about another part.
+bool IsIsolated(const Candidate& c) { return c.record().search.how == "window"; }
+
+}  // namespace
+
+bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
+  Grounds grounds(w_, terms);
+  std::vector<Candidate*> reach;
+  for (const auto& c : w_.candidates)
+    if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence)) reach.push_back(c.get());
+  std::vector<Found> ranked = Rank(reach, grounds);
+  // A strong effect passes for noise, and under so much noise others look as good. Once it is known what it leaves,
+  // those that may be meant are searched again.
+  for (int round = 0; round < kSharpenings && !ranked.empty(); ++round) {
+    if (!grounds.Sharpen(GatherColumns(*ranked[0].candidate, w_.evidence, ranked[0].eta))) break;
+    reach.clear();
+    for (const Found& f : ranked) reach.push_back(f.candidate);
+    ranked = Rank(reach, grounds);
+  }
+  for (Found& f : ranked) Rescore(grounds, f);
+  std::sort(ranked.begin(), ranked.end(), [this](const Found& a, const Found& b) { return Standing(a) > Standing(b); });
+  for (std::size_t k = 0; k < ranked.size(); ++k)
+    if (ranked[k].score > kAccept && Accept(grounds, terms, ranked, k, out)) return true;
+  return false;
+}
+
+bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
+  const Grounds grounds(w_, others);
+  Found f = SearchCandidate(*term.candidate, grounds.ground());
+  if (f.gain.gain <= 0) return false;
+  Rescore(grounds, f);
+  term.eta = f.eta;
+  term.found = f;
+  return f.score > kAccept;
+}
+
+std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds) {
+  std::vector<Found> ranked;
+  std::set<std::pair<std::string, std::vector<int>>> something;
+  for (Candidate* c : candidates) {
+    const std::string& simpler = c->record().search.after;
+    if (!simpler.empty() && !something.contains({simpler, c->joints()})) continue;
+    const Found f = SearchCandidate(*c, grounds.ground());
+    gain_[c] = f.gain.gain;
+    if (f.score <= 0) continue;
+    ranked.push_back(f);
+    something.insert({c->record().name, c->joints()});
+  }
+  std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
+  if (ranked.size() > kRescored) ranked.resize(kRescored);
+  return ranked;
+}
+
+void Selector::Rescore(const Grounds& grounds, Found& f) const {
+  const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
+  const double with = grounds.metric().RefittedDeviance(c);
+  f.score = Score(f, grounds.DevianceWithout(c.joints) - with, w_.evidence);
+}
+
+// The latest term touches none of its joints, and there was nothing on them before.
+bool Selector::IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const {
+  const auto known = gain_.find(&c);
+  return known != gain_.end() && !terms.empty() && known->second < kNothing &&
+         !SharesJoint(c, *terms.back()->candidate);
+}
+
+double Selector::Standing(const Found& f) const {
+  const auto& names = w_.standby;
+  const bool compiled_in = std::find(names.begin(), names.end(), f.candidate->record().name) != names.end();
+  return f.score * (f.candidate->is_curve() ? kCurveIsWorth : 1) + (compiled_in ? 1e-3 : 0);  // it wins among equals
+}
+
+// A chosen term, or one that is known to look like a chosen one on the same joints: the two together would only fit
+// noise, and apart from the training log's states they would fail.
+bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const {
+  return std::any_of(terms.begin(), terms.end(), [&](const Chosen* t) {
+    const auto& like = t->candidate->record().confusable_with;
+    const bool confusable = std::find(like.begin(), like.end(), c.record().name) != like.end();
+    // another frequency of the same kind is another term
+    return (t->candidate == &c && c.record().search.how != "spectral") ||
+           (confusable && t->candidate->joints() == c.joints());
+  });
+}
+
+// Delay, elasticity and backlash look like what a derivation of speed and acceleration leaves: a term that is real
+// gains about as much when these are derived otherwise.
+bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, double gain,
+                                     const std::vector<NoiseModel>& noise) {
+  if (!w_.narrow) return true;
+  Diagnosis::Work& narrow = *w_.narrow;
+  narrow.estimate = w_.estimate;
+  narrow.Prepare(terms);
+  return Metric(narrow.rows, noise).Try(GatherColumns(*f.candidate, narrow.evidence, f.eta)).gain > kStays * gain;
+}
+
+bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
+                      std::size_t k, Chosen& out) {
+  const Found& f = ranked[k];
+  const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
+  std::vector<NoiseModel> noise;
+  (void)grounds.metric().RefittedDeviance(c, &noise);
+  const Metric metric(w_.rows, noise);
+  const Gain gain = metric.Try(c);
+  const VectorXd folds = metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds);
+  const bool holds = folds.sum() > kKeepsOutOfFold * gain.gain && (folds.array() > 0).count() >= kFoldsThatImprove;
+  if (!holds && !IsIsolated(*f.candidate)) return false;
+  if (!StaysAtLowerBandwidth(f, terms, gain.gain, noise)) return false;
+  out = Chosen{};
+  out.candidate = f.candidate;
+  out.eta = f.eta;
+  out.found = f;
+  out.folds = folds;
+  for (std::size_t other = 0; other < ranked.size(); ++other) {
+    if (other == k) continue;
+    const Candidate& o = *ranked[other].candidate;
+    const std::string& kind = o.record().kind;
+    if (out.runner_up.empty()) out.runner_up = o.name(), out.runner_up_score = ranked[other].score;
+    const bool said = std::find(out.also_fits.begin(), out.also_fits.end(), kind) != out.also_fits.end();
+    if (!SharesJoint(o, *f.candidate) || kind == f.candidate->record().kind || kind != o.record().name || said)
+      continue;
+    const auto [taken, own] = metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].eta), c, gain.amplitude);
+    const double left = own - taken;
+    const bool same = left < kIndistinguishable && left < 0.1 * own;
+    const bool near = ranked[other].score > 0.95 * f.score;
+    if ((same || near) && out.also_fits.size() < kOtherNames) out.also_fits.push_back(kind);
+  }
+  return true;
+}
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,42 @@
+// diagnosis - chooses the next term: search, noise fitted anew, cross-validation, bandwidth; and whether a term still
+// earns its place.
+#pragma once
+
+#include <map>
+#include <set>
+
+#include "host_sim/diagnosis/grounds.hpp"
+#include "host_sim/diagnosis/work.hpp"
+
+namespace armcal::diagnosis {
+
+inline constexpr double kAccept = 15;  // score: odds of about e^7 to one after all penalties
+
+class Selector {
+ public:
+  explicit Selector(Diagnosis::Work& work) : w_(work) {}
+
+  // The best further term given those chosen; false if none is worth it.
+  bool Next(const std::vector<const Chosen*>& terms, Chosen& out);
+
+  // Searches a chosen term again with the others in; false if it no longer earns its place.
+  bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others);
+
+ private:
+  // The strongest candidates by white score.
+  std::vector<Found> Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds);
+  void Rescore(const Grounds& grounds, Found& f) const;
+  bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const;
+  bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
+  // What decides between candidates: the score, but a named cause before a curve that only fits somewhat better.
+  double Standing(const Found& f) const;
+  bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, double gain,
+                             const std::vector<NoiseModel>& noise);
+  bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
+              std::size_t k, Chosen& out);
+
+  Diagnosis::Work& w_;
+  std::map<const Candidate*, double> gain_;  // as last searched
+};
+
+}  // namespace armcal::diagnosis

@@ -108,7 +108,11 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     else term["joint"] = JointName(t);
     term["signals"] = Signals(t);
     nlohmann::ordered_json parameters, deviations;
-    for (std::size_t k = 0; k < t.eta.size(); ++k) parameters[t.unknowns[k].name] = t.eta[k];
+    for (std::size_t k = 0; k < t.eta.size(); ++k) {
+      parameters[t.unknowns[k].name] = t.eta[k];
+      if (t.eta_sd[static_cast<Eigen::Index>(k)] > 0)
+        deviations[t.unknowns[k].name] = t.eta_sd[static_cast<Eigen::Index>(k)];
+    }
     for (std::size_t c = 0; c < t.columns.size(); ++c)
       parameters[t.columns[c].name] = t.amplitude[c], deviations[t.columns[c].name] = t.sd[c];
     term["parameters"] = parameters;

@@ -38,6 +38,13 @@ std::string Candidate::name() const {
   return s;
 }
 
+int Candidate::delay() const {
+  if (record().apply.how != "delay") return -1;
+  for (std::size_t k = 0; k < unknowns().size(); ++k)
+    if (unknowns()[k].key == record().apply.by) return static_cast<int>(k);
+  return -1;
+}
+
 std::vector<double> Candidate::Initial() const {
   std::vector<double> eta;
   for (const auto& u : unknowns()) eta.push_back(u.initial);
@@ -46,8 +53,22 @@ std::vector<double> Candidate::Initial() const {
 
 namespace {
 
+// Each column as it was a time before, linear between samples: friction's jumps stay jumps.
+Eigen::MatrixXd Earlier(const VectorXd& t, const Eigen::MatrixXd& y, double delay_s) {
+  Eigen::MatrixXd out(y.rows(), y.cols());
+  const Eigen::Index last = t.size() - 1;
+  Eigen::Index k = 0;  // t[k] <= time < t[k + 1]
+  for (Eigen::Index i = 0; i <= last; ++i) {
+    const double time = std::clamp(t[i] - delay_s, t[0], t[last]);
+    while (k + 1 < last && t[k + 1] <= time) ++k;
+    const double share = (time - t[k]) / (t[k + 1] - t[k]);
+    out.row(i) = (1 - share) * y.row(k) + share * y.row(k + 1);
+  }
+  return out;
+}
+
 // The log's column that a graph input stands for; null if the input is none of them.
-const double* ColumnOf(const Quantities& quantities, const std::string& name) {
+const double* ColumnOf(const Quantities& quantities, const Eigen::MatrixXd& delayed, const std::string& name) {
   const codegen::Signals& s = quantities.data->s;
   if (name == "t") return s.t.data();
   if (name == "dt") return quantities.dt.data();
@@ -66,7 +87,7 @@ const double* ColumnOf(const Quantities& quantities, const std::string& name) {
                              : quantity == "tau_rigid"   ? &quantities.parts.rigid
                              : quantity == "tau_gravity" ? &quantities.parts.gravity
                              : quantity == "tau_model"   ? &quantities.tau_model
-                             : quantity == "dtau_model"  ? &quantities.dtau_model
+                             : quantity == "tau_delayed" ? &delayed
                                                          : nullptr;
   return m && a >= 1 && a <= m->cols() ? m->col(a - 1).data() : nullptr;
 }
@@ -84,6 +105,8 @@ void Candidate::EvaluateUse(const Quantities& quantities, const double* eta, std
                             std::vector<VectorXd>* value) const {
   const int samples = quantities.data->samples();
   const auto& states = graph_->states();
+  const Eigen::MatrixXd delayed =
+      reads("tau_delayed") ? Earlier(quantities.data->s.t, quantities.tau_model, eta[delay()]) : Eigen::MatrixXd();
   std::vector<codegen::Binding> bindings(graph_->inputs().size());
   for (std::size_t i = 0; i < bindings.size(); ++i) {
     const std::string& input = graph_->inputs()[i];
@@ -91,7 +114,8 @@ void Candidate::EvaluateUse(const Quantities& quantities, const double* eta, std
     const auto unknown = std::find_if(unknowns().begin(), unknowns().end(), is_it);
     if (unknown != unknowns().end()) bindings[i].value = eta[static_cast<std::size_t>(unknown - unknowns().begin())];
     else if (input == "t" && time_s) bindings[i].value = *time_s;
-    else if (std::none_of(states.begin(), states.end(), is_it)) bindings[i].column = ColumnOf(quantities, input);
+    else if (std::none_of(states.begin(), states.end(), is_it))
+      bindings[i].column = ColumnOf(quantities, delayed, input);
   }
   Eigen::MatrixXd path;
   if (!states.empty()) {
@@ -111,9 +135,9 @@ namespace {
 // Whether the search binds what this record reads and knows how to look for it.
 bool CanBeTried(const codegen::EffectRecord& record) {
   if (record.search.how == "none") return false;
-  static const std::set<std::string> bound = {"q",           "qd",         "qdd",        "temp", "t",
-                                              "dt",          "tau_rigid",  "tau_model",  "Y",    "M[:,j]",
-                                              "tau_gravity", "dtau_model", "dY/dgravity"};
+  static const std::set<std::string> bound = {"q",           "qd",          "qdd",        "temp", "t",
+                                              "dt",          "tau_rigid",   "tau_model",  "Y",    "M[:,j]",
+                                              "tau_gravity", "tau_delayed", "dY/dgravity"};
   return std::all_of(record.inputs.begin(), record.inputs.end(), [](const auto& i) { return bound.contains(i); });
 }
 }  // namespace

@@ -18,10 +18,10 @@ namespace armcal::diagnosis {
 struct Quantities {
   const calibration::Dataset* data = nullptr;
   codegen::TorqueParts parts;
-  Eigen::MatrixXd tau_model, dtau_model;  // [N x n] predicted torque and its rate
-  std::vector<Eigen::MatrixXd> flange;    // [n] N x 10: rows of the last body's columns
-  Eigen::VectorXd dt;                     // [N] time since the sample before
-  std::vector<char> restart;              // [N] 1: states start anew
+  Eigen::MatrixXd tau_model;            // [N x n] predicted torque
+  std::vector<Eigen::MatrixXd> flange;  // [n] N x 10: rows of the last body's columns
+  Eigen::VectorXd dt;                   // [N] time since the sample before
+  std::vector<char> restart;            // [N] 1: states start anew
 };
 
 // One candidate: a record on a set of joints. Columns are evaluated for given nonlinear parameters.
@@ -42,7 +42,8 @@ class Candidate {
   const std::vector<int>& rows() const { return rows_; }  // joints whose torque it touches
   bool reads(const std::string& input) const;
   bool is_curve() const { return record().generic_penalty > 0; }  // fits a form, names no cause
-  bool has_memory() const { return !graph_->states().empty(); }
+  // Columns at one sample hang on others: they cannot be had from a thinned log.
+  bool has_memory() const { return !graph_->states().empty() || reads("tau_delayed"); }
   std::string name() const;  // "stribeck, joint 3"
 
   // value[c][r]: column c (all of the first use, then all of the next) in row rows()[r], N values (empty where the
@@ -51,6 +52,8 @@ class Candidate {
                 std::vector<std::vector<Eigen::VectorXd>>& value, std::optional<double> time_s = {}) const;
 
   std::vector<double> Initial() const;
+  // The unknown that says by how much the measurement is delayed; -1 if the record is of another kind.
+  int delay() const;
 
  private:
   void EvaluateUse(const Quantities& quantities, const double* eta, std::optional<double> time_s,

@@ -34,6 +34,23 @@ std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chose
   return out;
 }
 
+// Delays the logs by what the latest term says of them, and once more by what it then says: the model that it was found
+// with had been fitted to logs that were not yet aligned.
+void ApplyDelay(Diagnosis::Work& w, Selector& select) {
+  constexpr int kRounds = 2;
+  Chosen& c = w.chosen.back();
+  if (c.candidate->delay() < 0) return;
+  double& rest_s = c.eta[static_cast<std::size_t>(c.candidate->delay())];
+  for (int round = 0; round < kRounds; ++round) {
+    c.delay_s += rest_s;
+    w.SetDelay(TotalDelay_s(w.chosen));
+    rest_s = 0;
+    Chosen again = c;
+    if (round + 1 < kRounds && select.StillEarns(again, Confirmed(w.chosen, &c)))
+      rest_s = again.eta[static_cast<std::size_t>(c.candidate->delay())];
+  }
+}
+
 // A log as the confirmed terms say that it was measured.
 calibration::Dataset AsTermsSay(const std::vector<Chosen>& chosen, const calibration::Dataset& log) {
   const double delay_s = TotalDelay_s(chosen);
@@ -52,8 +69,9 @@ void Repeat(const std::vector<Parameter>& once, std::size_t count, std::vector<P
   }
 }
 
-void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
+void WriteTerms(Diagnosis::Work& w, Finding& finding) {
   finding.terms.clear();
+  const std::vector<Diagnosis::Work::Deviation> deviation = w.Deviations(Confirmed(w.chosen));
   std::size_t k = 0;
   for (const Chosen& c : w.chosen) {
     Term t;
@@ -62,14 +80,16 @@ void WriteTerms(const Diagnosis::Work& w, Finding& finding) {
     Repeat(c.candidate->instance().columns, static_cast<std::size_t>(c.candidate->columns(c.eta)), t.columns);
     Repeat(c.candidate->unknowns(), c.eta.size(), t.unknowns);
     t.eta = c.eta;
+    if (c.delay_s != 0) t.eta[static_cast<std::size_t>(c.candidate->delay())] += c.delay_s;
     t.score = c.found.score, t.gain = c.found.gain.gain;
     t.folds = c.folds, t.also_fits = c.also_fits;
     t.runner_up = c.runner_up, t.runner_up_score = c.runner_up_score;
     t.confirmed = c.confirmed;
     t.amplitude = VectorXd::Zero(c.candidate->columns(c.eta)), t.sd = t.amplitude;
+    t.eta_sd = VectorXd::Zero(static_cast<Eigen::Index>(c.eta.size()));
     if (c.confirmed) {
-      t.amplitude = w.estimate.amplitude[k], t.sd = w.estimate.sd[k], ++k;
-      if (c.delay_s != 0) t.amplitude[0] += c.delay_s;
+      t.amplitude = w.estimate.amplitude[k];
+      t.sd = deviation[k].amplitude, t.eta_sd = deviation[k].eta, ++k;
     }
     finding.terms.push_back(std::move(t));
   }
@@ -91,7 +111,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   Selector select(w);
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);
-    w.ApplyDelay();
+    ApplyDelay(w, select);
   }
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
     if (w.chosen[k].delay_s != 0) ++k;  // the logs are as it says now

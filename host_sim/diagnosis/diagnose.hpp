@@ -18,6 +18,7 @@ struct Term {
   std::vector<codegen::EffectUnknown> unknowns;
   Eigen::VectorXd amplitude, sd;  // of the columns
   std::vector<double> eta;
+  Eigen::VectorXd eta_sd;
   double score = 0, gain = 0;
   Eigen::VectorXd folds;               // improvement of chi^2 out of fold
   std::vector<std::string> also_fits;  // kinds that this log cannot tell from it

@@ -48,7 +48,7 @@ Quantities PickSamples(const Quantities& q, int every, calibration::Dataset& dat
       to->emplace_back();
       for (const VectorXd& v : row) to->back().push_back(PickRows(v, every));
     }
-  out.tau_model = PickRows(q.tau_model, every), out.dtau_model = PickRows(q.dtau_model, every);
+  out.tau_model = PickRows(q.tau_model, every);
   for (const MatrixXd& m : q.flange) out.flange.push_back(PickRows(m, every));
   return out;
 }
@@ -87,6 +87,7 @@ Columns Thinned::Gather(const Candidate& candidate, const std::vector<double>& e
 BaseRows Thinned::Pick(const BaseRows& from) const {
   BaseRows out;
   out.columns = from.columns, out.informative = from.informative, out.L = from.L, out.mean = from.mean;
+  out.precision = from.precision;
   out.index = index;
   for (int j = 0; j < from.joints(); ++j) {
     out.design.push_back(from.design[j](kept[j], Eigen::all));

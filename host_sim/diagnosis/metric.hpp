@@ -44,6 +44,7 @@ struct BaseRows {
   bool informative = true;  // z has unit prior
   Eigen::MatrixXd L;        // x - mean = L z
   Eigen::VectorXd mean;
+  Eigen::MatrixXd precision;  // what is known of x beside the prior of z: of curves, how smooth and large; may be empty
   int joints() const { return static_cast<int>(index.size()); }
   int coordinates() const { return static_cast<int>(L.cols()); }
 };
@@ -66,6 +67,10 @@ class Metric {
   Projection Project(const Columns& c) const;
   Gain Try(const Projection& p) const;
   Gain Try(const Columns& c) const { return Try(Project(c)); }
+  // Twice the log evidence of a curve, its coefficients' size and smoothness as the data like them best: gain less what
+  // the freedom that is really used would gain by chance. precision: of the coefficients, where that evidence is
+  // largest.
+  double CurveEvidence(const Projection& p, Eigen::MatrixXd* precision = nullptr) const;
   // No bounded parameter of the joints given leaves its range at g (by more than 2 standard deviations).
   bool InBounds(const Gain& g, const std::vector<int>& joints) const;
   Eigen::VectorXd RawResidual(int j) const;                     // torque units
@@ -83,14 +88,16 @@ class Metric {
   // Gain of `other` on the fitted trace of `fitted` (amplitudes a), and that trace's own chi^2 off the base.
   std::pair<double, double> Imitates(const Columns& other, const Columns& fitted, const Eigen::VectorXd& a) const;
 
-  // Covariance of z (unit noise).
-  Eigen::MatrixXd Covariance() const;
+  // Covariance of z and of C's amplitudes about zero, whatever the noise is within a block of time: coloured, larger
+  // where the arm is fast. time: of each dataset.
+  Eigen::MatrixXd RobustCovariance(const Columns& c, double block_s,
+                                   const std::vector<const Eigen::VectorXd*>& time) const;
 
  private:
   Eigen::MatrixXd WhitenedColumns(const Columns& c, int r) const;
   void WhitenJoint(int j);
   void Solve();
-  double prior() const { return rows_.informative ? 1 : 1e-9; }
+  Eigen::MatrixXd PriorPrecision() const;  // of z
 
   const BaseRows& rows_;
   std::vector<NoiseModel> noise_;
@@ -100,6 +107,7 @@ class Metric {
   std::vector<Eigen::MatrixXd> gram_;   // [n] of q_
   std::vector<Eigen::VectorXd> right_;  // [n] q_' y_
   Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::MatrixXd prior_;
   Eigen::VectorXd z_, bounded_sd_;
 };
 

@@ -56,8 +56,10 @@ Found Searcher::Run() {
 
 Found Searcher::Scored() const {
   Found f = best_;
-  f.parameters = f.gain.rank + searched_;
-  f.score = Score(f, f.gain.gain, e_);
+  f.penalty = PenaltyOf(f.gain.rank + searched_, c_, e_);
+  if (f.gain.gain > 0 && c_.is_curve() && c_.record().search.how == "spline")
+    f.penalty = f.gain.gain - g_.metric.CurveEvidence(g_.metric.Project(GatherColumns(c_, e_, f.eta)), &f.precision);
+  f.score = Score(f, f.gain.gain);
   return f;
 }
 
@@ -90,8 +92,8 @@ bool Searcher::AmplitudesInBounds(const Gain& gain) const {
 
 double Searcher::Needed(int rank) const {
   Found f = best_;
-  f.parameters = rank + searched_;
-  return -Score(f, 0, e_);
+  f.penalty = PenaltyOf(rank + searched_, c_, e_);
+  return -Score(f, 0);
 }
 
 void Searcher::HoldAmplitude(Gain& g) const {
@@ -181,11 +183,14 @@ bool IsExcited(const Candidate& candidate, const Evidence& evidence) {
   return true;
 }
 
-double Score(const Found& found, double gain, const Evidence& evidence) {
+double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evidence) {
   int rows = 0;
-  for (const int j : found.candidate->rows()) rows += evidence.index[j].size();
-  return gain - found.parameters * std::log(std::max(2, rows)) - 2 * std::log(found.tried) -
-         found.candidate->record().generic_penalty;
+  for (const int j : candidate.rows()) rows += evidence.index[j].size();
+  return parameters * std::log(std::max(2, rows));
+}
+
+double Score(const Found& found, double gain) {
+  return gain - found.penalty - 2 * std::log(found.tried) - found.candidate->record().generic_penalty;
 }
 
 Found SearchCandidate(Candidate& candidate, const Ground& ground) { return Searcher(candidate, ground).Run(); }

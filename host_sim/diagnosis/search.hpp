@@ -48,13 +48,16 @@ struct Found {
   Candidate* candidate = nullptr;
   std::vector<double> eta;
   Gain gain;
-  double tried = 1;    // members of the grid: many tries find something by chance
-  int parameters = 0;  // linear directions + nonlinear parameters that were searched
+  double tried = 1;           // members of the grid: many tries find something by chance
+  Eigen::MatrixXd precision;  // of a curve's coefficients; empty for others
+  double penalty = 0;         // of its freedom: what so many parameters gain by chance, and more
   double score = 0;
 };
 
-// gain - parameters ln(rows) - 2 ln(tried) - the record's own penalty.
-double Score(const Found& found, double gain, const Evidence& evidence);
+// gain - penalty - 2 ln(tried) - the record's own penalty.
+double Score(const Found& found, double gain);
+// parameters ln(rows), as the Bayesian information criterion has it.
+double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evidence);
 
 // Amplitudes outside the record's bounds gain nothing.
 Found SearchCandidate(Candidate& candidate, const Ground& ground);

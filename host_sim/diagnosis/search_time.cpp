@@ -91,8 +91,8 @@ void Searcher::Windows() {
     }
     const double noise = g_.metric.noise()[row].innovation;
     Found one = best_;
-    one.parameters = 3, one.tried = tried;
-    if (best.gain < -Score(one, 0, e_) * noise * noise) break;
+    one.penalty = PenaltyOf(3, c_, e_), one.tried = tried;
+    if (best.gain < -Score(one, 0) * noise * noise) break;
     searched_ = 2 * windows;
     best_.tried = std::pow(tried, windows);
     const auto with = [&](const std::vector<double>& last) {

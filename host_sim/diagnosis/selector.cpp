@@ -80,7 +80,7 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
 void Selector::Rescore(const Grounds& grounds, Found& f) const {
   const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
   const double with = grounds.metric().RefittedDeviance(c);
-  f.score = Score(f, grounds.DevianceWithout(c.joints) - with, w_.evidence);
+  f.score = Score(f, grounds.DevianceWithout(c.joints) - with);
 }
 
 // The latest term touches none of its joints, and there was nothing on them before.
@@ -102,9 +102,9 @@ bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& t
   return std::any_of(terms.begin(), terms.end(), [&](const Chosen* t) {
     const auto& like = t->candidate->record().confusable_with;
     const bool confusable = std::find(like.begin(), like.end(), c.record().name) != like.end();
-    // another frequency of the same kind is another term
-    return (t->candidate == &c && c.record().search.how != "spectral") ||
-           (confusable && t->candidate->joints() == c.joints());
+    // another frequency of the same kind is another term, and so is another part of a signal's range
+    const bool other_part = c.record().search.how == "spectral" || (c.record().search.how == "spline" && c.is_curve());
+    return (t->candidate == &c && !other_part) || (confusable && t->candidate->joints() == c.joints());
   });
 }
 

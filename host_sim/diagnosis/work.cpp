@@ -16,7 +16,6 @@ using Eigen::VectorXd;
 
 namespace {
 constexpr int kPasses = 3;
-constexpr int kDelayRounds = 2;    // the rest after the first is of second order, after the second of fourth
 constexpr double kSettled = 1e-3;  // relative change of the residuals' spread after which nothing else moves
 }  // namespace
 
@@ -35,11 +34,6 @@ Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque&
   out.parts = arm.Evaluate(data.s, {x.data() + model.front(), static_cast<std::size_t>(model.rigid())});
   out.tau_model = calibration::Predict(model, data, x, eta);
   out.dt = codegen::SampleSteps(data.s.t, samples, 0, out.restart);
-  out.dtau_model = MatrixXd::Zero(samples, n);
-  for (int k = 1; k + 1 < samples; ++k)  // central differences: the prediction carries no noise of the torque
-    if (!out.restart[k] && !out.restart[k + 1])
-      out.dtau_model.row(k) =
-          (out.tau_model.row(k + 1) - out.tau_model.row(k - 1)) / (data.s.t[k + 1] - data.s.t[k - 1]);
   if (flange) model.BodyColumns(data.s, n - 1, out.flange);
   return out;
 }
@@ -93,25 +87,6 @@ void Diagnosis::Work::SetDelay(double delay_s) {
   for (std::size_t k = 0; k < train.size(); ++k) train[k] = &delayed[k];
   regressor.clear();
   if (narrow) narrow->SetDelay(delay_s);
-}
-
-void Diagnosis::Work::ApplyDelay() {
-  for (int round = 0; round < kDelayRounds; ++round) {
-    estimate = Solve(Confirmed(chosen));
-    double total_s = 0;
-    bool any = false;
-    std::size_t k = 0;
-    for (Chosen& c : chosen) {
-      if (!c.confirmed) continue;
-      const double amplitude = estimate.amplitude[k++][0];
-      if (c.candidate->record().apply.how != "delay") continue;
-      c.delay_s += amplitude;
-      total_s += c.delay_s;
-      any = true;
-    }
-    if (!any) return;
-    SetDelay(total_s);
-  }
 }
 
 std::vector<NoiseModel> Diagnosis::Work::WhiteNoise() const {
@@ -172,6 +147,7 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   rows.informative = prior.informative;
   FillDeclared();
   int size = active;
+  std::vector<std::pair<int, const MatrixXd*>> curves;
   for (const Chosen* t : terms) {
     const Columns c = GatherColumns(*t->candidate, evidence, t->eta);
     for (std::size_t r = 0; r < c.joints.size(); ++r) {
@@ -181,8 +157,12 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
       rows.design[j].rightCols(c.count()) = c.block[r];
       for (int i = 0; i < c.count(); ++i) rows.columns[j].push_back(size + i);
     }
+    if (t->found.precision.size()) curves.emplace_back(size, &t->found.precision);
     size += c.count();
   }
+  if (!curves.empty()) rows.precision = MatrixXd::Zero(size, size);
+  for (const auto& [at, precision] : curves)
+    rows.precision.block(at, at, precision->rows(), precision->cols()) = *precision;
   rows.mean.conservativeResize(size);
   rows.mean.tail(size - active).setZero();
   MakeCoordinates(size);
@@ -239,14 +219,12 @@ Diagnosis::Work::Estimate Diagnosis::Work::Solve(const std::vector<const Chosen*
     Prepare(terms);
     const Metric metric(rows, WhiteNoise());
     const VectorXd v = rows.L * metric.z();
-    const MatrixXd P = rows.L * metric.Covariance() * rows.L.transpose();
     out = Estimate{};
     out.x = prior.mean;
     for (int a = 0; a < active; ++a) out.x[declared.active[a]] = rows.mean[a] + v[a];
     int at = active;
     for (const Chosen* t : terms) {
       out.amplitude.push_back(v.segment(at, t->candidate->columns(t->eta)));
-      out.sd.push_back(P.diagonal().segment(at, t->candidate->columns(t->eta)).cwiseMax(0).cwiseSqrt());
       at += t->candidate->columns(t->eta);
     }
     out.sigma.resize(n), out.innovation.resize(n);

@@ -27,19 +27,22 @@ struct Diagnosis::Work {
 
   // x, amplitudes, sigma and model torque for the given terms (white metric, the same method with and without terms).
   struct Estimate {
-    Eigen::VectorXd x;                           // filter columns and gains
-    std::vector<Eigen::VectorXd> amplitude, sd;  // per term
+    Eigen::VectorXd x;                       // filter columns and gains
+    std::vector<Eigen::VectorXd> amplitude;  // per term
     Eigen::VectorXd sigma, innovation;
   };
   Estimate Solve(const std::vector<const Chosen*>& terms);
+  // Standard deviations of the terms' amplitudes and unknowns, all free together, at the estimate that Solve has left.
+  struct Deviation {
+    Eigen::VectorXd amplitude, eta;
+  };
+  std::vector<Deviation> Deviations(const std::vector<const Chosen*>& terms);
 
   // Refreshes model torque and base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
   std::vector<NoiseModel> WhiteNoise() const;
   // Reads the logs' motion that much before their torque, from now on.
   void SetDelay(double delay_s);
-  // Applies exactly what the chosen terms say of the measurement; their columns then hold the rest.
-  void ApplyDelay();
   void FillDeclared();
   void MakeCoordinates(int size);
 

@@ -310,12 +310,12 @@ const std::map<std::string, Maker>& Makers() {
       {"belt_elasticity",  // the link follows the motor, whose position is logged, through a spring
        [](const Arm& a, plant::Random& r, Effect& e) {
          const int j = static_cast<int>(r.Uniform(0, 5.999));
-         const double hertz = r.Uniform(8, 18);
          e.accept = {"belt_elasticity", "time_delay"}, e.joint = j + 1, e.seen_on = j;
          e.signals = {Signal("qdd", j)};
-         e.torque = [&a, j, hertz](const Motion& m, const MatrixXd& links) {
+         const auto softness = e.Strength(1 / std::pow(2 * kPi * 14, 2), 1 / std::pow(2 * kPi * 9.6, 2));  // 1 / w^2
+         e.torque = [&a, j, softness](const Motion& m, const MatrixXd& links) {
            Motion moved = m;
-           const double h = m.t[1] - m.t[0], w = 2 * kPi * hertz;
+           const double h = m.t[1] - m.t[0], w = 1 / std::sqrt(*softness);
            moved.q.col(j) = LowPass(Q(m, j), h, w, 0.05);
            moved.qd.col(j) = LowPass(V(m, j), h, w, 0.05);
            moved.qdd.col(j) = LowPass(m.qdd.col(j), h, w, 0.05);
@@ -325,23 +325,22 @@ const std::map<std::string, Maker>& Makers() {
       {"torque_saturation",
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.accept = {"torque_saturation", "torque_gain_error", "load_friction"}, e.signals = {"load"};
-         const double from = r.Uniform(0.5, 0.7);
-         OnJoint(a, r, e, [&a, from](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
+         const auto missing = e.Strength(0.3, 0.7);  // share of the largest torque that is cut off
+         OnJoint(a, r, e, [&a, missing](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
            const ArrayXd tau = links.col(j).array() + a.coulomb[j] * S(m, j) + a.viscous[j] * V(m, j);
-           const double edge = from * tau.abs().maxCoeff();
+           const double edge = (1 - *missing) * tau.abs().maxCoeff();
            return tau.max(-edge).min(edge) - tau;
          });
        }},
       {"time_delay",
-       [](const Arm& a, plant::Random& r, Effect& e) {
-         const double delay_s = r.Uniform(0.003, 0.012);
+       [](const Arm& a, plant::Random&, Effect& e) {
+         const auto delay_s = e.Strength(0.005, 0.02);
          e.joint = "all", e.seen_on = 1, e.signals = {"time shift"};
          e.torque = [&a, delay_s](const Motion& m, const MatrixXd& links) {
            MatrixXd tau = links;
            for (int j = 0; j < a.joints(); ++j)
              tau.col(j).array() += a.coulomb[j] * S(m, j) + a.viscous[j] * V(m, j) + a.rotor[j] * m.qdd.col(j).array();
-           // First terms of the shift; the motion is smooth over some milliseconds but for friction's sign.
-           const double h = m.t[1] - m.t[0], whole = delay_s / h;
+           const double h = m.t[1] - m.t[0], whole = *delay_s / h;
            MatrixXd out(tau.rows(), tau.cols());
            for (Index k = 0; k < tau.rows(); ++k) {
              const double at = std::max(0.0, static_cast<double>(k) - whole);

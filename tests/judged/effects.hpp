@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,13 @@ struct Effect {
   bool held_by_a_record = true;              // false: no record has this form exactly
   bool needs_temperature = false, run_state = false;
   int seen_on = 0;  // the joint whose visible part is scaled
+  // Where a larger effect is not the same torque times a number: what makes it larger, and its largest value.
+  std::shared_ptr<double> strength;
+  double most = 0;
+  std::shared_ptr<double> Strength(double first, double largest) {
+    most = largest;
+    return strength = std::make_shared<double>(first);
+  }
   // links: LinkTorque of the motion, [samples x joints].
   std::function<Eigen::MatrixXd(const Motion& motion, const Eigen::MatrixXd& links)> torque;
 };

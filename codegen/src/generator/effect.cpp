@@ -14,7 +14,7 @@ namespace {
 // Everything that a record may read.
 constexpr const char* kInputs[] = {"q",           "qd",     "qdd",       "temp",        "t",
                                    "dt",          "flag",   "tau_rigid", "tau_gravity", "Y",
-                                   "dY/dgravity", "M[:,j]", "tau_model", "dtau_model"};
+                                   "dY/dgravity", "M[:,j]", "tau_model", "tau_delayed"};
 
 std::string ExpressionText(const TomlReader& in, std::string_view key, const std::string& otherwise) {
   if (!in.Has(key)) return otherwise;

@@ -90,7 +90,7 @@ class Names {
     if (name == "tau_gravity") return value = quantities_.tau_gravity(joint), true;
     if (record_.kind_class == "sensor") {
       if (name == "tau_model") return value = quantities_.tau_model(joint), true;
-      if (name == "dtau_model") return value = quantities_.dtau_model(joint), true;
+      if (name == "tau_delayed") return value = quantities_.tau_delayed(joint), true;
     }
     double constant = 0;
     if (RobotConstant(robot_.joint[joint], name, constant)) return value = g_.Constant(constant), true;
@@ -176,7 +176,7 @@ ModelQuantities QuantitiesAsInputs(Graph& graph) {
           [&graph](int row, int j) { return graph.Input("M" + std::to_string(row) + "_" + std::to_string(j)); },
           [&graph](int row, int axis) { return graph.Input("G" + std::to_string(row) + "_" + std::to_string(axis)); },
           [&graph](int j) { return graph.Input(InputName("tau_model", j)); },
-          [&graph](int j) { return graph.Input(InputName("dtau_model", j)); }};
+          [&graph](int j) { return graph.Input(InputName("tau_delayed", j)); }};
 }
 
 std::vector<std::vector<int>> JointSets(const EffectRecord& record, int n) {
@@ -241,7 +241,11 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
         else if (row == "k" && joints.size() > 1) targets = {joints[1]};
         else if (row == "all")
           for (int i = 0; i < robot.joints(); ++i) targets.push_back(i);
-        else throw io::InputError(where + ": expected a row of scope \"" + record.scope + "\": j, k or all");
+        else if (const int at = std::atoi(row.c_str()); joints.empty() && at >= 1 && at <= robot.joints())
+          targets = {at - 1};
+        else
+          throw io::InputError(where + ": expected a row of scope \"" + record.scope +
+                               "\": j, k, all or, without joints of its own, a joint's number");
         for (const int i : targets) {
           names.row = i;
           const Expr e = ParseExpression(g, text, names.scope(), where);

@@ -44,10 +44,10 @@ struct ModelQuantities {
   std::function<Expr(int row, int body, int parameter)> body;
   std::function<Expr(int row, int joint)> mass;  // entry of M of (1)
   std::function<Expr(int row, int axis)> tilt;   // torque per m/s^2 of gravity along the base frame's x, y, z
-  std::function<Expr(int joint)> tau_model, dtau_model;
+  std::function<Expr(int joint)> tau_model, tau_delayed;
 };
 
-// Plain graph inputs named tau_rigid1.., tau_gravity1.., tau_model1.., dtau_model1.., Y<row>_<body>_<parameter>,
+// Plain graph inputs named tau_rigid1.., tau_gravity1.., tau_model1.., tau_delayed1.., Y<row>_<body>_<parameter>,
 // M<row>_<joint>, G<row>_<axis>; row, body, joint, axis and parameter counted from 0.
 ModelQuantities QuantitiesAsInputs(Graph& graph);
 

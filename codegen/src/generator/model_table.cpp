@@ -65,9 +65,8 @@ void Model::MakeTable() {
     const int joint = static_cast<int>(k) < front_ ? column_joint_[k] : -1;
     // A record that takes the friction law's place is one, and starts from the same nominal values.
     const bool friction = e.record->friction_law || !e.record->replaces.empty();
-    TableParameter p{
-        c.name, c.unit,        c.amplitude, c.sd, c.lower, c.upper, 0, use.state, friction ? 1 : 2,
-        joint,  e.record->name};
+    TableParameter p{c.name, c.unit,    c.amplitude,      c.sd,  c.lower,       c.upper,
+                     0,      use.state, friction ? 1 : 2, joint, e.record->name};
     if (friction && joint >= 0) {
       const auto it = robot_.joint[joint].nominal.find(c.key);
       if (it != robot_.joint[joint].nominal.end() && it->second > 0)

@@ -181,14 +181,18 @@ TEST(Effects, PairColumns_EqualFormulasWrittenByHand) {
     }
 }
 
-TEST(Effects, SensorColumns_AreTheSensorsLinearisation) {
+TEST(Effects, SensorColumns_AreWhatTheSensorAdds) {
   for (const double tau : {-900.0, -120.0, 30.0, 700.0}) {
     EXPECT_EQ(At("torque_gain_error", 0, {{"tau_model2", tau}}), tau);
     const double read = std::abs(tau) > 500 ? 500 * Sign(tau) : tau;
     EXPECT_EQ(At("torque_saturation", 0, {{"tau_model2", tau}}, {{"limit", 500}}), read - tau);
   }
-  for (int row = 0; row < 6; ++row)  // y(t) = tau(t - d): minus the rate, in every row
-    EXPECT_EQ(At("time_delay", 0, {{"dtau_model" + std::to_string(row + 1), 7.0 + row}}, {}, {}, row), -7.0 - row);
+  for (int row = 0; row < 6; ++row) {  // y(t) = tau(t - d), in every row
+    const std::string number = std::to_string(row + 1);
+    EXPECT_EQ(
+        At("time_delay", 0, {{"tau_model" + number, 7.0}, {"tau_delayed" + number, 4.0 - row}}, {{"d", 0.01}}, {}, row),
+        -3.0 - row);
+  }
   for (const double t : {0.5, 2.0, 2.5, 3.5, 4.0, 9.0}) {
     const double force = t < 2 || t > 4 ? 0 : std::sin(M_PI * (t - 2) / 2);
     EXPECT_NEAR(At("external_contact", 0, {{"t", t}}, {{"t_on", 2}, {"t_off", 4}}), force, 1e-15);
@@ -201,6 +205,8 @@ TEST(Effects, BaseTilt_IsTheTorquePerGravityOfEachRow) {
     EXPECT_EQ(At("base_tilt", 0, {{g + "0", 3.0}, {g + "1", 5.0}}, {}, {}, row), 3.0);
     EXPECT_EQ(At("base_tilt", 1, {{g + "0", 3.0}, {g + "1", 5.0}}, {}, {}, row), 5.0);
   }
+  EXPECT_EQ(At("base_tilt", 2, {{"q1", 0.4}}, {}, {}, 0), std::cos(0.4));  // the first moments of link 1, in row 1
+  EXPECT_EQ(At("base_tilt", 3, {{"q1", 0.4}}, {}, {}, 0), std::sin(0.4));
 }
 
 }  // namespace

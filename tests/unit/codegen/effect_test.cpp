@@ -17,15 +17,16 @@ namespace {
 
 // Every kind that a report may name, and the laws of the survey.
 const char* const kKinds[] = {
-    "coulomb_asymmetry", "torque_offset",        "viscous_asymmetry",    "stribeck",           "viscous_quadratic",
-    "viscous_cubic",     "viscous_cuberoot",     "load_friction",        "load_linear",        "temp_viscous",
-    "temp_coulomb",      "time_varying_viscous", "time_varying_coulomb", "torque_drift",       "torque_ripple",
-    "meshing_friction",  "cross_ripple",         "gravity_spring",       "cable_pack",         "position_torque",
-    "position_friction", "position_viscous",     "presliding_dahl",      "presliding_lugre",   "backlash",
-    "wrist_coupling",    "coupled_friction",     "velocity_product",     "payload_step",       "rotor_inertia",
-    "base_tilt",         "belt_elasticity",      "torque_saturation",    "torque_gain_error",  "time_delay",
-    "external_contact",  "coulomb_viscous",      "friction_exponential", "friction_sech_tanh", "stribeck_basis",
-    "friction_table"};
+    "coulomb_asymmetry",   "torque_offset",        "viscous_asymmetry",    "stribeck",           "viscous_quadratic",
+    "viscous_cubic",       "viscous_cuberoot",     "load_friction",        "load_linear",        "temp_viscous",
+    "temp_coulomb",        "time_varying_viscous", "time_varying_coulomb", "torque_drift",       "torque_ripple",
+    "meshing_friction",    "cross_ripple",         "gravity_spring",       "cable_pack",         "position_torque",
+    "position_friction",   "position_viscous",     "presliding_dahl",      "presliding_lugre",   "backlash",
+    "wrist_coupling",      "coupled_friction",     "velocity_product",     "payload_step",       "rotor_inertia",
+    "base_tilt",           "belt_elasticity",      "torque_saturation",    "torque_gain_error",  "time_delay",
+    "external_contact",    "coulomb_viscous",      "friction_exponential", "friction_sech_tanh", "stribeck_basis",
+    "friction_table",      "curve_speed",          "curve_friction",       "curve_load",         "curve_load_friction",
+    "curve_temp_friction", "curve_cross_position", "curve_cross_friction", "curve_cross_speed"};
 
 TEST(Catalogue, HasARecordForEveryKind_AndNoOther) {
   std::set<std::string> expected(std::begin(kKinds), std::end(kKinds)), found;
@@ -41,8 +42,8 @@ std::string InputWord(const std::string& graph_input) {
 
 // What a record declares is what its expressions do: inputs, estimate, memory.
 TEST(Catalogue, EveryRecord_ReadsWhatItDeclares) {
-  const std::set<std::string> of_the_estimate = {"tau_rigid",  "tau_gravity", "tau_model",
-                                                 "dtau_model", "M[:,j]",      "dY/dgravity"};
+  const std::set<std::string> of_the_estimate = {"tau_rigid",   "tau_gravity", "tau_model",
+                                                 "tau_delayed", "M[:,j]",      "dY/dgravity"};
   for (const auto& [name, record] : Records()) {
     EffectRun run(name, JointsFor(record));
     std::set<std::string> read, parameters;

@@ -1,0 +1,14 @@
+// diagnosis - small pieces that every part of a metric uses.
+#pragma once
+
+#include "host_sim/diagnosis/metric.hpp"
+
+namespace armcal::diagnosis {
+
+// g' S^+ g with S = C'C - B' base^-1 B, directions judged against the columns' own size.
+Gain SolveGain(const Eigen::LLT<Eigen::MatrixXd>& base, const Projection& p);
+
+Eigen::MatrixXd WhitenAll(const NoiseModel& noise, const RowIndex& rows, const Eigen::MatrixXd& m);
+Eigen::MatrixXd SelfProduct(const Eigen::MatrixXd& m);  // m' m
+
+}  // namespace armcal::diagnosis

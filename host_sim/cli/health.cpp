@@ -1,8 +1,8 @@
 // cli - armcal health: reads a drive's residual statistics and says which joint no longer fits its model; knows no log.
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "host_sim/cli/connect.hpp"
 #include "host_sim/cli/verb.hpp"
@@ -97,8 +97,9 @@ int Run(const Options& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   ordered_json json{{"verdict", ""}, {"elapsed_s", 0}, {"joints", ordered_json::array()}};
   bool misfit = false, early = false, unnamed = false;
+  std::vector<JointHealth> joints;
   for (int joint = 1; joint <= drive.ReadIdentity().axes; ++joint) {
-    const JointHealth h = health::Judge(client::ReadResiduals(drive, joint));
+    const JointHealth& h = joints.emplace_back(health::Judge(client::ReadResiduals(drive, joint)));
     fmt::print("{}\n", Sentence(h));
     const bool bad = h.verdict == Verdict::kNoLongerFits || h.verdict == Verdict::kNeverFitted;
     misfit = misfit || bad;
@@ -107,7 +108,12 @@ int Run(const Options& o) {
     json["elapsed_s"] = h.elapsed_s;
     json["joints"].push_back(ToJson(h));
   }
+  const std::vector<int> together = health::ChangedTogether(joints);
+  if (!together.empty())
+    fmt::print("joints {} changed at the same time: another payload, or the base was moved?\n",
+               fmt::join(together, ", "));
   if (unnamed) fmt::print("take a log: armcal record ..., then armcal diagnose ...\n");
+  json["changed_together"] = together;
   json["verdict"] = misfit ? "misfit" : early ? "too_early" : "fits";
   WriteJson(o.json, json);
   return misfit ? kMismatch : early ? kPartial : kOk;

@@ -1,6 +1,7 @@
 // health - the verdict on one joint.
 #include "host_sim/health/joint_health.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "host_sim/health/evidence.hpp"
@@ -51,6 +52,22 @@ JointHealth Judge(const client::JointResiduals& joint) {
     health.verdict = Verdict::kFits;
   }
   return health;
+}
+
+std::vector<int> ChangedTogether(const std::vector<JointHealth>& joints) {
+  std::vector<int> together;
+  double earliest_s = 0, latest_s = 0;  // what their onsets have in common
+  for (const JointHealth& h : joints) {
+    const auto& terms = h.looks_like.terms;
+    const bool load =
+        terms.empty() || terms[0].shape == kOffset || terms[0].shape == kGain || terms[0].shape == kPosition;
+    if (h.verdict != Verdict::kNoLongerFits || !h.onset || !load) continue;
+    earliest_s = together.empty() ? h.onset->earliest_s : std::max(earliest_s, h.onset->earliest_s);
+    latest_s = together.empty() ? h.onset->latest_s : std::min(latest_s, h.onset->latest_s);
+    together.push_back(h.joint);
+  }
+  if (together.size() < 2 || earliest_s > latest_s) together.clear();
+  return together;
 }
 
 }  // namespace armcal::health

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "host_sim/client/residual_reader.hpp"
 #include "host_sim/health/onset.hpp"
@@ -34,5 +35,9 @@ inline constexpr double kNeverInSigma = 2.0;
 inline constexpr double kFewestLatestRows = 2048;
 
 JointHealth Judge(const client::JointResiduals& joint);
+
+// Joints, from 1, that no longer fit for the load's sake (gain, offset, torque by position, or untold, but no friction)
+// and whose onsets may be one: what another payload or a tilted base does. Empty unless there are two at least.
+std::vector<int> ChangedTogether(const std::vector<JointHealth>& joints);
 
 }  // namespace armcal::health

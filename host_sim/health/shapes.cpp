@@ -32,8 +32,9 @@ class Regression {
   bool Independent(int k) const { return whole_[k] > 0 && column_.col(k).squaredNorm() > kIndependent * whole_[k]; }
   double Gain(int k) const {
     if (!Independent(k)) return 0;
-    const double along = column_.col(k).dot(torque_);
-    return along * along / column_.col(k).squaredNorm();
+    const double along = column_.col(k).dot(torque_), square = column_.col(k).squaredNorm();
+    const double most = ShapeOf(k).most;
+    return most > 0 && std::abs(along) > most * square ? 0 : along * along / square;
   }
   void Choose(int k) {
     const Eigen::VectorXd direction = column_.col(k).normalized();
@@ -83,14 +84,15 @@ void Fit(const std::vector<Evidence>& evidence, double noise, std::vector<Term>&
 }  // namespace
 
 const Shape& ShapeOf(int index) {
-  static const Shape shapes[kShapes] = {{"torque offset", "torque_offset", "To", "N*m"},
-                                        {"Coulomb friction", "coulomb_viscous", "Fc", "N*m"},
-                                        {"viscous friction", "coulomb_viscous", "Fv", "N*m*s/rad"},
-                                        {"torque gain", "torque_gain_error", "g", "1"},
-                                        {"load-dependent friction", "load_friction", "mu", "1"},
-                                        {"torque by position", "position_torque", "slope", "N*m/rad"},
-                                        {"Coulomb friction by temperature", "temp_coulomb", "slope", "N*m/K"},
-                                        {"viscous friction by temperature", "temp_viscous", "slope", "N*m*s/rad/K"}};
+  constexpr double kRatio = 0.3;  // three prior deviations of the records: no gain is off by more, no gear loses more
+  static const Shape shapes[kShapes] = {{"torque offset", "torque_offset", "To", "N*m", 0},
+                                        {"Coulomb friction", "coulomb_viscous", "Fc", "N*m", 0},
+                                        {"viscous friction", "coulomb_viscous", "Fv", "N*m*s/rad", 0},
+                                        {"torque gain", "torque_gain_error", "g", "1", kRatio},
+                                        {"load-dependent friction", "load_friction", "mu", "1", kRatio},
+                                        {"torque by position", "position_torque", "slope", "N*m/rad", 0},
+                                        {"Coulomb friction by temperature", "temp_coulomb", "slope", "N*m/K", 0},
+                                        {"viscous friction by temperature", "temp_viscous", "slope", "N*m*s/rad/K", 0}};
   return shapes[index];
 }
 

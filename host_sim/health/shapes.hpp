@@ -24,6 +24,7 @@ struct Shape {
   const char* kind;       // the record in codegen/effects that has it
   const char* parameter;  // of that record, or of a linear stand-in for it
   const char* unit;       // of a turning joint; a sliding one: N for N*m, m for rad
+  double most;            // a larger value is something else; 0: any
 };
 const Shape& ShapeOf(int index);
 

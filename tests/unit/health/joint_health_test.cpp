@@ -122,6 +122,33 @@ TEST(JointHealth, ALargeResidualFromTheStart_NeverFitted) {
   EXPECT_NEAR(h.looks_like.terms[0].value, 9, 0.3);
 }
 
+TEST(JointHealth, AGainThatNoSensorHas_IsNotOffered) {
+  SyntheticJoint joint([](const ResidualRow& r, double t) { return t < 160 ? 0.0 : 0.8 * r.load_Nm; });
+  joint.Run(360);
+  const JointHealth h = Judge(joint.Read());
+  EXPECT_EQ(h.verdict, Verdict::kNoLongerFits);
+  for (const Term& t : h.looks_like.terms) EXPECT_STRNE(ShapeOf(t.shape).name, "torque gain");
+}
+
+TEST(ChangedTogether, AreJointsWithAnotherLoadSinceTheSameTime) {
+  const auto joint = [](int number, Verdict verdict, int shape, double earliest_s, double latest_s) {
+    JointHealth h;
+    h.joint = number, h.verdict = verdict;
+    h.looks_like.terms.push_back({shape, 1, 0.1, 1, {}});
+    h.onset = Onset{earliest_s, earliest_s, latest_s};
+    return h;
+  };
+  using Joints = std::vector<int>;
+  const JointHealth offset = joint(2, Verdict::kNoLongerFits, kOffset, 100, 120),
+                    gain = joint(3, Verdict::kNoLongerFits, kGain, 90, 110),
+                    friction = joint(4, Verdict::kNoLongerFits, kCoulomb, 100, 120),
+                    later = joint(5, Verdict::kNoLongerFits, kGain, 300, 310),
+                    fits = joint(6, Verdict::kFits, kGain, 100, 120);
+  EXPECT_EQ(ChangedTogether({offset, gain, friction, fits}), (Joints{2, 3}));
+  EXPECT_EQ(ChangedTogether({offset, later}), Joints{});
+  EXPECT_EQ(ChangedTogether({offset, friction, fits}), Joints{});
+}
+
 TEST(JointHealth, BeforeEnoughMotion_SaysThatItIsTooEarly) {
   SyntheticJoint joint([](const ResidualRow&, double) { return 30; });
   EXPECT_EQ(Judge(joint.Read()).verdict, Verdict::kTooEarly);

@@ -2,8 +2,6 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
-
 #include "host_sim/cli/connect.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/client/residual_reader.hpp"
@@ -47,7 +45,8 @@ std::string TermText(const health::Term& t) {
   const health::Shape& shape = health::ShapeOf(t.shape);
   std::string text = shape.name;
   for (const int k : t.also) text += std::string(" or ") + health::ShapeOf(k).name;
-  return text + fmt::format(" ({:+.3g} +- {:.1g} {})", t.value, t.sd, shape.unit);
+  const std::string unit = shape.unit == std::string("1") ? "" : std::string(" ") + shape.unit;
+  return text + fmt::format(" ({:+.3g} +- {:.1g}{})", t.value, t.sd, unit);
 }
 
 std::string Sentence(const JointHealth& h) {

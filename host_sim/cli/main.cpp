@@ -28,6 +28,7 @@ int Main(int argc, char** argv) {
   AddGenerate(app, action);
   AddFlash(app, action);
   AddVerify(app, action);
+  AddHealth(app, action);
   AddDemo(app, action);
   AddBench(app, action);
   AddSurvey(app, action);

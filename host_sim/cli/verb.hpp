@@ -27,6 +27,7 @@ void AddIdentify(CLI::App& app, Action& action);
 void AddDiagnose(CLI::App& app, Action& action);
 void AddFlash(CLI::App& app, Action& action);
 void AddVerify(CLI::App& app, Action& action);
+void AddHealth(CLI::App& app, Action& action);
 void AddDemo(CLI::App& app, Action& action);
 void AddBench(CLI::App& app, Action& action);
 void AddSurvey(CLI::App& app, Action& action);

@@ -16,6 +16,7 @@
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
 #include "armcal/link/device.hpp"
+#include "armcal/link/residual_registers.hpp"
 #include "armcal/link/tcp_service.hpp"
 #include "armcal/link/trace_registers.hpp"
 #include "codegen/src/robot/robot.hpp"
@@ -61,7 +62,8 @@ class Drive {
     identity.schema = Model::kSchema, identity.firmware_version = 1, identity.serial_number = 1;
     identity.axes = n, identity.parameters = Model::kParameters, identity.columns = Model::kColumns;
     identity.capabilities = link::reg::kHasFilterA | link::reg::kHasFilterB | link::reg::kHasRawTrace |
-                            link::reg::kHasSampleTrace | link::reg::kHasFeedForward | link::reg::kHasMonitor;
+                            link::reg::kHasSampleTrace | link::reg::kHasFeedForward | link::reg::kHasMonitor |
+                            link::reg::kHasResiduals;
     identity.tick_rate_Hz = static_cast<std::uint32_t>(Model::kTickRate_Hz),
     identity.sample_ticks = Model::kSampleTicks;
     identity.texts = {"armcal", Model::kName, "1"};
@@ -75,7 +77,9 @@ class Drive {
     Require(device_->AddFloats(link::reg::kConsistency, b_.nis, n));
     Require(link::ServeTrace(device_->map(), 0, raw_trace_));
     Require(link::ServeTrace(device_->map(), 1, sample_trace_));
+    Require(residual_pages_.Serve(device_->map()));
     Require(vendor_->Serve(device_->map()));
+    forgetting_.SetResiduals(&residuals_);
     forgetting_.SetObserver(&OnSample, this);
     // Defaults run the estimators; feed-forward stays off until a table is stored and adopted.
     Table table = estimator::DefaultTable<Model>();
@@ -166,6 +170,16 @@ class Drive {
     d.kalman_.Adopt(image, d.adopted_tick_);
     d.grant_ = kSettleTicks;
     return core::Status::kOk;
+  }
+
+  static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
+    static_assert(monitor::ResidualBins::kValues == link::reg::kResidualBinValues &&
+                  monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValueCount);
+    const auto& d = *static_cast<const Drive*>(self);
+    page.generation = d.generation_;
+    page.elapsed_s = d.residuals_.elapsed_s();
+    page.sigma_Nm = d.images_[d.active_image_].sigma_Nm[joint];
+    d.residuals_.Write(joint, page.values);
   }
 
   static void OnSample(void* self, const model::Sample<n>& sample, const float* tau_model_Nm) {
@@ -328,6 +342,8 @@ class Drive {
   std::unique_ptr<link::Device> device_;
   std::unique_ptr<VendorBlock> vendor_;
   link::TraceRing<> raw_trace_{1, &RawWords, nullptr}, sample_trace_{Model::kSampleTicks, &SampleWords, nullptr};
+  monitor::ResidualStatistics<n> residuals_;
+  link::ResidualPages residual_pages_{&TakeResiduals, this, n};
   estimator::Estimator<Model, filter::ForgettingFilter<Model>> forgetting_;
   estimator::Estimator<Model, filter::KalmanFilter<Model>> kalman_;
   estimator::Estimates<Model> a_, b_;

@@ -49,7 +49,7 @@ Arm::Arm(const Scenario& scenario, const std::string& robot_path)
   for (const PlacedJointEffect& placed : scenario.joint_effects) {
     if (placed.joint >= n)
       throw io::InputError(scenario.path + ": effect: joint: expected a joint from 1 to " + std::to_string(n));
-    effects_[static_cast<std::size_t>(placed.joint)].push_back(placed.effect);
+    effects_[static_cast<std::size_t>(placed.joint)].push_back(placed);
   }
   Eigen::VectorXd rotor(n);
   for (int j = 0; j < n; ++j) {

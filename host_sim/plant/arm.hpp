@@ -88,7 +88,7 @@ class Arm {
   Random noise_;
   Dynamics bare_, laden_, declared_;  // laden: with the payload; declared: without payload and tilt
   Dynamics* links_ = &bare_;
-  std::vector<std::vector<std::shared_ptr<const JointEffect>>> effects_;  // by joint
+  std::vector<std::vector<PlacedJointEffect>> effects_;  // by joint
   std::vector<double> nominal_constant_;
   Eigen::MatrixXd rotors_;  // C^T diag(N^2 J) C
   Eigen::VectorXd rise_KpW_, warming_time_s_;

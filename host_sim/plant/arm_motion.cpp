@@ -23,9 +23,10 @@ Arm::JointTorques Arm::TorquesAt(int joint, int direction, double q, double qd, 
                          .viscous_Nm = viscous};
   JointTorques sum{breaking_loose ? scenario_.stick_ratio * coulomb : coulomb, viscous, 0, 0};
   double dry = 0;
-  for (const auto& effect : effects_[j]) {
-    const double drag = effect->Drag(state), position = effect->Torque(state);
-    dry += effect->DryLevel(state);
+  for (const PlacedJointEffect& placed : effects_[j]) {
+    if (time_s_ < placed.from_s) continue;
+    const double drag = placed.effect->Drag(state), position = placed.effect->Torque(state);
+    dry += placed.effect->DryLevel(state);
     sum.drag += drag;
     sum.position += position;
     sum.undeclared += drag + position;

@@ -60,7 +60,8 @@ void ReadEffect(TomlKeys keys, Scenario& scenario) {
     scenario.tilt_pitch_rad = keys.Number("pitch_deg", 0) * kRadPerDeg;
   } else {
     const int joint = static_cast<int>(keys.Integer("joint", 1, kMostJoints)) - 1;
-    scenario.joint_effects.push_back({kind, joint, ReadJointEffect(kind, keys)});
+    const double from_s = keys.NotNegative("from_s", 0);
+    scenario.joint_effects.push_back({kind, joint, ReadJointEffect(kind, keys), from_s});
   }
   keys.Finish();
 }

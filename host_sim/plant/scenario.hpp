@@ -23,6 +23,7 @@ struct PlacedJointEffect {
   std::string kind;
   int joint = 0;  // 0-based
   std::shared_ptr<const JointEffect> effect;
+  double from_s = 0;  // it is not there before
 };
 
 // A body clamped to the flange from one time to another.

@@ -53,6 +53,7 @@ const Edges kEdges = {
                                 kLib + "physical", "host_sim/calibration/methods"}},
     {"host_sim/calibration/methods", {"host_sim/io", "host_sim/search", "codegen/src/", "host_sim/calibration"}},
     {"host_sim/diagnosis",     {"host_sim/io", "codegen/src/", "host_sim/calibration"}},
+    {"host_sim/health",        {"host_sim/client", kLib + "link/registers.hpp"}},  // a drive's statistics -> a verdict
     {"host_sim/drive",         {"host_sim/io", "host_sim/plant", "host_sim/excitation", "port/linux",
                                 "codegen/src/robot", "codegen/generated/", kLib}},
     {"host_sim/estimate",      {"host_sim/io", "host_sim/client", "host_sim/calibration", "codegen/generated/", kLib}},

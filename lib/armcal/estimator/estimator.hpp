@@ -3,8 +3,10 @@
 
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/sample_ring.hpp"
+#include "armcal/estimator/axes.hpp"
 #include "armcal/estimator/image.hpp"
 #include "armcal/monitor/monitor.hpp"
+#include "armcal/monitor/residual_statistics.hpp"
 #include "armcal/signal/signal_path.hpp"
 
 namespace armcal::estimator {
@@ -25,24 +27,6 @@ struct Estimates {
   float nis[Model::kJoints] = {};                   // see monitor::JointMonitor
   float residual_rms_Nm[Model::kJoints] = {};       // measured minus committed model, used rows
 };
-
-// Signal axes of a generated model.
-template <class Model>
-signal::Axes<Model::kJoints> AxesOf() {
-  constexpr int n = Model::kJoints;
-  signal::Axes<n> axes = {};
-  for (int i = 0; i < n; ++i) {
-    axes.counts_to_rad[i] = Model::kAxes[i].counts_to_rad;
-    axes.zero_counts[i] = Model::kAxes[i].zero_counts;
-    axes.lsb_to_Nm[i] = Model::kAxes[i].lsb_to_Nm;
-  }
-  for (int i = 0; i < n * n; ++i) {
-    axes.motor_to_joint[i] = Model::kMotorToJoint[i];
-    axes.motor_torque_to_joint[i] = Model::kMotorTorqueToJoint[i];
-  }
-  axes.tick_rate_Hz = static_cast<float>(Model::kTickRate_Hz);
-  return axes;
-}
 
 // Filter: filter::ForgettingFilter<Model> or filter::KalmanFilter<Model>.
 // Push and PushSample belong to the tick (use one of the two), everything else to the background.
@@ -81,6 +65,7 @@ class Estimator {
     estimates_ = Estimates<Model>{};
     estimates_.generation = image.committed.generation;
     for (monitor::JointMonitor& m : monitors_) m = monitor::JointMonitor{};
+    if (residuals_ != nullptr) residuals_->Restart(adopted_tick);
     memory_.running = false;
     stage_ = Stage::kIdle;
     read_out_due_ = true;
@@ -124,6 +109,10 @@ class Estimator {
     observer_ = observer;
     observer_context_ = context;
   }
+
+  // Statistics to fill from now on and to restart with each adoption; nullptr: none. They do not depend on the filter,
+  // so one of two estimators is enough.
+  void SetResiduals(monitor::ResidualStatistics<n>* residuals) { residuals_ = residuals; }
 
   std::uint32_t refused_samples() const { return ring_.refused(); }
   std::uint32_t pending() const { return ring_.size(); }         // samples waiting for Step; context: any
@@ -188,7 +177,8 @@ class Estimator {
     float front[Model::kFront > 0 ? Model::kFront : 1], dense[Model::kDense];
     for (int k = first; k < Model::kFrontBegin[i + 1]; ++k) front[k - first] = scaled(rows_.front[k], k);
     for (int k = 0; k < Model::kDense; ++k) dense[k] = scaled(rows_.dense[i * Model::kDense + k], Model::kFront + k);
-    tau_model_Nm_[i] = feedforward::RowTorque(image_->committed.p, rows_, i);
+    const float load_Nm = feedforward::LoadTorque(image_->committed.p, rows_, i);
+    tau_model_Nm_[i] = feedforward::RowTorque(image_->committed.p, rows_, i, load_Nm);
     const float residual_Nm = item_.sample.tau[i] - tau_model_Nm_[i];
 
     const bool use = ((moving_ >> i) & 1u) != 0u;
@@ -199,11 +189,16 @@ class Estimator {
     estimates_.rows_gated[i] += report.status == core::Status::kGated;
     estimates_.rows_refused[i] += core::IsRefused(report.status);
     if (report.accepted) monitors_[i].Add(report.innovation, report.variance, residual_Nm);
+    // Rows that the filter's gate keeps out count as well: they are what a changed arm looks like.
+    const model::Sample<n>& s = item_.sample;
+    if (residuals_ != nullptr) residuals_->Add(i, {residual_Nm, s.qd[i], s.q[i], load_Nm, s.temperature_degC[i]}, use);
     if (++joint_ == n) stage_ = Stage::kEnd;
   }
 
   void EndSample() {
     filter_.EndSample(moving_);
+    if (residuals_ != nullptr)
+      residuals_->EndSample(item_.sample.tick, static_cast<std::uint32_t>(Model::kTickRate_Hz));
     estimates_.tick = item_.sample.tick;
     if (observer_ != nullptr) observer_(observer_context_, item_.sample, tau_model_Nm_);
     if (++estimates_.samples % publish_every_ == 0u) read_out_due_ = true;
@@ -240,6 +235,7 @@ class Estimator {
   std::uint32_t adopted_tick_ = 0, last_tick_ = 0;
   std::uint32_t moving_ = 0;
   std::uint32_t publish_every_ = 125;
+  monitor::ResidualStatistics<n>* residuals_ = nullptr;
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;
   int joint_ = 0;

@@ -52,18 +52,29 @@ void EvaluateRows(const Committed<Model>& committed, const model::ModelInput<flo
   }
 }
 
-// Committed torque of one joint. A column whose parameter is zero adds nothing, even if its value is not finite
-// (an effect in standby may read a sensor that is not there). Context: any.
+// Committed torque of the links alone, without the joint's own friction and effects; RowTorque continues it.
 template <class Model>
-float RowTorque(const float* p, const Rows<Model>& rows, int joint) {
+float LoadTorque(const float* p, const Rows<Model>& rows, int joint) {
   float sum = 0.0f;
   for (int k = 0; k < Model::kDense; ++k) {
     const float parameter = p[Model::kFront + k];
     sum += parameter * math::Masked(rows.dense[joint * Model::kDense + k], math::MaskOf(parameter != 0.0f));
   }
+  return sum;
+}
+
+// Committed torque of one joint; load_Nm: its LoadTorque. A column whose parameter is zero adds nothing, even if its
+// value is not finite (an effect in standby may read a sensor that is not there). Context: any.
+template <class Model>
+float RowTorque(const float* p, const Rows<Model>& rows, int joint, float load_Nm) {
+  float sum = load_Nm;
   for (int k = Model::kFrontBegin[joint]; k < Model::kFrontBegin[joint + 1]; ++k)
     sum += p[k] * math::Masked(rows.front[k], math::MaskOf(p[k] != 0.0f));
   return sum;
+}
+template <class Model>
+float RowTorque(const float* p, const Rows<Model>& rows, int joint) {
+  return RowTorque(p, rows, joint, LoadTorque(p, rows, joint));
 }
 
 // Torque of all joints at a state, unclamped. Shape: tau_Nm [kJoints]. Not finite where the model is not. Context: any.

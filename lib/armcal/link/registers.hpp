@@ -31,7 +31,7 @@ struct Item {
 namespace reg {
 
 inline constexpr std::uint16_t kMapMajor = 1;
-inline constexpr std::uint16_t kMapMinor = 0;
+inline constexpr std::uint16_t kMapMinor = 1;
 inline constexpr std::uint32_t kMagic = 0x41524D43;  // "ARMC"
 inline constexpr float kProbeFloat = 123456.789f;    // reads 123456.79 only with the right word order
 inline constexpr std::uint32_t kProbeU32 = 0x12345678;
@@ -43,6 +43,12 @@ inline constexpr std::uint16_t kMaxJoints = 16;
 inline constexpr std::uint16_t kResidualRms = 0x0080, kConsistency = 0x00A0;
 inline constexpr std::uint16_t kMaxColumns = 256;
 inline constexpr std::uint16_t kEstimateA = 0x0100, kDeviationA = 0x0300, kEstimateB = 0x0500, kDeviationB = 0x0700;
+// Residual statistics of one joint: header, then f32 values, without a gap.
+inline constexpr std::uint16_t kResidualPage = 0x1000, kResidualHeaderCount = 8, kResidualValues = 0x1008;
+inline constexpr std::uint16_t kResidualSignals = 4, kResidualQuarters = 4, kResidualSums = 8;
+inline constexpr std::uint16_t kResidualBinValues = kResidualSignals * 2 * kResidualQuarters * kResidualSums;
+inline constexpr std::uint16_t kResidualSlices = 32, kResidualSliceValues = 3 * kResidualSlices;
+inline constexpr std::uint16_t kResidualValueCount = 2 * kResidualBinValues + kResidualSliceValues;
 inline constexpr int kTraces = 2;  // 0 raw samples, 1 processed samples
 inline constexpr std::uint16_t kTracePage[kTraces] = {0x4000, 0x6000};
 inline constexpr std::uint16_t kPageHeaderCount = 16, kPageData = 0x0010, kPageDataCount = 0x1F00;
@@ -54,6 +60,7 @@ inline constexpr std::uint16_t kUnlock = 0x0040;
 inline constexpr std::uint16_t kScratchFloat = 0x0050, kScratchU32 = 0x0058, kScratchPairs = 4;
 inline constexpr std::uint16_t kTraceArm[kTraces] = {0x0100, 0x0110};
 inline constexpr std::uint16_t kTraceArmCount = 10, kTraceAcknowledge = 0x000C;  // the latter from the arm block on
+inline constexpr std::uint16_t kResidualSelect = 0x0140;
 inline constexpr std::uint16_t kStaged = 0x1000, kActive = 0x2000, kMaxTableWords = 0x1000;
 inline constexpr std::uint16_t kVendor = 0x8000;
 
@@ -65,7 +72,7 @@ inline constexpr std::uint32_t kUnlockKey = 0x6B6C6E75;  // "unlk"
 
 // Capability bits.
 inline constexpr std::uint32_t kHasFilterA = 1, kHasFilterB = 2, kHasRawTrace = 4, kHasSampleTrace = 8;
-inline constexpr std::uint32_t kHasFeedForward = 16, kHasMonitor = 32;
+inline constexpr std::uint32_t kHasFeedForward = 16, kHasMonitor = 32, kHasResiduals = 64;
 
 }  // namespace reg
 
@@ -110,7 +117,7 @@ inline constexpr Item kAll[] = {
   In(0x0011, 1, kU16, "parameters", "", "entries of the parameter table"),
   In(0x0012, 1, kU16, "columns", "", "filter coordinates: estimates served"),
   In(0x0013, 1, kU16, "table_words", "", "registers of the staged and the active table"),
-  In(0x0014, 1, kU32, "capabilities", "", "bits: 1 filter A, 2 filter B, 4 raw trace, 8 sample trace, 16 feed-forward, 32 monitor"),
+  In(0x0014, 1, kU32, "capabilities", "", "bits: 1 filter A, 2 filter B, 4 raw trace, 8 sample trace, 16 feed-forward, 32 monitor, 64 residual statistics"),
   In(0x0016, 1, kU32, "tick_rate", "Hz", "control ticks a second"),
   In(0x0018, 1, kU16, "sample_ticks", "", "control ticks of one estimator sample"),
   In(0x0019, 1, kU16, "page_data_words", "", "most registers of one trace page's data"),
@@ -147,6 +154,15 @@ inline constexpr Item kAll[] = {
   In(0x0300, reg::kMaxColumns, kF32, "deviation_a", "SI", "its standard deviation"),
   In(0x0500, reg::kMaxColumns, kF32, "estimate_b", "SI", "filter B, per column; NaN: no estimate yet"),
   In(0x0700, reg::kMaxColumns, kF32, "deviation_b", "SI", "its standard deviation"),
+
+  In(0x1000, 1, kU16, "residual_joint", "", "joint of this page, from 1; 0: none selected yet"),
+  In(0x1001, 1, kU16, "residual_snapshot", "", "number of this snapshot, wraps"),
+  In(0x1002, 1, kU32, "residual_generation", "", "adoption that the statistics began with"),
+  In(0x1004, 1, kU32, "residual_elapsed", "s", "since that adoption"),
+  In(0x1006, 1, kF32, "residual_sigma", "N*m", "torque noise of one row by the table"),
+  In(0x1008, reg::kResidualBinValues, kF32, "residual_reference", "SI", "bins of the first rows, eight sums each"),
+  In(0x1208, reg::kResidualBinValues, kF32, "residual_recent", "SI", "bins of the latest rows, fading"),
+  In(0x1408, reg::kResidualSliceValues, kF32, "residual_history", "SI", "slices: start in s, rows, sum of squares; NaN: unused"),
 
 #define ARMCAL_TRACE_PAGE(base, n) \
   In(base + 0x00, 1, kU32, "trace" n "_first_record", "", "number of the page's first record, counted from the arm"), \
@@ -188,6 +204,8 @@ inline constexpr Item kAll[] = {
   ARMCAL_TRACE_ARM(0x0100, "0"),
   ARMCAL_TRACE_ARM(0x0110, "1"),
 #undef ARMCAL_TRACE_ARM
+
+  Hold(0x0140, 1, kU16, kWrite, "residual_select", "", "joint from 1: takes a snapshot of its statistics"),
 
   Hold(0x1000, reg::kMaxTableWords, kU16, kWrite, "staged_table", "", "the table being loaded"),
   Hold(0x2000, reg::kMaxTableWords, kU16, kRead, "active_table", "", "the table in force"),

@@ -9,6 +9,7 @@
 #include "armcal/feedforward/feed_forward.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/link/device.hpp"
+#include "armcal/link/residual_registers.hpp"
 #include "armcal/port/clock.hpp"
 #include "armcal/port/storage.hpp"
 #include "armcal/table/table_store.hpp"
@@ -21,7 +22,7 @@ struct SetPoint {
   float q[n], qd[n], qdd[n];
 };
 
-// One controller. Lives as long as the power is on; some 60 KB for six joints.
+// One controller. Lives as long as the power is on; some 80 KB for six joints.
 template <class Model>
 class Drive {
  public:
@@ -32,7 +33,9 @@ class Drive {
       : clock_(clock),
         store_(storage, Model::kSchema, kWords),
         transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords),
-        device_(Describe(), live_, transaction_) {}
+        device_(Describe(), live_, transaction_) {
+    estimator_.SetResiduals(&residuals_);
+  }
 
   // Before the first tick. Without a valid table in storage the estimator starts from the model's defaults and the
   // feed-forward stays off. Answers as table::TableStore::Load; a status of link::RegisterMap::Add is a wrong map.
@@ -45,6 +48,7 @@ class Drive {
     serve(link::reg::kDeviationA, estimates_.sd, Model::kColumns);
     serve(link::reg::kResidualRms, estimates_.residual_rms_Nm, n);
     serve(link::reg::kConsistency, estimates_.nis, n);
+    if (core::IsOk(map)) map = residual_pages_.Serve(device_.map());
     if (!core::IsOk(map)) return map;
 
     table_ = estimator::DefaultTable<Model>();
@@ -96,11 +100,22 @@ class Drive {
     identity.axes = n;
     identity.parameters = Model::kParameters;
     identity.columns = Model::kColumns;
-    identity.capabilities = link::reg::kHasFilterA | link::reg::kHasFeedForward | link::reg::kHasMonitor;
+    identity.capabilities =
+        link::reg::kHasFilterA | link::reg::kHasFeedForward | link::reg::kHasMonitor | link::reg::kHasResiduals;
     identity.tick_rate_Hz = static_cast<std::uint32_t>(Model::kTickRate_Hz);
     identity.sample_ticks = Model::kSampleTicks;
     identity.texts = {"armcal", Model::kName, "1"};
     return identity;
+  }
+
+  static void TakeResiduals(void* context, int joint, link::ResidualPage& page) {
+    static_assert(monitor::ResidualBins::kValues == link::reg::kResidualBinValues &&
+                  monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValueCount);
+    const auto& drive = *static_cast<const Drive*>(context);
+    page.generation = drive.generation_;
+    page.elapsed_s = drive.residuals_.elapsed_s();
+    page.sigma_Nm = drive.images_[drive.in_force_].sigma_Nm[joint];
+    drive.residuals_.Write(joint, page.values);
   }
 
   static std::uint32_t Sum(const std::uint32_t (&rows)[n]) {
@@ -157,6 +172,8 @@ class Drive {
   feedforward::FeedForward<Model> feed_forward_;
   estimator::Estimator<Model, filter::ForgettingFilter<Model>> estimator_;
   estimator::Estimates<Model> estimates_;
+  monitor::ResidualStatistics<n> residuals_;
+  link::ResidualPages residual_pages_{TakeResiduals, this, n};
   estimator::Table<Model> table_;
   estimator::ImageWork<Model> work_;
   estimator::Image<Model> images_[2];

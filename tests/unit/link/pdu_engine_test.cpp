@@ -96,8 +96,8 @@ TEST_F(Engine, Write_ToReadOnlyOrLocked_Gets04_WithTheReason) {
 }
 
 TEST_F(Engine, LastErrorAddress_IsTheFirstRegisterOfTheRefusedRequest) {
-  Ask({4, 0x12, 0x34, 0, 1});
-  EXPECT_EQ(drive_.device.map().last_error().address, 0x1234);
+  Ask({4, 0x34, 0x56, 0, 1});
+  EXPECT_EQ(drive_.device.map().last_error().address, 0x3456);
   EXPECT_EQ(drive_.device.map().last_error().request, drive_.device.map().requests());
 }
 

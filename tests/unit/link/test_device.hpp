@@ -12,6 +12,7 @@
 #include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
 #include "armcal/link/device.hpp"
+#include "armcal/link/residual_registers.hpp"
 #include "armcal/link/trace_registers.hpp"
 #include "tests/unit/table/nor_flash.hpp"
 
@@ -84,7 +85,19 @@ struct TestDevice {
       served = served && core::IsOk(device.AddFloats(first, values, static_cast<std::uint16_t>(count)));
     served = served && core::IsOk(link::ServeTrace(device.map(), 0, raw));
     served = served && core::IsOk(link::ServeTrace(device.map(), 1, samples));
+    served = served && core::IsOk(residuals.Serve(device.map()));
     all_served = served;
+  }
+
+  // The statistics of a joint: recognisable figures that change with every snapshot.
+  static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
+    auto& t = *static_cast<TestDevice*>(self);
+    page.generation = 3;
+    page.elapsed_s = 4000;
+    page.sigma_Nm = 0.5f;
+    ++t.snapshots_taken;
+    for (int k = 0; k < link::reg::kResidualValueCount; ++k)
+      page.values[k] = static_cast<float>(10000 * t.snapshots_taken + 1000 * joint + k);
   }
 
   NorFlash flash{{2, 2048, 8, 0xFF}};
@@ -94,12 +107,15 @@ struct TestDevice {
   std::vector<std::uint16_t> active = std::vector<std::uint16_t>(kTableWords);
   link::TableTransaction transaction{application.Functions(), store,         kSchema,
                                      staged.data(),           active.data(), kTableWords};
-  link::Identity identity{kSchema, 0x00010002, 77, kAxes, 30, kColumns, 15, 1000, 8, {"armcal", "test_arm", "1.0"}};
+  link::Identity identity{kSchema,  0x00010002, 77,   kAxes, 30,
+                          kColumns, 15 + 64,    1000, 8,     {"armcal", "test_arm", "1.0"}};
   link::LiveStatus live;
   float estimate[kColumns], deviation[kColumns];
   link::TraceRing<1024> raw{1, &RecordWords, nullptr};
   link::TraceRing<1024> samples{8, &RecordWords, nullptr};
   link::Device device{identity, live, transaction};
+  link::ResidualPages residuals{&TakeResiduals, this, kAxes};
+  int snapshots_taken = 0;
   core::Status boot_status = core::Status::kOk;
   bool all_served = false;
 };

@@ -112,6 +112,17 @@ TEST(SpringBalancer, IsTheGradientOfItsSpringEnergy) {
     EXPECT_NEAR(effect->Torque({.q_rad = q}), (energy(q + 1e-5) - energy(q - 1e-5)) / 2e-5, 1e-5);
 }
 
+TEST(AnyEffect, WithAFromTime_IsNotThereBefore) {
+  Arm arm(MakeScenario("[[effect]]\nkind = \"torque_offset\"\njoint = 1\ntorque_Nm = 7.0\nfrom_s = 0.01\n"),
+          WriteText("one.toml", RobotText({JointText{}})));
+  arm.SetBrakes(true);
+  Sensors sensors;
+  for (int k = 1; k <= 20; ++k) {
+    arm.Step(std::vector<double>{0.0}, sensors);
+    EXPECT_EQ(arm.undeclared_torque_Nm()[0], k >= 10 ? 7.0 : 0.0) << k;
+  }
+}
+
 TEST(PayloadStep, AddsItsWeightAtTheFlangeFromItsTimeOnAndTakesItAway) {
   const std::string top = "dh = \"modified\"\ntool_frame = { xyz_m = [0.5, 0, 0] }\n";
   Arm arm(MakeScenario("[[effect]]\nkind = \"payload_step\"\nmass_kg = 2.0\ncenter_m = [0.1, 0, 0]\n"

@@ -15,6 +15,7 @@ Dataset Delayed(const Dataset& data, double delay_s) {
     k = std::min(k, last - 1);
     while (k + 1 < last && t[k + 1] <= time) ++k;
     while (k > 0 && t[k] > time) --k;
+    out.used.row(i) = data.used.row(i).cwiseMin(data.used.row(k).cwiseMin(data.used.row(k + 1)));
     const Eigen::Index first = std::clamp<Eigen::Index>(k - 1, 0, last - 3);
     double weight[4];
     for (int a = 0; a < 4; ++a) {

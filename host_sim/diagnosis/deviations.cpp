@@ -18,6 +18,9 @@ Columns Slope(const Chosen& term, const VectorXd& amplitude, std::size_t k, cons
   const auto& unknown = term.candidate->unknowns()[k % term.candidate->unknowns().size()];
   const double step = kStep * std::min(unknown.upper - unknown.lower,
                                        unknown.logarithmic ? std::abs(term.eta[k]) : unknown.upper - unknown.lower);
+  VectorXd held = amplitude;  // of a delay that has been applied the column is zero, and so is its estimate
+  for (int c = 0; c < held.size(); ++c)
+    if (term.candidate->column(c).fixed_amplitude) held[c] = term.candidate->column(c).amplitude;
   std::vector<double> eta = term.eta;
   eta[k] += step;
   const Columns above = GatherColumns(*term.candidate, evidence, eta);
@@ -25,7 +28,7 @@ Columns Slope(const Chosen& term, const VectorXd& amplitude, std::size_t k, cons
   const Columns below = GatherColumns(*term.candidate, evidence, eta);
   Columns out{above.joints, {}};
   for (std::size_t r = 0; r < above.joints.size(); ++r)
-    out.block.emplace_back((above.block[r] - below.block[r]) * amplitude / (2 * step));
+    out.block.emplace_back((above.block[r] - below.block[r]) * held / (2 * step));
   return out;
 }
 

@@ -160,7 +160,8 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
     Chosen* refuted = nullptr;
     for (Chosen& c : w.chosen)
       for (const int j : c.candidate->rows())
-        if (c.confirmed && after[j] > kWorse * before[j]) refuted = &c;  // the weakest one: they are sorted
+        if (c.confirmed && !OfTrainingOnly(*c.candidate) && after[j] > kWorse * before[j])
+          refuted = &c;  // the weakest one: they are sorted
     if (!refuted) break;
     refuted->confirmed = false;
     if (refuted->delay_s != 0) w.SetDelay(TotalDelay_s(w.chosen));

@@ -79,7 +79,8 @@ class Metric {
   const Eigen::VectorXd& z() const { return z_; }
 
   // chi^2 on each of `folds` interleaved folds of `blocks` blocks, of the base with C fitted to the other folds.
-  Eigen::VectorXd OutOfFold(const Columns& c, int blocks, int folds) const;
+  // precision: what is known of C's amplitudes; empty: nothing.
+  Eigen::VectorXd OutOfFold(const Columns& c, int blocks, int folds, const Eigen::MatrixXd& precision = {}) const;
 
   // -2 log likelihood (up to a constant) of C's joints with C in the model and their noise fitted anew. If `noise` is
   // given it receives the noise models of all joints, those of C's joints fitted with C in.

@@ -11,7 +11,7 @@ namespace armcal::diagnosis {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds) const {
+VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const MatrixXd& precision) const {
   const int n = rows_.joints(), d = rows_.coordinates(), k = c.count();
   std::vector<MatrixXd> gram(folds, MatrixXd::Zero(d + k, d + k));  // of each fold's own rows
   std::vector<VectorXd> right(folds, VectorXd::Zero(d + k));
@@ -45,6 +45,7 @@ VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds) const {
   MatrixXd ridge = MatrixXd::Zero(d + k, d + k);
   ridge.topLeftCorner(d, d) = prior_;
   ridge.bottomRightCorner(k, k).diagonal() = 1e-9 * total.bottomRightCorner(k, k).diagonal();
+  if (precision.size()) ridge.bottomRightCorner(k, k) += precision;
   for (int f = 0; f < folds; ++f) {
     const VectorXd x = MatrixXd(total - gram[f] + ridge).ldlt().solve(total_right - right[f]);
     for (int j = 0; j < n; ++j) {
@@ -159,7 +160,8 @@ MatrixXd Metric::RobustCovariance(const Columns& c, double block_s, const std::v
   MatrixXd spread = MatrixXd::Zero(d + k, d + k);
   spread.topLeftCorner(d, d) = prior_;
   for (const auto& [block, s] : score) spread += s * s.transpose();
-  VectorXd scale = hessian.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  VectorXd scale(d + k);
+  for (int i = 0; i < d + k; ++i) scale[i] = hessian(i, i) > 0 ? 1 / std::sqrt(hessian(i, i)) : 0;
   const MatrixXd scaled = scale.asDiagonal() * hessian * scale.asDiagonal() + 1e-9 * MatrixXd::Identity(d + k, d + k);
   const MatrixXd inverse = scale.asDiagonal() * scaled.ldlt().solve(MatrixXd(scale.asDiagonal()));
   return inverse * spread * inverse;

@@ -155,7 +155,9 @@ void Searcher::Profile() {
   visit(0);
   std::sort(tried.rbegin(), tried.rend());
   const double step = 0.5 / (points[0] - 1);
-  Consider(Refine(tried[0].second, step, 2, [this](const auto& e) { return ConsiderThinned(e); }));
+  // A delay gains nothing a little off the right place, far below a step of the grid: it must be looked for closer.
+  const int rounds = c_.delay() >= 0 ? 7 : 2;
+  Consider(Refine(tried[0].second, step, rounds, [this](const auto& e) { return ConsiderThinned(e); }));
   for (std::size_t k = 0; k < 2 && k < tried.size(); ++k) Consider(tried[k].second);
   if (Promising()) RefineBest(step, 5);
 }

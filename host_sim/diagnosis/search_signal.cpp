@@ -95,6 +95,7 @@ void Searcher::Spline() {
   if (signal.size() == 0 || signal.maxCoeff() - signal.minCoeff() <= 0) return;
   if (name == "t" && e_.logs.size() != 1) return;  // each run has a time of its own
   const double lo = signal.minCoeff(), range = signal.maxCoeff() - lo;
+  if (c_.is_curve() && ConsiderThinned({lo, lo + range}) < kKnots + 1) return;  // as chance gives
   Consider({lo, lo + range});
   if (name == "t") return;  // a run state wanders all the time
   const Found whole = Scored();

@@ -14,7 +14,8 @@ constexpr int kMostWindows = 6;  // more are no isolated events
 constexpr int kDurations = 6;    // tried, from the shortest on, each 1.6 times the one before
 constexpr double kLonger = 1.6;
 constexpr int kStepsPerWindow = 8;
-constexpr double kSeen = 0.7;  // share of a window's samples that are used at least
+constexpr double kOutlier = 4;  // times the noise: a few samples beyond are no event
+constexpr double kSeen = 0.7;   // share of a window's samples that are used at least
 
 struct Window {
   double gain = 0, on = 0, off = 0;
@@ -77,7 +78,9 @@ void Searcher::Windows() {
   std::vector<double> found;
   for (int windows = 1; windows <= kMostWindows; ++windows) {
     VectorXd dense = VectorXd::Zero(samples), used = dense;
-    for (int i = 0; i < index.size(); ++i) dense[index.sample[i]] = residual[i], used[index.sample[i]] = 1;
+    const double noise = g_.metric.noise()[row].innovation, most = kOutlier * noise;
+    for (int i = 0; i < index.size(); ++i)
+      dense[index.sample[i]] = std::clamp(residual[i], -most, most), used[index.sample[i]] = 1;
     Window best;
     double tried = 0;
     for (const VectorXd& shape : shapes) {
@@ -89,7 +92,6 @@ void Searcher::Windows() {
         if (fit * fit > best.gain * norm) best = {fit * fit / norm, time[at], time[at] + length * step_s};
       }
     }
-    const double noise = g_.metric.noise()[row].innovation;
     Found one = best_;
     one.penalty = PenaltyOf(3, c_, e_), one.tried = tried;
     if (best.gain < -Score(one, 0) * noise * noise) break;
@@ -102,7 +104,7 @@ void Searcher::Windows() {
       return Consider(all);
     };
     const double width = (best.off - best.on) / (end - begin + 2);
-    const std::vector<double> last = Refine({best.on, best.off}, 0.25 * width, 4, with);
+    const std::vector<double> last = Refine({best.on, best.off}, 0.25 * width, 3, with);
     found.insert(found.end(), last.begin(), last.end());
     residual = g_.metric.ResidualWith(GatherColumns(c_, e_, found), row);
   }

@@ -16,7 +16,7 @@ constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates 
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr int kSharpenings = 3;
 constexpr double kNothing = 10;         // a gain that no score above zero can come from
-constexpr double kCurveIsWorth = 0.85;  // of its score, beside a named cause: forms differ a little from any record
+constexpr double kCurveIsWorth = 0.9;   // of its score, beside a named cause: forms differ a little from any record
 constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
 
 bool SharesJoint(const Candidate& a, const Candidate& b) {
@@ -31,9 +31,16 @@ bool IsIsolated(const Candidate& c) { return c.record().search.how == "window"; 
 
 bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
   Grounds grounds(w_, terms);
-  std::vector<Candidate*> reach;
+  std::vector<Candidate*> causes, events;
   for (const auto& c : w_.candidates)
-    if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence)) reach.push_back(c.get());
+    if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence))
+      (IsIsolated(*c) ? events : causes).push_back(c.get());
+  // Whatever comes and goes with the motion looks like events, too: they are asked for last.
+  return Best(causes, terms, grounds, out) || Best(events, terms, grounds, out);
+}
+
+bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chosen*>& terms, Grounds& grounds,
+                    Chosen& out) {
   std::vector<Found> ranked = Rank(reach, grounds);
   // A strong effect passes for noise, and under so much noise others look as good. Once it is known what it leaves,
   // those that may be meant are searched again.
@@ -93,7 +100,8 @@ bool Selector::IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>
 double Selector::Standing(const Found& f) const {
   const auto& names = w_.standby;
   const bool compiled_in = std::find(names.begin(), names.end(), f.candidate->record().name) != names.end();
-  return f.score * (f.candidate->is_curve() ? kCurveIsWorth : 1) + (compiled_in ? 1e-3 : 0);  // it wins among equals
+  const double worth = f.candidate->is_curve() ? kCurveIsWorth : 1;
+  return f.score * worth + (compiled_in ? 1e-3 : 0);  // it wins among equals
 }
 
 // A chosen term, or one that is known to look like a chosen one on the same joints: the two together would only fit
@@ -127,7 +135,8 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   (void)grounds.metric().RefittedDeviance(c, &noise);
   const Metric metric(w_.rows, noise);
   const Gain gain = metric.Try(c);
-  const VectorXd folds = metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds);
+  const VectorXd folds =
+      metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds, f.precision);
   const bool holds = folds.sum() > kKeepsOutOfFold * gain.gain && (folds.array() > 0).count() >= kFoldsThatImprove;
   if (!holds && !IsIsolated(*f.candidate)) return false;
   if (!StaysAtLowerBandwidth(f, terms, gain.gain, noise)) return false;

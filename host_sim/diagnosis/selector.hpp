@@ -23,6 +23,8 @@ class Selector {
   bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others);
 
  private:
+  // The best of these candidates that can be accepted; false if none can.
+  bool Best(std::vector<Candidate*> reach, const std::vector<const Chosen*>& terms, Grounds& grounds, Chosen& out);
   // The strongest candidates by white score.
   std::vector<Found> Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds);
   void Rescore(const Grounds& grounds, Found& f) const;

@@ -67,7 +67,11 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
       if (p.effect == e.record->name && p.state == "standby") standby.push_back(p.effect);
   for (const auto& c : candidates) needs_flange = needs_flange || c->reads("Y");
   evidence.model = &model;
-  evidence.index.resize(model.joints());
+  IndexRows();
+}
+
+void Diagnosis::Work::IndexRows() {
+  evidence.index.assign(model.joints(), {});
   for (int j = 0; j < model.joints(); ++j)
     for (std::size_t log = 0; log < train.size(); ++log) {
       int previous = -2;
@@ -86,6 +90,7 @@ void Diagnosis::Work::SetDelay(double delay_s) {
   for (const auto* d : logged) delayed.push_back(calibration::Delayed(*d, delay_s));
   for (std::size_t k = 0; k < train.size(); ++k) train[k] = &delayed[k];
   regressor.clear();
+  IndexRows();
   if (narrow) narrow->SetDelay(delay_s);
 }
 

@@ -43,6 +43,7 @@ struct Diagnosis::Work {
   std::vector<NoiseModel> WhiteNoise() const;
   // Reads the logs' motion that much before their torque, from now on.
   void SetDelay(double delay_s);
+  void IndexRows();
   void FillDeclared();
   void MakeCoordinates(int size);
 

@@ -13,7 +13,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 namespace {
-constexpr double kSegment_s = 4;  // a quarter of a hertz a bin
+constexpr double kSegment_s = 8;  // at most; a tone is a hertz or two wide
 constexpr double kAbove = 4;      // times the noise: a bin of noise alone, averaged over ten segments, stays below
 constexpr int kNeighbours = 2;    // bins on either side that must agree
 }  // namespace
@@ -22,9 +22,11 @@ double MotionBand_Hz(const VectorXd& q, double noise, double rate_Hz) {
   const Index segment = static_cast<Index>(std::exp2(std::floor(std::log2(kSegment_s * rate_Hz))));
   if (q.size() < segment + 2) return 0.5 * rate_Hz;
   const VectorXd bend = q.tail(q.size() - 2) - 2 * q.segment(1, q.size() - 2) + q.head(q.size() - 2);
-  const VectorXd window = 0.5 - 0.5 * (2 * std::numbers::pi / static_cast<double>(segment) *
-                                       VectorXd::LinSpaced(segment, 0, static_cast<double>(segment - 1)).array())
-                                          .cos();
+  VectorXd window(segment);  // Blackman and Harris, four terms: what leaks of a tone is 92 dB below it
+  for (Index k = 0; k < segment; ++k) {
+    const double x = 2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(segment);
+    window[k] = 0.35875 - 0.48829 * std::cos(x) + 0.14128 * std::cos(2 * x) - 0.01168 * std::cos(3 * x);
+  }
   Eigen::FFT<double> fft;
   std::vector<double> part(static_cast<std::size_t>(segment));
   std::vector<std::complex<double>> spectrum;

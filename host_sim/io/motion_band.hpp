@@ -6,7 +6,7 @@
 namespace armcal::io {
 
 // The frequency [Hz] above which evenly sampled q shows less power than white noise of this standard deviation would.
-// Welch's periodogram of the second difference, whose range is small enough for a Hann window. 0 if q only holds noise;
+// Welch's periodogram of the second difference. 0 if q only holds noise;
 // half the rate if it is too short to tell.
 double MotionBand_Hz(const Eigen::VectorXd& q, double noise, double rate_Hz);
 

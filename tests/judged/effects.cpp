@@ -21,9 +21,11 @@ using Curve = std::function<ArrayXd(const Motion& m, const MatrixXd& links, int 
 
 std::string Signal(const char* name, int j) { return name + std::to_string(j + 1); }
 
-// An effect on one joint that reads that joint alone.
-void OnJoint(const Arm& arm, plant::Random& random, Effect& e, const Curve& curve) {
-  const int j = static_cast<int>(random.Uniform(0, arm.joints() - 1e-9));
+constexpr int kHeavy = 3;  // joints that carry more than noise
+
+// An effect on one joint (one of the first `joints`) that reads that joint alone.
+void OnJoint(const Arm& arm, plant::Random& random, Effect& e, const Curve& curve, int joints = 0) {
+  const int j = static_cast<int>(random.Uniform(0, (joints ? joints : arm.joints()) - 1e-9));
   e.joint = j + 1, e.seen_on = j;
   for (std::string& s : e.signals)
     s = s.find('(') == s.npos ? s + std::to_string(j + 1) : "sgn(qd" + std::to_string(j + 1) + ")";
@@ -130,11 +132,14 @@ const std::map<std::string, Maker>& Makers() {
       {"load_friction",
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.accept = {"load_friction", "position_friction"}, e.signals = {"load", "sgn(qd)"}, e.held_by_a_record = false;
-         OnJoint(a, r, e, [](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
-           const ArrayXd load = links.col(j);
-           const double preload = 0.1 * load.abs().maxCoeff();
-           return ((load.square() + preload * preload).sqrt() - preload) * S(m, j);
-         });
+         OnJoint(
+             a, r, e,
+             [](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
+               const ArrayXd load = links.col(j);
+               const double preload = 0.1 * load.abs().maxCoeff();
+               return ((load.square() + preload * preload).sqrt() - preload) * S(m, j);
+             },
+             kHeavy);
        }},
       {"temp_viscous",
        [](const Arm& a, plant::Random& r, Effect& e) {
@@ -309,10 +314,10 @@ const std::map<std::string, Maker>& Makers() {
        }},
       {"belt_elasticity",  // the link follows the motor, whose position is logged, through a spring
        [](const Arm& a, plant::Random& r, Effect& e) {
-         const int j = static_cast<int>(r.Uniform(0, 5.999));
+         const int j = static_cast<int>(r.Uniform(0, 2.999));  // those whose motors stand apart
          e.accept = {"belt_elasticity", "time_delay"}, e.joint = j + 1, e.seen_on = j;
          e.signals = {Signal("qdd", j)};
-         const auto softness = e.Strength(1 / std::pow(2 * kPi * 14, 2), 1 / std::pow(2 * kPi * 9.6, 2));  // 1 / w^2
+         const auto softness = e.Strength(1 / std::pow(2 * kPi * 10, 2), 1 / std::pow(2 * kPi * 4.5, 2));  // 1 / w^2
          e.torque = [&a, j, softness](const Motion& m, const MatrixXd& links) {
            Motion moved = m;
            const double h = m.t[1] - m.t[0], w = 1 / std::sqrt(*softness);
@@ -325,10 +330,10 @@ const std::map<std::string, Maker>& Makers() {
       {"torque_saturation",
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.accept = {"torque_saturation", "torque_gain_error", "load_friction"}, e.signals = {"load"};
-         const auto missing = e.Strength(0.3, 0.7);  // share of the largest torque that is cut off
-         OnJoint(a, r, e, [&a, missing](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
+         const auto early = e.Strength(2, 100);  // torque limit over the torque at which the amplifier saturates
+         OnJoint(a, r, e, [&a, early](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
            const ArrayXd tau = links.col(j).array() + a.coulomb[j] * S(m, j) + a.viscous[j] * V(m, j);
-           const double edge = (1 - *missing) * tau.abs().maxCoeff();
+           const double edge = a.torque_limit[j] / *early;
            return tau.max(-edge).min(edge) - tau;
          });
        }},
@@ -428,10 +433,13 @@ Effect DrawUnknown(const Arm& arm, plant::Random& random) {
     }
     case 3:  // a gear that loses more beyond a load
       e.signals = {"load"};
-      OnJoint(arm, random, e, [place](const Motion&, const MatrixXd& links, int j) -> ArrayXd {
-        const ArrayXd u = links.col(j).array() / links.col(j).cwiseAbs().maxCoeff();
-        return (u.abs() - place).max(0) * u;
-      });
+      OnJoint(
+          arm, random, e,
+          [place](const Motion&, const MatrixXd& links, int j) -> ArrayXd {
+            const ArrayXd u = links.col(j).array() / links.col(j).cwiseAbs().maxCoeff();
+            return (u.abs() - place).max(0) * u;
+          },
+          kHeavy);
       break;
     default:  // a detent: sharp steps of position
       e.signals = {"q"};

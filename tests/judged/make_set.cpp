@@ -24,8 +24,10 @@ using nlohmann::json;
 
 constexpr double kRate_Hz = 250, kTrain_s = 40, kTest_s = 30, kIgnored_s = 0.5;
 constexpr int kTestDraws = 40;  // of which the one that stays nearest to what training shows is taken
-constexpr int kStrengths = 6;   // tried, where an effect's size is not proportional to its strength
-constexpr int kThin = 10;       // every tenth sample decides what the declared model absorbs
+constexpr double kSizeError = 0.05;
+constexpr int kStrengths = 16;     // tried, where an effect's size is not proportional to its strength
+constexpr double kSmallest = 0.1;  // size of an effect over the noise
+constexpr int kThin = 10;          // every tenth sample decides what the declared model absorbs
 
 struct Case {
   std::string name, noise_class = "white";
@@ -139,11 +141,8 @@ Motion DrawTest(const Arm& arm, const Motion& train, Random& random) {
   return best;
 }
 
-void MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& random) {
-  const fs::path home = folder / c.name;
-  fs::create_directories(home);
-  fs::create_directories(folder / "robots");
-  Write(folder / "robots" / (arm.name + ".json"), RobotJson(arm));
+// False, and nothing is written, if an effect stays below the smallest size at its largest strength.
+bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& random) {
   const Motion train = DrawMotion(arm, kTrain_s, kRate_Hz, random);
   const Motion motion[] = {train, DrawTest(arm, train, random)};
   const VectorXd sigma = arm.sigma_Nm * (c.noise_class == "quiet" ? 0.1 : 1.0);
@@ -160,11 +159,14 @@ void MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
       seen = Visible(arm, motion[0], effect.torque(motion[0], links[0]), sigma, random);
       return one_joint ? seen[effect.seen_on] : seen.maxCoeff();
     };
-    double found = size();
-    for (int k = 0; effect.strength && k < kStrengths; ++k) {
-      *effect.strength = std::min(effect.most, *effect.strength * std::clamp(c.size[e] / found, 0.3, 3.0));
+    double found = size(), low = 0, high = effect.most;
+    for (int k = 0; effect.strength && k < kStrengths && std::abs(found / c.size[e] - 1) > kSizeError; ++k) {
+      double& strength = *effect.strength;
+      (found < c.size[e] ? low : high) = strength;
+      strength = low == 0 ? 0.5 * strength : high == effect.most ? std::min(2 * strength, high) : std::sqrt(low * high);
       found = size();
     }
+    if (effect.strength && found < 0.95 * kSmallest) return false;
     gain.push_back(effect.strength ? 1 : c.size[e] / found);
     temperature = temperature || effect.needs_temperature;
     const VectorXd ratio = gain.back() * seen;
@@ -177,6 +179,10 @@ void MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
                        {"size", gain.back() * found},
                        {"visible_ratio", std::vector<double>(ratio.begin(), ratio.end())}});
   }
+  const fs::path home = folder / c.name;
+  fs::create_directories(home);
+  fs::create_directories(folder / "robots");
+  Write(folder / "robots" / (arm.name + ".json"), RobotJson(arm));
   std::vector<double> floor;
   VectorXd derived_floor;
   const char* const file[] = {"train.csv.gz", "test.csv.gz"};
@@ -211,10 +217,11 @@ void MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
                                {"rotor_inertia", true},
                                {"coulomb_smoothing_velocity", 0.005}}},
                              {"files", {{"train", file[0]}, {"test", file[1]}}}});
+  return true;
 }
 
 // Sizes 0.1 to 2 x noise, evenly on a logarithmic scale.
-double DrawSize(Random& random) { return 0.1 * std::pow(20, random.Uniform(0, 1)); }
+double DrawSize(Random& random) { return kSmallest * std::pow(20, random.Uniform(0, 1)); }
 
 Case DrawCase(const std::string& what, int number, const Arm& arm, Random& random) {
   Case c;
@@ -225,7 +232,7 @@ Case DrawCase(const std::string& what, int number, const Arm& arm, Random& rando
   const auto kind = [&](int k) { return kinds[static_cast<std::size_t>(k) % kinds.size()]; };
   if (what == "singles" || what == "detection") {
     c.effects = {DrawEffect(kind(number), arm, random)};
-    c.size = {what == "detection" ? 0.1 : DrawSize(random)};
+    c.size = {what == "detection" ? kSmallest : DrawSize(random)};
   } else if (what == "unknowns") {
     c.effects = {DrawUnknown(arm, random)};
     c.size = {0.3 * std::pow(6, random.Uniform(0, 1))};
@@ -251,8 +258,10 @@ int main(int argc, char** argv) try {
   for (int k = 0; k < std::stoi(argv[4]); ++k) {
     Random random(1000003ULL * std::stoull(argv[2]) + 7919ULL * static_cast<unsigned>(k) +
                   std::hash<std::string>{}(what));
-    const Arm arm = DrawArm(random, 0.15);
-    MakeCase(argv[1], DrawCase(what, k, arm, random), arm, random);
+    for (bool made = false; !made;) {
+      const Arm arm = DrawArm(random, 0.15);
+      made = MakeCase(argv[1], DrawCase(what, k, arm, random), arm, random);
+    }
   }
   return 0;
 } catch (const std::exception& e) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <numbers>
 
 #include "host_sim/diagnosis/diagnose.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
@@ -38,6 +39,14 @@ Effect LoadFriction(int joint, double mu) {
   };
 }
 
+// What no record holds: a speed at which something rings.
+Effect Resonance(int joint, double size_Nm) {
+  return [=](const State& s) {
+    const double off = (std::abs(s.qd) - 0.8) / 0.12;
+    return s.joint == joint - 1 ? size_Nm * std::exp(-off * off) * Sign(s.qd) : 0;
+  };
+}
+
 codegen::Robot TwoLink() { return codegen::ReadRobot("codegen/robots/two_link.toml"); }
 
 struct Case {
@@ -45,8 +54,10 @@ struct Case {
   Dataset train, test;
   std::unique_ptr<Diagnosis> diagnosis;
 
-  Case(const Effect& effect, std::uint64_t seed)
+  // change: what happens to a log beside the effect.
+  Case(const Effect& effect, std::uint64_t seed, const std::function<void(Dataset&)>& change = {})
       : arm(TwoLink(), seed), train(arm.Run(20, 10 * seed, effect)), test(arm.Run(20, 10 * seed + 1, effect)) {
+    if (change) change(train), change(test);
     diagnosis = std::make_unique<Diagnosis>(arm.model(), tests::Records(), std::vector<const Dataset*>{&train});
   }
   const Finding& finding() const { return diagnosis->finding(); }
@@ -99,6 +110,63 @@ TEST(Diagnosis, FrictionThatGrowsWithTheLoad_IsNamedAtItsJoint) {
   Case c(LoadFriction(1, 0.06), 4);
   EXPECT_TRUE(c.Names("load_friction", 1)) << c.Said();
   EXPECT_LT(c.After(1), 1.10 * c.arm.noise_Nm(0));
+}
+
+TEST(Diagnosis, WhatNoRecordHolds_IsUnknownAtItsJointAndSignal_AndTheErrorFalls) {
+  Case c(Resonance(2, 0.5), 7);
+  ASSERT_FALSE(c.finding().terms.empty());
+  const Term& t = c.finding().terms[0];
+  EXPECT_EQ(t.record->kind, "unknown") << c.Said();
+  EXPECT_EQ(t.record->signals[0], "qd");
+  EXPECT_EQ(t.joints, std::vector<int>{1});
+  EXPECT_LT(c.After(2), 1.10 * c.arm.noise_Nm(1));
+}
+
+TEST(Diagnosis, ContactsAtTwoTimes_AreOneTermWithTheirTimes) {
+  const double begin[] = {5.2, 13.1}, length = 0.4;
+  Case c({}, 8, [&](Dataset& d) {
+    for (int k = 0; k < d.samples(); ++k)
+      for (const double from : begin)
+        if (const double u = (d.s.t[k] - from) / length; u > 0 && u < 1)
+          d.tau(k, 1) += 1.5 * std::sin(std::numbers::pi * u);  // N m, fourteen times the noise
+  });
+  ASSERT_EQ(c.finding().terms.size(), 1u) << c.Said();
+  const Term& t = c.finding().terms[0];
+  EXPECT_EQ(t.record->name, "external_contact");
+  EXPECT_EQ(t.joints, std::vector<int>{1});
+  ASSERT_EQ(t.eta.size(), 4u);  // on, off of each
+  std::vector<double> middle{(t.eta[0] + t.eta[1]) / 2, (t.eta[2] + t.eta[3]) / 2};
+  std::sort(middle.begin(), middle.end());
+  for (int k = 0; k < 2; ++k) EXPECT_NEAR(middle[k], begin[k] + length / 2, 0.03);  // four samples
+}
+
+TEST(Diagnosis, TorqueThatIsReadLate_IsADelayOfItsLength) {
+  for (const double delay_s : {0.004, -0.012}) {  // half a sample, and one and a half the other way
+    Case c({}, 9, [&](Dataset& d) {
+      const Eigen::MatrixXd tau = d.tau;
+      for (int k = 2; k + 2 < d.samples(); ++k) {
+        const double at = k - delay_s * 125;
+        const int below = static_cast<int>(std::floor(at));
+        d.tau.row(k) = (below + 1 - at) * tau.row(below) + (at - below) * tau.row(below + 1);
+      }
+    });
+    ASSERT_FALSE(c.finding().terms.empty());
+    const Term& t = c.finding().terms[0];
+    EXPECT_EQ(t.record->name, "time_delay") << c.Said();
+    EXPECT_NEAR(t.eta[0], delay_s, 0.0005);
+  }
+}
+
+TEST(Diagnosis, Deviations_CoverTheTruthAsOftenAsTheySay) {
+  int inside = 0, all = 0;
+  for (std::uint64_t seed = 20; seed < 50; ++seed) {
+    Case c(Asymmetry(2, 0.2), seed);
+    if (!c.Names("coulomb_asymmetry", 2)) continue;  // or an offset: the same column while the joint moves
+    const Term& t = c.finding().terms[0];
+    inside += std::abs(t.amplitude[0] - 0.2) < 1.96 * t.sd[0], ++all;
+  }
+  EXPECT_GE(all, 25);
+  EXPECT_GE(inside, 0.80 * all);  // of 30 intervals of 95 %, fewer than 24 hold the truth once in ten thousand sets
 }
 
 TEST(Diagnosis, OrdinaryParameterError_IsNoEffect) {

@@ -1,5 +1,6 @@
 // io tests - derivatives against analytic motion: no fake elasticity, no phase, and the cut-off by its own rule.
 #include "host_sim/io/signals.hpp"
+#include "host_sim/io/motion_band.hpp"
 
 #include <gtest/gtest.h>
 
@@ -164,6 +165,29 @@ TEST(Signals, NoiseOfEncoderAndTorque_AreFoundUnderMotion) {
   const JointNoise noise = EstimateNoise(MakeLog(motion, Uniform(40, 250), step, 3.0), 0);
   EXPECT_NEAR(noise.position_rad, step / std::sqrt(12.0), 0.1 * step);
   EXPECT_NEAR(noise.torque_Nm, 3.0, 0.15);  // 10000 samples: 1 % statistics; 40 kg m^2 x the motion adds the rest
+}
+
+TEST(Signals, MotionBand_EndsWhereTheHighestToneDoes) {
+  const double noise = 5e-6;
+  std::mt19937_64 random(12);
+  std::normal_distribution<double> white(0, noise);
+  for (const double highest_Hz : {2.7, 8.3}) {
+    Log log = MakeLog({{0.3, 1.1, highest_Hz}}, Uniform(60, 250), 1e-9, 3.0);
+    for (double& q : log.q.reshaped()) q += white(random);
+    // segments of 1024 samples: a tone is four bins wide on either side, and two neighbours are averaged
+    EXPECT_NEAR(MotionBand_Hz(log.q.col(0), noise, 250), highest_Hz, 6 * 250.0 / 1024);
+  }
+}
+
+TEST(Signals, CoarseEncoderUnderSlowMotion_IsSmoothedFurther_ButNeverIntoTheMotion) {
+  const JointNoise slow{1, 3.0, 3.0}, fast{1, 3.0, 50};  // noise that calls for the lowest cut-off
+  EXPECT_DOUBLE_EQ(ChooseCutoff_Hz(slow, 40, 250), 4.5);
+  EXPECT_EQ(ChooseCutoff_Hz(fast, 40, 250), 20);
+  // friction's sign: noise of speed stays below a twentieth of the width
+  const JointNoise fine{1e-5, 3.0};
+  const double cutoff_Hz = ChooseCutoff_Hz(fine, 0, 250, 0.01);
+  const double s = 1e-5 * kTau * std::sqrt(2.0 / 250 * 0.2657) * std::pow(cutoff_Hz, 1.5);
+  EXPECT_NEAR(s, 0.05 * 0.01, 1e-9);
 }
 
 TEST(Signals, CutoffScale_ScalesAndChangesNothingElse) {

@@ -3,6 +3,7 @@
 
 #include "host_sim/calibration/table_file.hpp"
 #include "host_sim/cli/identify_method.hpp"
+#include "host_sim/cli/identify_payload.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/io/input_error.hpp"
@@ -16,6 +17,7 @@ struct Options {
   std::vector<std::string> train;
   bool force = false;
   double band_Hz = 0;
+  PayloadOptions payload;
 };
 
 std::string Significant(double v) { return fmt::format("{:.5g}", v); }
@@ -44,6 +46,14 @@ void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
 }
 
 int Run(const Options& o) {
+  if (o.payload.asked()) {
+    if (!o.train.empty() || !o.test.empty() || !o.method.empty())
+      throw io::InputError("--with, --without: expected no --train, --test or --method beside them");
+    PayloadOptions payload = o.payload;
+    payload.robot = o.robot, payload.channels = o.channels, payload.table = o.table, payload.json = o.json;
+    return RunPayload(payload);
+  }
+  if (o.train.empty()) throw io::InputError("--train: expected log(s) to fit");
   if (!o.method.empty()) {
     if (!o.table.empty())
       throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
@@ -104,10 +114,13 @@ int Run(const Options& o) {
 void AddIdentify(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand("identify",
                                   "fit the declared model to logs, weighted, with the prior\nexample: armcal identify "
-                                  "--robot er20_like --train train.csv.gz --test test.csv.gz --table-out table.toml");
+                                  "--robot er20_like --train train.csv.gz --test test.csv.gz --table-out table.toml\n"
+                                  "or find the drives' gains by a known payload, or an unknown payload\nexample: "
+                                  "armcal identify --robot er20_like --with b.csv.gz --without a.csv.gz --payload "
+                                  "known.toml");
   auto o = std::make_shared<Options>();
   verb->add_option("--robot", o->robot, "robot file or name")->required();
-  verb->add_option("--train", o->train, "log(s) to fit")->required();
+  verb->add_option("--train", o->train, "log(s) to fit");
   verb->add_option("--test", o->test, "held-out log: its error is printed, nothing is fitted to it");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
   verb->add_option("--method", o->method,
@@ -118,6 +131,7 @@ void AddIdentify(CLI::App& app, Action& action) {
       "also compare in the band below this frequency (Hz): residual and torque through the same zero-phase filter");
   verb->add_flag("--force", o->force, "let parameters move that the data hardly determine");
   verb->add_option("--json", o->json, "write everything here");
+  AddPayloadOptions(*verb, o->payload);
   verb->callback([o, &action] { action = [o] { return Run(*o); }; });
 }
 

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include "host_sim/calibration/table_file.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 #include "host_sim/cli/identify_method.hpp"
 #include "host_sim/cli/identify_payload.hpp"
 #include "host_sim/cli/logs.hpp"
@@ -33,6 +34,12 @@ nlohmann::ordered_json Columns(const codegen::Model& model, const calibration::F
   return out;
 }
 
+Eigen::VectorXd Unknowns(const codegen::Model& model, const calibration::Fit& fit) {
+  Eigen::VectorXd z(model.columns() + model.nonlinear());
+  z << fit.x.head(model.columns()), Eigen::VectorXd::Map(fit.eta.data(), model.nonlinear());
+  return z;
+}
+
 void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
   report::Table t{{"parameter", "unit", "value", "sd", "posterior / prior", ""}, {}};
   for (const int c : fit.active) {
@@ -54,11 +61,10 @@ int Run(const Options& o) {
     return RunPayload(payload);
   }
   if (o.train.empty()) throw io::InputError("--train: expected log(s) to fit");
-  if (!o.method.empty()) {
-    if (!o.table.empty())
-      throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
-    return RunMethod({o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz});
-  }
+  if (!o.method.empty() && !o.table.empty())
+    throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
+  MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, {}};
+  if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
   const LogReader read(model, o.channels);
   std::vector<calibration::Dataset> train = read.All(o.train);
@@ -68,6 +74,13 @@ int Run(const Options& o) {
   for (int j = 0; j < model.joints(); ++j) {
     json["sigma_Nm"].push_back(all.sigma[j]);
     json["torque_gain"].push_back(1 + all.x[model.columns() + j]);
+  }
+  const calibration::Exogeneity exogeneity = CheckExogeneity(model, read, o.train, train, Unknowns(model, all));
+  fmt::print("{}", ExogeneityText(exogeneity));
+  json["exogeneity"] = ToJson(exogeneity);
+  if (o.method == "auto" && !exogeneity.passed() && exogeneity.instruments == kSimulatedLoop) {
+    method.method = "instrumental_variable", method.exogeneity = json["exogeneity"];
+    return RunMethod(method);
   }
   calibration::Fit used = all;
   Eigen::VectorXd x = all.x;
@@ -123,8 +136,10 @@ void AddIdentify(CLI::App& app, Action& action) {
   verb->add_option("--train", o->train, "log(s) to fit");
   verb->add_option("--test", o->test, "held-out log: its error is printed, nothing is fitted to it");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
-  verb->add_option("--method", o->method,
-                   "another method than the weighted fit with prior: a name of the survey's, see docs");
+  verb->add_option(
+      "--method", o->method,
+      "another method than the weighted fit with prior: a name of the survey's, see docs; auto: instrumental "
+      "variables where the regressors are not free of the torque's error and the control law is known");
   verb->add_option("--table-out", o->table, "parameter table to write");
   verb->add_option(
       "--band", o->band_Hz,

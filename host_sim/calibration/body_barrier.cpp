@@ -55,6 +55,24 @@ class Barrier {
   const MatrixXd& information_;
 };
 
+// Newton's steps, halved until they gain, at one weight of the barrier.
+void Descend(const Barrier& barrier, double eps, VectorXd& p) {
+  VectorXd gradient;
+  MatrixXd hessian;
+  for (int k = 0; k < 100; ++k) {
+    barrier.Derivatives(p, eps, gradient, hessian);
+    const VectorXd step = -hessian.ldlt().solve(gradient);
+    const double decrease = -gradient.dot(step), cost = barrier.Cost(p, eps);
+    int halved = 0;
+    while (halved < 40 &&
+           !(barrier.Cost(p + std::ldexp(1, -halved) * step, eps) < cost - 0.1 * std::ldexp(decrease, -halved)))
+      ++halved;
+    if (halved == 40) return;  // round-off: nothing left to gain
+    p += std::ldexp(1, -halved) * step;
+    if (decrease < 1e-9) return;  // in units of chi^2
+  }
+}
+
 }  // namespace
 
 VectorXd NearestBody(const VectorXd& estimate, const MatrixXd& information) {
@@ -63,21 +81,13 @@ VectorXd NearestBody(const VectorXd& estimate, const MatrixXd& information) {
   p[0] = std::max(std::abs(estimate[0]), 1e-6);
   p[4] = p[7] = p[9] = p[0] * kStartRadius_m * kStartRadius_m;
   const Barrier barrier(estimate, information);
-  VectorXd gradient;
-  MatrixXd hessian;
   // From where the barrier weighs as much as the data down to where it hardly does: Newton's steps stay few all along.
-  for (double eps = std::max(1.0, barrier.Cost(p, 0)), last = 1; last > kWeight;
-       last = eps, eps = std::max(kWeight, 0.2 * eps))
-    for (int k = 0; k < 100; ++k) {
-      barrier.Derivatives(p, eps, gradient, hessian);
-      const VectorXd step = -hessian.ldlt().solve(gradient);
-      const double decrease = -gradient.dot(step), cost = barrier.Cost(p, eps);
-      double share = 1;
-      while (share > 1e-12 && !(barrier.Cost(p + share * step, eps) < cost - 0.1 * share * decrease)) share /= 2;
-      if (share <= 1e-12) break;  // round-off: nothing left to gain
-      p += share * step;
-      if (decrease < 1e-9) break;  // in units of chi^2
-    }
+  double eps = std::max(1.0, barrier.Cost(p, 0));
+  while (eps > kWeight) {
+    Descend(barrier, eps, p);
+    eps *= 0.2;
+  }
+  Descend(barrier, kWeight, p);
   return p;
 }
 

@@ -113,9 +113,9 @@ JointExogeneity TestJoint(const JointRows& rows) {
   const auto plain = solve(k), augmented = solve(k + q);
   const VectorXd least_squares = plain.solve(y), both = augmented.solve(y);
   const auto free = static_cast<double>(white.rows() - augmented.rank());
-  out.restrictions = static_cast<int>(augmented.rank() - plain.rank());
-  if (out.restrictions <= 0) return out;
   const double remains = (y - white.leftCols(k + q) * both).squaredNorm();
+  if (augmented.rank() <= plain.rank() || remains <= kSingular * kSingular * y.squaredNorm()) return out;  // no error
+  out.restrictions = static_cast<int>(augmented.rank() - plain.rank());
   const double gained = (y - white.leftCols(k) * least_squares).squaredNorm() - remains;
   out.F = std::max(0.0, gained) / out.restrictions / (remains / free);
   out.p = cdf(complement(boost::math::fisher_f(out.restrictions, free), out.F));

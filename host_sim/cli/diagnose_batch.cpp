@@ -2,7 +2,6 @@
 #include "host_sim/cli/diagnose_batch.hpp"
 
 #include <fmt/core.h>
-#include <algorithm>
 #include <map>
 #include <mutex>
 
@@ -97,7 +96,7 @@ std::string Reason(const fs::path& log, int code) {
   return last.starts_with(mark) ? last.substr(mark.size()) : fmt::format("ended with code {}", code);
 }
 
-Verdict Diagnose(const Case& c, const DiagnoseOptions& one, const fs::path& out) {
+nlohmann::ordered_json Diagnose(const Case& c, const DiagnoseOptions& one, const fs::path& out) {
   const auto file = [&](const char* end) { return (out / (c.name + end)).string(); };
   for (const char* end : {".json", ".html", ".toml", ".log"}) fs::remove(file(end));
   std::string why = c.train.empty()   ? "no train log"
@@ -125,33 +124,30 @@ Verdict Diagnose(const Case& c, const DiagnoseOptions& one, const fs::path& out)
     why = Reason(file(".log"), code);
   }
   WriteJson(file(".json"), FailedVerdict(why));
-  return {c.name, FailedVerdict(why)};
+  return FailedVerdict(why);
 }
 
-std::vector<Verdict> DiagnoseAll(const std::vector<Case>& cases, const DiagnoseOptions& one,
-                                 const BatchOptions& batch) {
+Verdicts DiagnoseAll(const std::vector<Case>& cases, const DiagnoseOptions& one, const BatchOptions& batch) {
   fs::create_directories(batch.out);
-  std::vector<Verdict> verdicts(cases.size());
+  Verdicts verdicts;
   report::Progress progress(fmt::format("{} logs", cases.size()));
   std::mutex mutex;
-  int done = 0;
   search::InParallel(static_cast<int>(cases.size()), batch.jobs, [&](int k) {
-    const auto i = static_cast<std::size_t>(k);
-    verdicts[i] = Diagnose(cases[i], one, batch.out);
+    const Case& c = cases[static_cast<std::size_t>(k)];
+    const nlohmann::ordered_json verdict = Diagnose(c, one, batch.out);
     const std::lock_guard lock(mutex);
-    progress.Set(static_cast<double>(++done) / static_cast<double>(cases.size()));
+    verdicts[c.name] = verdict;
+    progress.Set(static_cast<double>(verdicts.size()) / static_cast<double>(cases.size()));
   });
   return verdicts;
 }
 
 // Verdicts of other jobs; a log of the batch that has none gets a line that says so.
-std::vector<Verdict> Collect(const BatchOptions& batch, const DiagnoseOptions& one) {
-  std::vector<Verdict> verdicts = ReadVerdicts(batch.summary);
+Verdicts Collect(const BatchOptions& batch, const DiagnoseOptions& one) {
+  Verdicts verdicts = ReadVerdicts(batch.summary);
   if (!batch.folder.empty())
     for (const Case& c : FindCases(batch.folder, one.robot))
-      if (std::none_of(verdicts.begin(), verdicts.end(), [&](const Verdict& v) { return v.name == c.name; }))
-        verdicts.push_back({c.name, FailedVerdict("no verdict: its job has not ended")});
-  std::sort(verdicts.begin(), verdicts.end(), [](const Verdict& a, const Verdict& b) { return a.name < b.name; });
+      verdicts.emplace(c.name, FailedVerdict("no verdict: its job has not ended"));
   if (verdicts.empty()) throw io::InputError("--summary: expected files that armcal diagnose --json wrote");
   return verdicts;
 }
@@ -180,9 +176,9 @@ void AddBatchOptions(CLI::App& verb, BatchOptions& b) {
 
 int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch) {
   Check(one, batch);
-  const std::vector<Verdict> verdicts =
-      batch.summary.empty() ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part), one, batch)
-                            : Collect(batch, one);
+  const Verdicts verdicts = batch.summary.empty()
+                                ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part), one, batch)
+                                : Collect(batch, one);
   const nlohmann::ordered_json summary = SummaryJson(verdicts);
   fmt::print("{}", SummaryText(summary));
   WriteJson(one.json, summary);

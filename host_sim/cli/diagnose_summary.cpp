@@ -3,7 +3,6 @@
 
 #include <fmt/core.h>
 #include <algorithm>
-#include <map>
 
 #include "host_sim/io/files.hpp"
 #include "host_sim/io/input_error.hpp"
@@ -72,17 +71,17 @@ std::string Headline(const ordered_json& s) {
 
 ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed"}, {"error", why}}; }
 
-Verdict ReadVerdict(const fs::path& path) {
-  const ordered_json j = ordered_json::parse(io::ReadWholeFile(path), nullptr, false);
-  return {path.stem().string(), IsVerdict(j) ? j : FailedVerdict(path.filename().string() + " holds no verdict")};
+ordered_json ReadVerdict(const fs::path& path) {
+  ordered_json j = ordered_json::parse(io::ReadWholeFile(path), nullptr, false);
+  return IsVerdict(j) ? j : FailedVerdict(path.filename().string() + " holds no verdict");
 }
 
-std::vector<Verdict> ReadVerdicts(const std::vector<std::string>& paths) {
-  std::map<std::string, Verdict> by_name;
+Verdicts ReadVerdicts(const std::vector<std::string>& paths) {
+  Verdicts out;
   const auto add = [&](const fs::path& path) {
-    Verdict v = ReadVerdict(path);
-    if (!by_name.emplace(v.name, v).second)
-      throw io::InputError(path.string() + ": expected one verdict of the name " + v.name);
+    const std::string name = path.stem().string();
+    if (!out.emplace(name, ReadVerdict(path)).second)
+      throw io::InputError(path.string() + ": expected one verdict of the name " + name);
   };
   for (const std::string& p : paths) {
     if (!fs::is_directory(p)) {
@@ -92,33 +91,31 @@ std::vector<Verdict> ReadVerdicts(const std::vector<std::string>& paths) {
     for (const auto& e : fs::directory_iterator(p))
       if (e.path().extension() == ".json") add(e.path());
   }
-  std::vector<Verdict> out;
-  for (auto& [name, v] : by_name) out.push_back(std::move(v));
   return out;
 }
 
-ordered_json SummaryJson(const std::vector<Verdict>& verdicts) {
+ordered_json SummaryJson(const Verdicts& verdicts) {
   ordered_json s{{"effect", 0}, {"none", 0}, {"failed", 0}, {"findings", ordered_json::array()}};
   s["verdicts"] = ordered_json::array();
   std::map<std::pair<std::string, std::string>, ordered_json> findings;  // by kind and joint
-  for (const Verdict& v : verdicts) {
-    const std::string verdict = v.json["verdict"];
+  for (const auto& [name, v] : verdicts) {
+    const std::string verdict = v["verdict"];
     s[verdict] = s[verdict].get<int>() + 1;
-    ordered_json row{{"name", v.name}, {"verdict", verdict}};
-    if (v.failed()) {
-      row["error"] = v.json["error"];
+    ordered_json row{{"name", name}, {"verdict", verdict}};
+    if (verdict == "failed") {
+      row["error"] = v["error"];
       s["verdicts"].push_back(row);
       continue;
     }
     row["terms"] = ordered_json::array();
-    for (const auto& t : v.json["terms"]) {
+    for (const auto& t : v["terms"]) {
       if (!t.value("confirmed", true)) continue;
       row["terms"].push_back({{"kind", t["kind"]}, {"joint", t["joint"]}, {"parameters", t["parameters"]}});
       ordered_json& f = findings[{t["kind"].get<std::string>(), JointText(t["joint"])}];
       if (f.is_null()) f = {{"kind", t["kind"]}, {"joint", t["joint"]}, {"logs", ordered_json::array()}};
-      f["logs"].push_back(v.name);
+      f["logs"].push_back(name);
     }
-    row["before_moving"] = v.json["before_moving"], row["after_moving"] = v.json["after_moving"];
+    row["before_moving"] = v["before_moving"], row["after_moving"] = v["after_moving"];
     s["verdicts"].push_back(row);
   }
   std::vector<ordered_json> sorted;

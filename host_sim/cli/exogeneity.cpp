@@ -62,7 +62,7 @@ std::string ExogeneityText(const Exogeneity& e) {
   std::string joints;
   for (std::size_t j = 0; j < e.joint.size(); ++j)
     if (!e.joint[j].exogenous)
-      joints += fmt::format("{}joint {} (p {:.1g}, bias {:.2g} of {:.2g} N m left)", joints.empty() ? "" : ", ", j + 1,
+      joints += fmt::format("{}joint {} (p {:.1g}, bias {:.2g} of {:.2g} left)", joints.empty() ? "" : ", ", j + 1,
                             e.joint[j].p, e.joint[j].bias_Nm, e.joint[j].left_Nm);
   return text + "NO, " + joints + "\n  least squares is biased there: --method " +
          (e.instruments == kSimulatedLoop ? "instrumental_variable" : "fourier_fit for periodic motion") +

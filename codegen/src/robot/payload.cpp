@@ -2,6 +2,7 @@
 #include "codegen/src/robot/payload.hpp"
 
 #include "codegen/src/robot/frames.hpp"
+#include "codegen/src/robot/toml_reader.hpp"
 
 namespace armcal::codegen {
 namespace {

@@ -7,14 +7,17 @@
 // The same table at the end of a robot file makes the last link carry it.
 #pragma once
 
+#include <array>
+#include <filesystem>
 #include <optional>
 
 #include <Eigen/Geometry>
 
 #include "codegen/src/robot/robot.hpp"
-#include "codegen/src/robot/toml_reader.hpp"
 
 namespace armcal::codegen {
+
+class TomlReader;
 
 struct Payload {
   double mass_kg = 0;

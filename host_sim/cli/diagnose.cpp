@@ -3,10 +3,12 @@
 #include <chrono>
 
 #include "codegen/src/generator/emit.hpp"
+#include "host_sim/cli/diagnose_batch.hpp"
 #include "host_sim/cli/diagnosis_report.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/io/files.hpp"
+#include "host_sim/io/input_error.hpp"
 #include "host_sim/report/table.hpp"
 
 namespace armcal::cli {
@@ -72,6 +74,8 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
 namespace {
 
 int Run(const DiagnoseOptions& o) {
+  if (o.robot.empty() || o.train.empty() || o.test.empty())
+    throw io::InputError("expected --robot, --train and --test, or --batch, or --summary");
   const auto run = RunDiagnosis(o);
   if (!o.report.empty()) {
     report::Page page("What the model of " + run->model->robot().name + " lacks",
@@ -94,16 +98,21 @@ void AddDiagnose(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand(
       "diagnose",
       "find what the model lacks: residual, cause, new model, error before and after\nexample: armcal diagnose --robot "
-      "er20_like --train train.csv.gz --test test.csv.gz --json out.json --report out.html --model-out new.toml");
+      "er20_like --train train.csv.gz --test test.csv.gz --json out.json --report out.html --model-out new.toml\n"
+      "example, many logs: armcal diagnose --batch logs --robot er20_like --out verdicts --json all.json --report "
+      "all.html");
   auto o = std::make_shared<DiagnoseOptions>();
-  verb->add_option("--robot", o->robot, "robot file or name")->required();
-  verb->add_option("--train", o->train, "log(s) on which everything is decided")->required();
-  verb->add_option("--test", o->test, "held-out log: read once, after the model is written")->required();
+  verb->add_option("--robot", o->robot, "robot file or name");
+  verb->add_option("--train", o->train, "log(s) on which everything is decided");
+  verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
   verb->add_option("--json", o->json, "write the verdict here");
   verb->add_option("--report", o->report, "write a self-contained page here");
   verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  auto batch = std::make_shared<BatchOptions>();
+  AddBatchOptions(*verb, *batch);
+  verb->callback(
+      [o, batch, &action] { action = [o, batch] { return batch->asked() ? RunBatch(*o, *batch) : Run(*o); }; });
 }
 
 }  // namespace armcal::cli

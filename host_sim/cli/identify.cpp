@@ -2,7 +2,9 @@
 #include <fmt/core.h>
 
 #include "host_sim/calibration/table_file.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 #include "host_sim/cli/identify_method.hpp"
+#include "host_sim/cli/identify_payload.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/io/input_error.hpp"
@@ -16,6 +18,7 @@ struct Options {
   std::vector<std::string> train;
   bool force = false;
   double band_Hz = 0;
+  PayloadOptions payload;
 };
 
 std::string Significant(double v) { return fmt::format("{:.5g}", v); }
@@ -31,6 +34,12 @@ nlohmann::ordered_json Columns(const codegen::Model& model, const calibration::F
   return out;
 }
 
+Eigen::VectorXd Unknowns(const codegen::Model& model, const calibration::Fit& fit) {
+  Eigen::VectorXd z(model.columns() + model.nonlinear());
+  z << fit.x.head(model.columns()), Eigen::VectorXd::Map(fit.eta.data(), model.nonlinear());
+  return z;
+}
+
 void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
   report::Table t{{"parameter", "unit", "value", "sd", "posterior / prior", ""}, {}};
   for (const int c : fit.active) {
@@ -44,11 +53,18 @@ void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
 }
 
 int Run(const Options& o) {
-  if (!o.method.empty()) {
-    if (!o.table.empty())
-      throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
-    return RunMethod({o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz});
+  if (o.payload.asked()) {
+    if (!o.train.empty() || !o.test.empty() || !o.method.empty())
+      throw io::InputError("--with, --without: expected no --train, --test or --method beside them");
+    PayloadOptions payload = o.payload;
+    payload.robot = o.robot, payload.channels = o.channels, payload.table = o.table, payload.json = o.json;
+    return RunPayload(payload);
   }
+  if (o.train.empty()) throw io::InputError("--train: expected log(s) to fit");
+  if (!o.method.empty() && !o.table.empty())
+    throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
+  MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, {}};
+  if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
   const LogReader read(model, o.channels);
   std::vector<calibration::Dataset> train = read.All(o.train);
@@ -58,6 +74,13 @@ int Run(const Options& o) {
   for (int j = 0; j < model.joints(); ++j) {
     json["sigma_Nm"].push_back(all.sigma[j]);
     json["torque_gain"].push_back(1 + all.x[model.columns() + j]);
+  }
+  const calibration::Exogeneity exogeneity = CheckExogeneity(model, read, o.train, train, Unknowns(model, all));
+  fmt::print("{}", ExogeneityText(exogeneity));
+  json["exogeneity"] = ToJson(exogeneity);
+  if (o.method == "auto" && !exogeneity.passed() && exogeneity.instruments == kSimulatedLoop) {
+    method.method = "instrumental_variable", method.exogeneity = json["exogeneity"];
+    return RunMethod(method);
   }
   calibration::Fit used = all;
   Eigen::VectorXd x = all.x;
@@ -104,20 +127,26 @@ int Run(const Options& o) {
 void AddIdentify(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand("identify",
                                   "fit the declared model to logs, weighted, with the prior\nexample: armcal identify "
-                                  "--robot er20_like --train train.csv.gz --test test.csv.gz --table-out table.toml");
+                                  "--robot er20_like --train train.csv.gz --test test.csv.gz --table-out table.toml\n"
+                                  "or find the drives' gains by a known payload, or an unknown payload\nexample: "
+                                  "armcal identify --robot er20_like --with b.csv.gz --without a.csv.gz --payload "
+                                  "known.toml");
   auto o = std::make_shared<Options>();
   verb->add_option("--robot", o->robot, "robot file or name")->required();
-  verb->add_option("--train", o->train, "log(s) to fit")->required();
+  verb->add_option("--train", o->train, "log(s) to fit");
   verb->add_option("--test", o->test, "held-out log: its error is printed, nothing is fitted to it");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
-  verb->add_option("--method", o->method,
-                   "another method than the weighted fit with prior: a name of the survey's, see docs");
+  verb->add_option(
+      "--method", o->method,
+      "another method than the weighted fit with prior: a name of the survey's, see docs; auto: instrumental "
+      "variables where the regressors are not free of the torque's error and the control law is known");
   verb->add_option("--table-out", o->table, "parameter table to write");
   verb->add_option(
       "--band", o->band_Hz,
       "also compare in the band below this frequency (Hz): residual and torque through the same zero-phase filter");
   verb->add_flag("--force", o->force, "let parameters move that the data hardly determine");
   verb->add_option("--json", o->json, "write everything here");
+  AddPayloadOptions(*verb, o->payload);
   verb->callback([o, &action] { action = [o] { return Run(*o); }; });
 }
 

@@ -76,6 +76,7 @@ int RunMethod(const MethodOptions& o) {
   json["seconds"] = s.seconds, json["memory_bytes"] = s.memory_bytes, json["from_prior"] = s.from_prior;
   json["remark"] = s.remark;
   if (!ranges.empty()) json["ranges"] = ranges;
+  if (!o.exogeneity.is_null()) json["exogeneity"] = o.exogeneity;
   fmt::print("{}{}{}: {} iterations, {}, {:.3f} s, {:.1f} MB, bodies physical: {}{}{}\n", method.title,
              *method.equation ? " " : "", method.equation, s.iterations, s.converged ? "converged" : "NOT converged",
              s.seconds, 1e-6 * static_cast<double>(s.memory_bytes), s.physical ? "yes" : "no",

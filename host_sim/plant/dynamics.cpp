@@ -4,13 +4,6 @@
 namespace armcal::plant {
 namespace {
 
-KDL::RigidBodyInertia ToKdl(const Body& body) {
-  const auto& c = body.center_m;
-  const auto& i = body.inertia_kgm2;
-  return KDL::RigidBodyInertia(body.mass_kg, KDL::Vector(c[0], c[1], c[2]),
-                               KDL::RotationalInertia(i[0], i[3], i[5], i[1], i[2], i[4]));
-}
-
 // Each segment ends in its own link frame (its joint turns about, or slides along, that frame's z axis), so bodies are
 // handed to KDL in the frame in which the robot file gives them.
 KDL::Chain MakeChain(const RobotFile& robot, const std::vector<Body>& bodies,

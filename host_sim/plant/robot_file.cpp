@@ -63,7 +63,24 @@ void ShiftStandardDh(RobotFile& robot) {
   robot.tool_frame = KDL::Frame::DH_Craig1989(a, alpha, 0, 0) * robot.tool_frame;
 }
 
+// The last link and what is clamped to its flange as one body.
+void Carry(RobotFile& robot, const Body& payload) {
+  Body& link = robot.joint.back().body;
+  KDL::RigidBodyInertia both = ToKdl(link) + robot.tool_frame * ToKdl(payload);
+  const KDL::Vector c = both.getCOG();
+  const auto about_centre = both.RefPoint(c).getRotationalInertia();
+  const double* I = about_centre.data;
+  link = {both.getMass(), {c.x(), c.y(), c.z()}, {I[0], I[1], I[2], I[4], I[5], I[8]}};
+}
+
 }  // namespace
+
+KDL::RigidBodyInertia ToKdl(const Body& body) {
+  const auto& c = body.center_m;
+  const auto& i = body.inertia_kgm2;
+  return KDL::RigidBodyInertia(body.mass_kg, KDL::Vector(c[0], c[1], c[2]),
+                               KDL::RotationalInertia(i[0], i[3], i[5], i[1], i[2], i[4]));
+}
 
 RobotFile ReadRobotFile(const std::string& path) {
   const toml::table table = ParseTomlFile(path);
@@ -81,6 +98,7 @@ RobotFile ReadRobotFile(const std::string& path) {
   const std::string dh = keys.Text("dh");
   if (dh != "modified" && dh != "standard") keys.Fail("dh", "\"modified\" or \"standard\"");
   if (dh == "standard") ShiftStandardDh(robot);
+  if (keys.Has("payload")) Carry(robot, ReadBody(keys.Table("payload")));
   const int n = robot.joints();
   robot.coupling = Eigen::MatrixXd::Identity(n, n);
   if (keys.Has("coupling")) {

@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 #include <kdl/frames.hpp>
+#include <kdl/rigidbodyinertia.hpp>
 
 namespace armcal::plant {
 
@@ -20,6 +21,8 @@ struct Body {
   std::array<double, 3> center_m{};
   std::array<double, 6> inertia_kgm2{};
 };
+
+KDL::RigidBodyInertia ToKdl(const Body& body);
 
 // Rotary quantities; for a prismatic joint read m, m/s, N, N s/m, and rad/m for the gear ratio.
 struct JointData {
@@ -48,7 +51,7 @@ struct RobotFile {
 };
 
 // Throws io::InputError (file, key, what was expected); also when bodies or motors are missing, without which there
-// is nothing to simulate.
+// is nothing to simulate. A [payload] table makes the last link carry it.
 RobotFile ReadRobotFile(const std::string& path);
 
 }  // namespace armcal::plant

@@ -3,6 +3,7 @@
 
 #include "codegen/src/robot/frames.hpp"
 #include "codegen/src/robot/joint_reader.hpp"
+#include "codegen/src/robot/payload.hpp"
 #include "codegen/src/robot/urdf.hpp"
 
 namespace armcal::codegen {
@@ -90,9 +91,9 @@ Robot ReadRobot(const std::filesystem::path& path) {
   const toml::table table = ParseToml(path);
   const TomlReader in(table, path.string());
   in.AllowOnly(
-      {"name",           "title",        "source",       "gravity_mps2", "dh",      "sign_law",  "sign_width_radps",
-       "sign_width_mps", "tick_rate_Hz", "sample_ticks", "prior",        "control", "joint",     "effect",
-       "coupling",       "base_frame",   "tool_frame",   "identified",   "urdf",    "parameters"});
+      {"name",           "title",        "source",       "gravity_mps2", "dh",      "sign_law",   "sign_width_radps",
+       "sign_width_mps", "tick_rate_Hz", "sample_ticks", "prior",        "control", "joint",      "effect",
+       "coupling",       "base_frame",   "tool_frame",   "identified",   "urdf",    "parameters", "payload"});
   Robot r;
   r.path = path.string();
   r.name = in.Text("name");
@@ -137,6 +138,13 @@ Robot ReadRobot(const std::filesystem::path& path) {
   if (in.Has("tool_frame")) flange = flange * ReadFrame(in.Table("tool_frame"));
   r.base_xyz_m = Components(base.translation()), r.base_rotation = RowMajor(base.linear());
   r.tool_xyz_m = Components(flange.translation()), r.tool_rotation = RowMajor(flange.linear());
+  if (in.Has("payload")) {
+    if (!r.has_prior) in.Fail("payload", "links with bodies to carry it; prior = \"none\" leaves them out");
+    const TomlReader clamped = in.Table("payload");
+    const Payload payload = ReadPayload(clamped);
+    if (!payload.inertia_kgm2) clamped.Fail("inertia_kgm2", "6 numbers");
+    r.joint.back().link = Carrying(r.joint.back().link, flange, payload);
+  }
   if (in.Has("parameters")) {
     const TomlReader set = in.Table("parameters");
     set.AllowOnly({"set", "prefer", "omit"});

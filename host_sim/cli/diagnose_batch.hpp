@@ -1,0 +1,25 @@
+// cli - armcal diagnose --batch: the logs of many arms; knows how they lie in a folder, no search.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host_sim/cli/diagnosis_report.hpp"
+#include "host_sim/cli/verb.hpp"
+
+namespace armcal::cli {
+
+struct BatchOptions {
+  std::string folder, out, part;
+  std::vector<std::string> summary;
+  int jobs = 0;
+  bool asked() const { return !folder.empty() || !summary.empty(); }
+};
+
+void AddBatchOptions(CLI::App& verb, BatchOptions& options);
+
+// kOk, or kPartial where a log has no verdict; the summary has a line for each such log. Throws io::InputError: an
+// option is missing or in vain, or there is nothing to diagnose.
+int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch);
+
+}  // namespace armcal::cli

@@ -1,0 +1,114 @@
+// end-to-end tests - many logs at once: a folder of small arms, one of them lacking a term, some of them bad.
+#include "host_sim/io/log.hpp"
+#include "tests/e2e/tool.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::tests {
+namespace {
+
+constexpr int kPartial = 6, kBadInput = 2;
+
+void WriteRun(const fs::path& path, SyntheticArm& arm, std::uint64_t seed, const Effect& effect) {
+  const calibration::Dataset d = arm.Run(10, seed, effect);
+  io::Log log;
+  log.joints = d.joints();
+  log.t = d.s.t, log.q = d.s.q, log.tau = d.tau;
+  io::WriteLog(path, log);
+}
+
+// Two good logs as pairs and one as a folder; "offset" lacks a term on joint 2; two that are bad, each in its own way.
+class Batch : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
+    fs::create_directories(logs() / "folder");
+    const auto pair = [&](const std::string& train, const std::string& test, std::uint64_t seed,
+                          const Effect& effect = {}) {
+      SyntheticArm arm(robot, seed);
+      WriteRun(logs() / train, arm, 10 * seed, effect);
+      WriteRun(logs() / test, arm, 10 * seed + 1, effect);
+    };
+    pair("plain.train.csv", "plain.test.csv", 1);
+    pair("offset.train.csv.gz", "offset.test.csv.gz", 2, [](const State& s) { return s.joint == 1 ? 0.8 : 0.0; });
+    pair("folder/train.csv.gz", "folder/test.csv.gz", 3);
+    SyntheticArm arm(robot, 4);
+    WriteRun(logs() / "alone.train.csv", arm, 40, {});
+    std::ofstream(logs() / "words.train.csv") << "t,q1,q2,tau1,tau2\nfast,0,0,0,0\n";
+    std::ofstream(logs() / "words.test.csv") << "t,q1,q2,tau1,tau2\n";
+    std::ofstream(logs() / "notes.txt") << "no log\n";
+  }
+  static fs::path logs() {
+    static const fs::path folder = FreshFolder("batch") / "logs";
+    return folder;
+  }
+  static Outcome Run(std::vector<std::string> words) {
+    words.insert(words.begin(), "diagnose");
+    return Tool(words);
+  }
+  static std::string Path(const std::string& name) { return (logs().parent_path() / name).string(); }
+};
+
+TEST_F(Batch, GivesEveryLogALine_AndABadOneStopsNoOther) {
+  const Outcome o = Run({"--batch", logs().string(), "--robot", "two_link", "--out", Path("verdicts"), "--json",
+                         Path("all.json"), "--report", Path("all.html")});
+  EXPECT_EQ(o.code, kPartial) << o.err << o.out;
+  const nlohmann::json s = ReadJson(Path("all.json"));
+  EXPECT_EQ(s.at("failed"), 2);
+  EXPECT_EQ(s.at("effect").get<int>() + s.at("none").get<int>(), 3);
+  std::vector<std::string> names;
+  for (const auto& v : s.at("verdicts")) names.push_back(v.at("name"));
+  EXPECT_EQ(names, (std::vector<std::string>{"alone", "folder", "offset", "plain", "words"}));
+  EXPECT_EQ(s.at("verdicts")[0].at("error"), "no test log");
+  EXPECT_NE(s.at("verdicts")[4].at("error").get<std::string>().find("words.train.csv"), std::string::npos);
+  EXPECT_EQ(s.at("verdicts")[1].at("verdict"), "none");
+  EXPECT_EQ(s.at("verdicts")[3].at("verdict"), "none");
+  ASSERT_EQ(s.at("findings").size(), 1u) << s.at("findings");
+  EXPECT_EQ(s.at("findings")[0].at("joint"), 2);
+  EXPECT_EQ(s.at("findings")[0].at("logs"), nlohmann::json({"offset"}));
+  for (const std::string& name : names) {
+    EXPECT_NE(o.out.find(name), std::string::npos) << name;
+    EXPECT_NE(ReadText(Path("all.html")).find(name), std::string::npos) << name;
+  }
+  // A log's own verdict is the one that it gets alone.
+  ASSERT_EQ(Run({"--robot", "two_link", "--train", (logs() / "offset.train.csv.gz").string(), "--test",
+                 (logs() / "offset.test.csv.gz").string(), "--json", Path("alone.json")})
+                .code,
+            0);
+  nlohmann::json alone = ReadJson(Path("alone.json")), together = ReadJson(Path("verdicts/offset.json"));
+  for (const char* key : {"terms", "before", "after", "verdict"}) EXPECT_EQ(alone.at(key), together.at(key)) << key;
+
+  // Independent jobs, one at a time: the same verdicts, the same summary.
+  const std::vector<std::string> job{"--batch", logs().string(), "--robot", "two_link",
+                                     "--out",   Path("jobs"),    "--jobs",  "1"};
+  auto part = [&](const std::string& which) {
+    std::vector<std::string> words = job;
+    words.insert(words.end(), {"--part", which});
+    return Run(words);
+  };
+  part("1/2");
+  const std::vector<std::string> merge{"--summary",     Path("jobs"), "--batch",
+                                       logs().string(), "--json",     Path("merged.json")};
+  EXPECT_EQ(Run(merge).code, kPartial);
+  int waiting = 0;
+  const nlohmann::json merged = ReadJson(Path("merged.json"));
+  for (const auto& v : merged.at("verdicts"))
+    waiting += v.value("error", "").starts_with("no verdict");
+  EXPECT_EQ(waiting, 2);  // of the second job's
+  part("2/2");
+  EXPECT_EQ(Run(merge).code, kPartial);
+  EXPECT_EQ(ReadText(Path("merged.json")), ReadText(Path("all.json")));
+}
+
+TEST_F(Batch, OptionsThatMakeNoSense_AreRefused) {
+  const std::string empty = FreshFolder("batch_empty").string();
+  ExpectOneLine(Run({}), kBadInput, "--train");
+  ExpectOneLine(Run({"--batch", empty, "--out", empty}), kBadInput, "NAME.train.csv");
+  ExpectOneLine(Run({"--batch", empty + "/absent", "--out", empty}), kBadInput, "absent");
+  ExpectOneLine(Run({"--batch", logs().string()}), kBadInput, "--out");
+  ExpectOneLine(Run({"--batch", logs().string(), "--out", empty, "--part", "3/2"}), kBadInput, "--part 3/2");
+  ExpectOneLine(Run({"--batch", logs().string(), "--out", empty, "--test", "x.csv"}), kBadInput, "--test");
+  ExpectOneLine(Run({"--summary", empty}), kBadInput, "--summary");
+}
+
+}  // namespace
+}  // namespace armcal::tests

@@ -72,18 +72,19 @@ ArrayXd Bristles(const Motion& m, int j, double length_rad, double power) {
   return z;
 }
 
-// Second-order low-pass of frequency w (rad/s), damping d, by small steps.
-// Before the start u runs as its own mirror image does, until what the beginning rang has died out.
-ArrayXd LowPass(const ArrayXd& u, double step_s, double w, double d) {
+// What a mass does on a spring and a damper whose other end moves as u does; w rad/s, d of the critical damping; small
+// steps. Before the start u runs as its own mirror image does, until what the beginning rang has died out.
+ArrayXd OnSpring(const ArrayXd& u, double step_s, double w, double d) {
   ArrayXd y(u.size());
-  const Index before = std::min(u.size() - 1, static_cast<Index>(8 / (d * w * step_s)));
-  double x = 2 * u[0] - u[before], v = 0;
+  const Index before = std::min(u.size() - 2, static_cast<Index>(8 / (d * w * step_s)));
+  const auto at = [&](Index k) { return k < 0 ? 2 * u[0] - u[-k] : u[k]; };
+  double x = at(-before), v = (at(1 - before) - x) / step_s;
   for (Index k = -before; k < u.size(); ++k) {
-    const double now = k < 0 ? 2 * u[0] - u[-k] : u[k];
+    const double from = at(std::max(-before, k - 1)), rate = (at(k) - from) / step_s;
     constexpr int kParts = 10;
-    for (int i = 0; i < kParts; ++i) {
-      const double h = step_s / kParts;
-      v += h * (w * w * (now - x) - 2 * d * w * v);
+    for (int i = 1; i <= kParts; ++i) {
+      const double h = step_s / kParts, now = from + rate * h * i;
+      v += h * (w * w * (now - x) + 2 * d * w * (rate - v));
       x += h * v;
     }
     if (k >= 0) y[k] = x;
@@ -321,9 +322,9 @@ const std::map<std::string, Maker>& Makers() {
          e.torque = [&a, j, softness](const Motion& m, const MatrixXd& links) {
            Motion moved = m;
            const double h = m.t[1] - m.t[0], w = 1 / std::sqrt(*softness);
-           moved.q.col(j) = LowPass(Q(m, j), h, w, 0.05);
-           moved.qd.col(j) = LowPass(V(m, j), h, w, 0.05);
-           moved.qdd.col(j) = LowPass(m.qdd.col(j), h, w, 0.05);
+           moved.q.col(j) = OnSpring(Q(m, j), h, w, 0.05);
+           moved.qd.col(j) = OnSpring(V(m, j), h, w, 0.05);
+           moved.qdd.col(j) = OnSpring(m.qdd.col(j), h, w, 0.05);
            return MatrixXd(LinkTorque(a, moved) - links);
          };
        }},

@@ -21,6 +21,25 @@ struct Window {
   double gain = 0, on = 0, off = 0;
 };
 
+// Where one of the shapes fits best; dense, used: [samples] residual and whether it counts. tried: places looked at.
+Window Strongest(const std::vector<VectorXd>& shapes, const VectorXd& dense, const VectorXd& used, const VectorXd& time,
+                 double& tried) {
+  const int samples = static_cast<int>(dense.size());
+  const double step_s = (time[samples - 1] - time[0]) / (samples - 1);
+  Window best;
+  tried = 0;
+  for (const VectorXd& shape : shapes) {
+    const int length = static_cast<int>(shape.size()), stride = std::max(1, length / kStepsPerWindow);
+    for (int at = 0; at + length <= samples; at += stride, ++tried) {
+      const auto seen = used.segment(at, length);
+      if (seen.sum() < kSeen * length) continue;
+      const double fit = shape.dot(dense.segment(at, length)), norm = (shape.array().square() * seen.array()).sum();
+      if (fit * fit > best.gain * norm) best = {fit * fit / norm, time[at], time[at] + length * step_s};
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 // Windows [on, off] on a grid of the log's time, not shorter than the record's minimum; then refined.
@@ -81,17 +100,8 @@ void Searcher::Windows() {
     const double noise = g_.metric.noise()[row].innovation, most = kOutlier * noise;
     for (int i = 0; i < index.size(); ++i)
       dense[index.sample[i]] = std::clamp(residual[i], -most, most), used[index.sample[i]] = 1;
-    Window best;
     double tried = 0;
-    for (const VectorXd& shape : shapes) {
-      const int length = static_cast<int>(shape.size()), stride = std::max(1, length / kStepsPerWindow);
-      for (int at = 0; at + length <= samples; at += stride, ++tried) {
-        const auto seen = used.segment(at, length);
-        if (seen.sum() < kSeen * length) continue;
-        const double fit = shape.dot(dense.segment(at, length)), norm = (shape.array().square() * seen.array()).sum();
-        if (fit * fit > best.gain * norm) best = {fit * fit / norm, time[at], time[at] + length * step_s};
-      }
-    }
+    const Window best = Strongest(shapes, dense, used, time, tried);
     Found one = best_;
     one.penalty = PenaltyOf(3, c_, e_), one.tried = tried;
     if (best.gain < -Score(one, 0) * noise * noise) break;

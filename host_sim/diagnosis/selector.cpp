@@ -16,7 +16,7 @@ constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates 
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr int kSharpenings = 3;
 constexpr double kNothing = 10;         // a gain that no score above zero can come from
-constexpr double kCurveIsWorth = 0.9;   // of its score, beside a named cause: forms differ a little from any record
+constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms differ a little from any record
 constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
 
 bool SharesJoint(const Candidate& a, const Candidate& b) {
@@ -51,7 +51,7 @@ bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chose
     ranked = Rank(reach, grounds);
   }
   for (Found& f : ranked) Rescore(grounds, f);
-  std::sort(ranked.begin(), ranked.end(), [this](const Found& a, const Found& b) { return Standing(a) > Standing(b); });
+  Sort(ranked);
   for (std::size_t k = 0; k < ranked.size(); ++k)
     if (ranked[k].score > kAccept && Accept(grounds, terms, ranked, k, out)) return true;
   return false;
@@ -97,11 +97,20 @@ bool Selector::IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>
          !SharesJoint(c, *terms.back()->candidate);
 }
 
-double Selector::Standing(const Found& f) const {
-  const auto& names = w_.standby;
-  const bool compiled_in = std::find(names.begin(), names.end(), f.candidate->record().name) != names.end();
-  const double worth = f.candidate->is_curve() ? kCurveIsWorth : 1;
-  return f.score * worth + (compiled_in ? 1e-3 : 0);  // it wins among equals
+// By score; what is compiled in already wins among equals.
+void Selector::Sort(std::vector<Found>& ranked) const {
+  const auto standing = [this](const Found& f) {
+    const auto& names = w_.standby;
+    return f.score + (std::find(names.begin(), names.end(), f.candidate->record().name) != names.end() ? 1e-3 : 0);
+  };
+  std::sort(ranked.begin(), ranked.end(), [&](const Found& a, const Found& b) { return standing(a) > standing(b); });
+  if (ranked.empty() || !ranked[0].candidate->is_curve()) return;
+  const Found& curve = ranked[0];
+  const auto cause = std::find_if(ranked.begin(), ranked.end(), [&](const Found& f) {
+    return !f.candidate->is_curve() && f.candidate->rows() == curve.candidate->rows() && f.score > kAccept &&
+           f.gain.gain > kCauseExplains * curve.gain.gain;
+  });
+  if (cause != ranked.end()) std::rotate(ranked.begin(), cause, cause + 1);
 }
 
 // A chosen term, or one that is known to look like a chosen one on the same joints: the two together would only fit

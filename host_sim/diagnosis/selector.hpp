@@ -30,8 +30,8 @@ class Selector {
   void Rescore(const Grounds& grounds, Found& f) const;
   bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
-  // What decides between candidates: the score, but a named cause before a curve that only fits somewhat better.
-  double Standing(const Found& f) const;
+  // Best first: by score, but a named cause before a curve that explains little more.
+  void Sort(std::vector<Found>& ranked) const;
   bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, double gain,
                              const std::vector<NoiseModel>& noise);
   bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,

@@ -96,11 +96,13 @@ const std::map<std::string, Maker>& Makers() {
   static const std::map<std::string, Maker> makers = {
       {"coulomb_asymmetry",
        [](const Arm& a, plant::Random& r, Effect& e) {
+         e.factor = "dFc";
          e.accept = {"coulomb_asymmetry", "torque_offset"}, e.signals = {"sgn(qd)"};
          OnJoint(a, r, e, [](const Motion& m, const MatrixXd&, int j) -> ArrayXd { return 0.5 * (1 + S(m, j)); });
        }},
       {"viscous_asymmetry",
        [](const Arm& a, plant::Random& r, Effect& e) {
+         e.factor = "dFv";
          e.signals = {"qd"};
          OnJoint(a, r, e, [](const Motion& m, const MatrixXd&, int j) -> ArrayXd { return V(m, j).max(0); });
        }},
@@ -114,6 +116,7 @@ const std::map<std::string, Maker>& Makers() {
        }},
       {"viscous_quadratic",
        [](const Arm& a, plant::Random& r, Effect& e) {
+         e.factor = "Fv2";
          e.accept = {"viscous_quadratic", "viscous_cubic"}, e.signals = {"qd"};
          OnJoint(a, r, e, [](const Motion& m, const MatrixXd&, int j) -> ArrayXd { return V(m, j) * V(m, j).abs(); });
        }},
@@ -125,6 +128,7 @@ const std::map<std::string, Maker>& Makers() {
        }},
       {"viscous_cuberoot",
        [](const Arm& a, plant::Random& r, Effect& e) {
+         e.factor = "f1";
          e.accept = {"stribeck", "viscous_cuberoot"}, e.signals = {"qd"};
          OnJoint(a, r, e, [](const Motion& m, const MatrixXd&, int j) -> ArrayXd {
            return S(m, j) * V(m, j).abs().pow(1.0 / 3);
@@ -196,6 +200,7 @@ const std::map<std::string, Maker>& Makers() {
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.signals = {"q", "sgn(qd)"};
          const double k = r.Uniform(15, 120), phase = r.Uniform(0, 2 * kPi);
+         e.others = {{"k", k}};
          OnJoint(a, r, e, [k, phase](const Motion& m, const MatrixXd&, int j) -> ArrayXd {
            return (k * Q(m, j) + phase).cos() * S(m, j);
          });
@@ -257,6 +262,7 @@ const std::map<std::string, Maker>& Makers() {
        [](const Arm& a, plant::Random& r, Effect& e) {
          const int j = static_cast<int>(r.Uniform(0, 5.999)), of = (j + 1 + static_cast<int>(r.Uniform(0, 4.999))) % 6;
          const double k = r.Uniform(15, 80), phase = r.Uniform(0, 2 * kPi);
+         e.others = {{"w", k}};
          e.joint = {j + 1, of + 1}, e.seen_on = j, e.signals = {Signal("q", of)};
          (void)a;
          e.torque = [=](const Motion& m, const MatrixXd& links) {
@@ -279,6 +285,7 @@ const std::map<std::string, Maker>& Makers() {
        }},
       {"velocity_product",
        [](const Arm& a, plant::Random& r, Effect& e) {
+         e.factor = "c";
          const int j = static_cast<int>(r.Uniform(0, 4.999));
          e.joint = {j + 1, j + 2}, e.seen_on = j, e.signals = {Signal("qd", j), Signal("qd", j + 1)};
          (void)a;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,6 +19,9 @@ struct Effect {
   bool held_by_a_record = true;              // false: no record has this form exactly
   bool needs_temperature = false, run_state = false;
   int seen_on = 0;  // the joint whose visible part is scaled
+  // Where a record has exactly this form: its parameter that is the factor of this torque, and its other ones.
+  std::string factor;
+  std::map<std::string, double> others;
   // Where a larger effect is not the same torque times a number: what makes it larger, and its largest value.
   std::shared_ptr<double> strength;
   double most = 0;

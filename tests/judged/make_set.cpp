@@ -170,12 +170,16 @@ bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
     gain.push_back(effect.strength ? 1 : c.size[e] / found);
     temperature = temperature || effect.needs_temperature;
     const VectorXd ratio = gain.back() * seen;
+    json parameters = effect.others;
+    if (!effect.factor.empty()) parameters[effect.factor] = gain.back();
+    if (effect.kind == "time_delay") parameters["d"] = *effect.strength;
     effects.push_back({{"kind", effect.kind},
                        {"joint", effect.joint},
                        {"accept_kinds", effect.accept},
                        {"depends_on", effect.signals},
                        {"run_state", effect.run_state},
                        {"held_by_a_record", effect.held_by_a_record},
+                       {"parameters", parameters},
                        {"size", gain.back() * found},
                        {"visible_ratio", std::vector<double>(ratio.begin(), ratio.end())}});
   }

@@ -1,5 +1,6 @@
 // judged set - verdicts against the truth, with intervals; knows no model.
-//   judged_score CASES VERDICTS [OUT.json]: CASES/<case>/truth.json against VERDICTS/<case>.json
+//   judged_score CASES VERDICTS [OUT.json [NAME=PERCENT...]]: CASES/<case>/truth.json against VERDICTS/<case>.json
+// Exit code 1: a case without a verdict, or a share of that name below the percentage.
 #include <fmt/core.h>
 
 #include <cmath>
@@ -57,6 +58,19 @@ struct Share {
 
 using Shares = std::map<std::string, Share>;
 
+// Intervals of 95 % that the verdict gives for parameters which the truth states.
+void Cover(const json& term, const json& effect, Share& share) {
+  if (term.at("kind") != effect.at("kind") || !effect.contains("parameters")) return;
+  for (const auto& [name, value] : effect.at("parameters").items())
+    for (const auto& [said, sd] : term.at("parameter_sd").items()) {
+      const std::string of = said.substr(said.find('.') + 1);  // the name, then the joints
+      if (!of.starts_with(name) || of.substr(name.size()).find_first_not_of("0123456789_") != of.npos) continue;
+      const double error = term.at("parameters").at(said).get<double>() - value.get<double>();
+      share.Add(std::abs(error) < 1.96 * sd.get<double>());
+      break;
+    }
+}
+
 std::string SizeBin(double size) {
   return size < 0.2 ? "size 0.1-0.2" : size < 0.5 ? "size 0.2-0.5" : size < 1 ? "size 0.5-1" : "size 1-2";
 }
@@ -65,6 +79,10 @@ void Judge(const std::string& name, const json& truth, const json& verdict, Shar
   const std::vector<json> terms = Confirmed(verdict);
   const json& effects = truth.at("effects");
   const std::string noise = "noise " + truth.at("noise_class").get<std::string>();
+  for (std::size_t j = 0; j < verdict.at("noise_floor").size(); ++j) {
+    const double ratio = verdict.at("noise_floor")[j].get<double>() / truth.at("test_floor_derived")[j].get<double>();
+    shares["noise floor within 5 %"].Add(std::abs(ratio - 1) < 0.05);
+  }
   if (effects.empty()) {
     shares["controls: silent"].Add(terms.empty());
     shares["controls, " + noise].Add(terms.empty());
@@ -92,6 +110,9 @@ void Judge(const std::string& name, const json& truth, const json& verdict, Shar
           right);
     }
   }
+  for (const json& e : effects)
+    for (const json& t : terms)
+      if (SameJoint(t, e)) Cover(t, e, shares["parameters: 95 % interval holds the truth"]);
   for (std::size_t j = 0; j < verdict.at("after").size() && !detection; ++j) {
     bool affected = false, run_state = false;
     for (const json& e : effects) {
@@ -106,7 +127,7 @@ void Judge(const std::string& name, const json& truth, const json& verdict, Shar
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc < 3 || argc > 4) throw std::runtime_error("usage: judged_score CASES VERDICTS [OUT.json]");
+  if (argc < 3) throw std::runtime_error("usage: judged_score CASES VERDICTS [OUT.json [NAME=PERCENT...]]");
   Shares shares;
   std::vector<double> over, seconds;
   int missing = 0;
@@ -136,12 +157,19 @@ int main(int argc, char** argv) try {
              quantile(over, 0.9), over.size());
   fmt::print("seconds a case: median {:.2f}, longest {:.2f}\n", quantile(seconds, 0.5), quantile(seconds, 1));
   if (missing) fmt::print("{} cases have no verdict: the diagnosis failed on them\n", missing);
-  if (argc == 4) {
+  if (argc >= 4) {
     out["after_over_floor"] = {{"median", quantile(over, 0.5)}, {"p90", quantile(over, 0.9)}, {"joints", over.size()}};
     out["missing"] = missing;
     std::ofstream(argv[3]) << out.dump(1) << "\n";
   }
-  return 0;
+  bool good = missing == 0;
+  for (int k = 4; k < argc; ++k) {
+    const std::string text = argv[k], name = text.substr(0, text.rfind('='));
+    if (100 * shares[name].value() >= std::stod(text.substr(name.size() + 1))) continue;
+    fmt::print("below what is asked for: {}\n", text);
+    good = false;
+  }
+  return good ? 0 : 1;
 } catch (const std::exception& e) {
   fmt::print(stderr, "judged_score: {}\n", e.what());
   return 2;

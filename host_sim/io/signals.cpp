@@ -24,8 +24,9 @@ constexpr double kAboveMotion =
 constexpr double kHighest_Hz = 60;  // above, the current loop no longer follows
 constexpr double kHighestOfRate = 0.4;   // the filter needs room below half the rate
 constexpr double kShareOfJitter = 0.07;  // encoder noise adds 0.25 % to the torque's noise power at this share
-constexpr double kShareOfWidth = 0.05;   // friction is a hundred times the noise, and a slow joint is within the width often
-constexpr double kWideGap = 5;           // sample times over which a spline may still bridge
+constexpr double kShareOfWidth =
+    0.05;                       // friction is a hundred times the noise, and a slow joint is within the width often
+constexpr double kWideGap = 5;  // sample times over which a spline may still bridge
 constexpr double kIrregular = 1e-4;      // time jitter over sample time below which a grid counts as uniform
 constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
 
@@ -54,13 +55,23 @@ double NoiseUnderSmooth(VectorXd x, int order) {
   return Median(std::move(size)) / kNormalMad / std::sqrt(power);
 }
 
-// The smallest change of q that the log shows: the encoder step, when there is one to see.
-double SmallestStep(const VectorXd& q) {
+// The encoder step: the smallest change of q that the log shows, if the other small changes are multiples of it.
+// Without a step to see, the smallest of thousands of changes means nothing.
+double EncoderStep(const VectorXd& q) {
+  constexpr double kSmall = 10, kOff = 0.1, kShare = 0.8;  // steps; of a step; of the small changes
+  constexpr int kFew = 5;
+  const VectorXd change = Difference(q).cwiseAbs();
   double smallest = INFINITY;
-  for (const double change : Difference(q)) {
-    if (change != 0) smallest = std::min(smallest, std::abs(change));
+  for (const double x : change)
+    if (x > 0) smallest = std::min(smallest, x);
+  if (!std::isfinite(smallest)) return 0;
+  int small = 0, multiples = 0;
+  for (const double x : change) {
+    if (x == 0 || x > kSmall * smallest) continue;
+    ++small;
+    multiples += std::abs(x / smallest - std::round(x / smallest)) < kOff;
   }
-  return std::isfinite(smallest) ? smallest : 0;
+  return small >= kFew && multiples >= kShare * small ? smallest : 0;
 }
 
 struct Piece {
@@ -123,7 +134,7 @@ JointNoise EstimateNoise(const Log& log, int joint) {
   const VectorXd tau = log.tau.col(joint).segment(longest.first, longest.count);
   // Orders: q moves smoothly over six samples, torque over two; beyond that the difference shows the noise alone.
   const VectorXd even = OnEvenGrid(t, q);
-  const double noise = std::max(SmallestStep(q) / std::sqrt(12.0), NoiseUnderSmooth(even, 6));
+  const double noise = std::max(EncoderStep(q) / std::sqrt(12.0), NoiseUnderSmooth(even, 6));
   const double rate_Hz = static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]);
   return {noise, NoiseUnderSmooth(tau, 2), MotionBand_Hz(even, noise, rate_Hz)};
 }

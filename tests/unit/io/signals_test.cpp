@@ -167,6 +167,12 @@ TEST(Signals, NoiseOfEncoderAndTorque_AreFoundUnderMotion) {
   EXPECT_NEAR(noise.torque_Nm, 3.0, 0.15);  // 10000 samples: 1 % statistics; 40 kg m^2 x the motion adds the rest
 }
 
+TEST(Signals, PositionWithoutSteps_HasNoneByChance) {
+  // The smallest of 5000 changes is some 1e-6 rad here; the sixth difference of the motion itself is below 1e-9.
+  const JointNoise noise = EstimateNoise(MakeLog({{0.3, 1.1, 2.7}}, Uniform(40, 125), 0, 3.0), 0);
+  EXPECT_LT(noise.position_rad, 1e-8);
+}
+
 TEST(Signals, MotionBand_EndsWhereTheHighestToneDoes) {
   const double noise = 5e-6;
   std::mt19937_64 random(12);

@@ -142,19 +142,21 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
     const calibration::Dataset seen = AsTermsSay(w.chosen, test);
     const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
     out.after = test.tau - calibration::Predict(model_, seen, w.estimate.x, w.declared.eta);
+    // Run states are followed in what is left once everything else has been taken off.
+    std::vector<std::pair<const Chosen*, std::size_t>> run_states;
     std::size_t k = 0;
     for (const Chosen& c : w.chosen) {
       if (!c.confirmed) continue;
-      const VectorXd& amplitude = w.estimate.amplitude[k++];
+      const std::size_t at = k++;
       if (OfTrainingOnly(*c.candidate)) continue;
-      if (c.candidate->record().kind_class == "run_state") {
-        const auto& t = w.train[0]->s.t;
-        const RunState state = MakeRunState(*c.candidate, c.eta, amplitude, t[t.size() - 1] - t[0]);
-        out.after -= Track(state, q, out.after, w.estimate.sigma);
-        out.tracking = "run states followed one step ahead; delay one sample";
-      } else {
-        out.after -= CandidateTorque(*c.candidate, q, c.eta, amplitude);
-      }
+      if (c.candidate->record().kind_class == "run_state") run_states.emplace_back(&c, at);
+      else out.after -= CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[at]);
+    }
+    for (const auto& [c, at] : run_states) {
+      const auto& t = w.train[0]->s.t;
+      const RunState state = MakeRunState(*c->candidate, c->eta, w.estimate.amplitude[at], t[t.size() - 1] - t[0]);
+      out.after -= Track(state, q, out.after, w.estimate.sigma);
+      out.tracking = "run states followed one step ahead; delay one sample";
     }
     const VectorXd after = calibration::Rms(test, out.after, true);
     Chosen* refuted = nullptr;

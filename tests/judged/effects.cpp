@@ -92,6 +92,14 @@ ArrayXd OnSpring(const ArrayXd& u, double step_s, double w, double d) {
   return y;
 }
 
+// A joint's largest load on the first motion that is asked for, the training's: a property of the gear from then on.
+std::function<double(const ArrayXd& load)> LargestLoad() {
+  return [most = std::make_shared<double>(0)](const ArrayXd& load) {
+    if (*most == 0) *most = load.abs().maxCoeff();
+    return *most;
+  };
+}
+
 const std::map<std::string, Maker>& Makers() {
   static const std::map<std::string, Maker> makers = {
       {"coulomb_asymmetry",
@@ -139,9 +147,9 @@ const std::map<std::string, Maker>& Makers() {
          e.accept = {"load_friction", "position_friction"}, e.signals = {"load", "sgn(qd)"}, e.held_by_a_record = false;
          OnJoint(
              a, r, e,
-             [](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
+             [largest = LargestLoad()](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
                const ArrayXd load = links.col(j);
-               const double preload = 0.1 * load.abs().maxCoeff();
+               const double preload = 0.1 * largest(load);
                return ((load.square() + preload * preload).sqrt() - preload) * S(m, j);
              },
              kHeavy);
@@ -325,13 +333,14 @@ const std::map<std::string, Maker>& Makers() {
          const int j = static_cast<int>(r.Uniform(0, 2.999));  // those whose motors stand apart
          e.accept = {"belt_elasticity", "time_delay"}, e.joint = j + 1, e.seen_on = j;
          e.signals = {Signal("qdd", j)};
+         const double damping = r.Uniform(0.02, 0.1);
          const auto softness = e.Strength(1 / std::pow(2 * kPi * 10, 2), 1 / std::pow(2 * kPi * 4.5, 2));  // 1 / w^2
-         e.torque = [&a, j, softness](const Motion& m, const MatrixXd& links) {
+         e.torque = [&a, j, softness, damping](const Motion& m, const MatrixXd& links) {
            Motion moved = m;
            const double h = m.t[1] - m.t[0], w = 1 / std::sqrt(*softness);
-           moved.q.col(j) = OnSpring(Q(m, j), h, w, 0.05);
-           moved.qd.col(j) = OnSpring(V(m, j), h, w, 0.05);
-           moved.qdd.col(j) = OnSpring(m.qdd.col(j), h, w, 0.05);
+           moved.q.col(j) = OnSpring(Q(m, j), h, w, damping);
+           moved.qd.col(j) = OnSpring(V(m, j), h, w, damping);
+           moved.qdd.col(j) = OnSpring(m.qdd.col(j), h, w, damping);
            return MatrixXd(LinkTorque(a, moved) - links);
          };
        }},
@@ -443,8 +452,8 @@ Effect DrawUnknown(const Arm& arm, plant::Random& random) {
       e.signals = {"load"};
       OnJoint(
           arm, random, e,
-          [place](const Motion&, const MatrixXd& links, int j) -> ArrayXd {
-            const ArrayXd u = links.col(j).array() / links.col(j).cwiseAbs().maxCoeff();
+          [place, largest = LargestLoad()](const Motion&, const MatrixXd& links, int j) -> ArrayXd {
+            const ArrayXd u = links.col(j).array() / largest(links.col(j));
             return (u.abs() - place).max(0) * u;
           },
           kHeavy);

@@ -42,15 +42,19 @@ Expr Lowpass(Graph& g, const std::vector<Expr>& a) {
   return step(g.State(StateName("lowpass", a), a[0], step));
 }
 
-// y'' = w0^2 (x - y) - 2 zeta w0 y', x held: the exact solution after dt.
-Expr Lowpass2(Graph& g, const std::vector<Expr>& a) {
+// A mass that follows x on a spring and a damper: y'' = w0^2 (x - y) + 2 zeta w0 (x' - y'), x straight between samples
+// (held, it would lead by half of dt): the exact solution after dt.
+Expr Spring(Graph& g, const std::vector<Expr>& a) {
   const Expr x = a[0], w0 = a[1], zeta = a[2], dt = g.Input("dt");
   const Expr damped = w0 * g.Unary(Op::kSqrt, g.Constant(1) - zeta * zeta), angle = damped * dt;
   const Expr decay = g.Unary(Op::kExp, -(zeta * w0 * dt));
   const Expr c = decay * g.Unary(Op::kCos, angle), s = decay * g.Unary(Op::kSin, angle) / damped;
-  const std::string name = StateName("lowpass2", a), rate_name = StateName("lowpass2", a, 1);
-  const auto position = [&](Expr y, Expr rate) { return x + (y - x) * (c + zeta * w0 * s) + rate * s; };
-  const auto speed = [&](Expr y, Expr rate) { return rate * (c - zeta * w0 * s) - (y - x) * (w0 * w0) * s; };
+  const Expr from = Previous(g, {x}), slope = (x - from) / dt;
+  const auto position = [&](Expr y, Expr rate) { return x + (y - from) * (c + zeta * w0 * s) + (rate - slope) * s; };
+  const auto speed = [&](Expr y, Expr rate) {
+    return slope + (rate - slope) * (c - zeta * w0 * s) - (y - from) * (w0 * w0) * s;
+  };
+  const std::string name = StateName("spring", a), rate_name = StateName("spring", a, 1);
   const Expr y = g.State(name, x, [&](Expr value) {
     const Expr rate = g.State(rate_name, g.Constant(0), [&](Expr r) { return speed(value, r); });
     return position(value, rate);
@@ -206,7 +210,7 @@ class Parser {
     }
     if (name == "previous") return need(1), Previous(g_, a);
     if (name == "lowpass") return need(2), Lowpass(g_, a);
-    if (name == "lowpass2") return need(3), Lowpass2(g_, a);
+    if (name == "spring") return need(3), Spring(g_, a);
     if (name == "play") return need(2), Play(g_, a);
     if (name == "delay") {
       need(3);

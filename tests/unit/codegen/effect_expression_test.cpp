@@ -139,13 +139,14 @@ TEST(Memory, Lowpass_HalvesTheDistanceEveryHalfLife) {
   }
 }
 
-// A mass on a spring with p as its frequency; undamped it swings about a held input for ever: x0 cos(w t).
-TEST(Memory, Lowpass2_WithoutDamping_KeepsSwinging) {
-  const std::vector<double> step(200, 0.0);
-  std::vector<double> x = step;
-  x[0] = 1;
-  const auto y = RunOver("lowpass2(x, p, 0)", x, 30, 0.01);
-  for (std::size_t k = 0; k < y.size(); ++k) EXPECT_NEAR(y[k], std::cos(30 * 0.01 * static_cast<double>(k)), 1e-11);
+// A mass on a spring with p as its frequency, at rest when the other end starts to move steadily: v t - v / w sin(w t).
+TEST(Memory, Spring_WithoutDamping_KeepsSwingingAboutWhatItFollows) {
+  const double v = 0.7, w = 30, dt = 0.01;
+  std::vector<double> x;
+  for (int k = 0; k < 200; ++k) x.push_back(v * dt * k);
+  const auto y = RunOver("spring(x, p, 0)", x, w, dt);
+  for (std::size_t k = 0; k < y.size(); ++k)
+    EXPECT_NEAR(y[k], x[k] - v / w * std::sin(w * dt * static_cast<double>(k)), 1e-11);
 }
 
 TEST(Memory, Play_FollowsOnceTheGapIsCrossed) {

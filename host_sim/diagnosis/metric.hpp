@@ -82,6 +82,9 @@ class Metric {
   // precision: what is known of C's amplitudes; empty: nothing.
   Eigen::VectorXd OutOfFold(const Columns& c, int blocks, int folds, const Eigen::MatrixXd& precision = {}) const;
 
+  // Share of the trace C a that lies in the fold which holds most of it: near 1, no other fold can tell of it.
+  double LargestFold(const Columns& c, const Eigen::VectorXd& a, int blocks, int folds) const;
+
   // -2 log likelihood (up to a constant) of C's joints with C in the model and their noise fitted anew. If `noise` is
   // given it receives the noise models of all joints, those of C's joints fitted with C in.
   double RefittedDeviance(const Columns& c, std::vector<NoiseModel>* noise = nullptr) const;

@@ -11,6 +11,11 @@ namespace armcal::diagnosis {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+// First row of a block of time among so many rows.
+int BlockBegin(int rows, int blocks, int b) { return static_cast<int>(static_cast<long>(rows) * b / blocks); }
+}  // namespace
+
 VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const MatrixXd& precision) const {
   const int n = rows_.joints(), d = rows_.coordinates(), k = c.count();
   std::vector<MatrixXd> gram(folds, MatrixXd::Zero(d + k, d + k));  // of each fold's own rows
@@ -29,8 +34,7 @@ VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const Matrix
     map[j].bottomRightCorner(extra, extra).setIdentity();
     std::vector<MatrixXd> own(folds, MatrixXd::Zero(r + extra, r + extra));
     for (int b = 0; b < blocks; ++b) {
-      const int begin = static_cast<int>(static_cast<long>(rows) * b / blocks),
-                end = static_cast<int>(static_cast<long>(rows) * (b + 1) / blocks);
+      const int begin = BlockBegin(rows, blocks, b), end = BlockBegin(rows, blocks, b + 1);
       if (begin == end) continue;
       const MatrixXd part = extended[j].middleRows(begin, end - begin);
       own[b % folds] += SelfProduct(part);
@@ -56,6 +60,19 @@ VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const Matrix
     }
   }
   return error;
+}
+
+double Metric::LargestFold(const Columns& c, const VectorXd& a, int blocks, int folds) const {
+  VectorXd own = VectorXd::Zero(folds);
+  for (std::size_t r = 0; r < c.joints.size(); ++r) {
+    const VectorXd trace = WhitenedColumns(c, static_cast<int>(r)) * a;
+    const int rows = static_cast<int>(trace.size());
+    for (int b = 0; b < blocks; ++b) {
+      const int begin = BlockBegin(rows, blocks, b), end = BlockBegin(rows, blocks, b + 1);
+      own[b % folds] += trace.segment(begin, end - begin).squaredNorm();
+    }
+  }
+  return own.maxCoeff() / std::max(own.sum(), 1e-300);
 }
 
 double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_noise) const {

@@ -12,6 +12,7 @@ namespace {
 constexpr int kRescored = 14;  // candidates whose likelihood is computed with their own noise model
 constexpr double kKeepsOutOfFold = 0.35;
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
+constexpr double kOnce = 0.8;              // of a trace in one fold: the others cannot tell of it
 constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates another
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr int kSharpenings = 3;
@@ -35,8 +36,12 @@ bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
   for (const auto& c : w_.candidates)
     if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence))
       (IsIsolated(*c) ? events : causes).push_back(c.get());
-  // Whatever comes and goes with the motion looks like events, too: they are asked for last.
-  return Best(causes, terms, grounds, out) || Best(events, terms, grounds, out);
+  bursts_.clear();
+  if (Best(causes, terms, grounds, out)) return true;
+  // Whatever comes and goes with the motion looks like events, too: they are asked for last. A cause that showed once
+  // stands among them.
+  events.insert(events.end(), bursts_.begin(), bursts_.end());
+  return Best(events, terms, grounds, out);
 }
 
 bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chosen*>& terms, Grounds& grounds,
@@ -147,7 +152,11 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   const VectorXd folds =
       metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds, f.precision);
   const bool holds = folds.sum() > kKeepsOutOfFold * gain.gain && (folds.array() > 0).count() >= kFoldsThatImprove;
-  if (!holds && !IsIsolated(*f.candidate)) return false;
+  if (!holds && !IsIsolated(*f.candidate) && !bursts_.contains(f.candidate)) {
+    if (!f.candidate->is_curve() && metric.LargestFold(c, gain.amplitude, kBlocks, kFolds) > kOnce)
+      bursts_.insert(f.candidate);
+    return false;
+  }
   if (!StaysAtLowerBandwidth(f, terms, gain.gain, noise)) return false;
   out = Chosen{};
   out.candidate = f.candidate;

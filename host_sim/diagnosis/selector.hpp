@@ -39,6 +39,7 @@ class Selector {
 
   Diagnosis::Work& w_;
   std::map<const Candidate*, double> gain_;  // as last searched
+  std::set<Candidate*> bursts_;              // causes that this pass could not judge fold by fold
 };
 
 }  // namespace armcal::diagnosis

@@ -139,7 +139,7 @@ const std::map<std::string, Maker>& Makers() {
          e.factor = "f1";
          e.accept = {"stribeck", "viscous_cuberoot"}, e.signals = {"qd"};
          OnJoint(a, r, e, [](const Motion& m, const MatrixXd&, int j) -> ArrayXd {
-           return S(m, j) * V(m, j).abs().pow(1.0 / 3);
+           return V(m, j).sign() * V(m, j).abs().pow(1.0 / 3);
          });
        }},
       {"load_friction",
@@ -347,7 +347,7 @@ const std::map<std::string, Maker>& Makers() {
       {"torque_saturation",
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.accept = {"torque_saturation", "torque_gain_error", "load_friction"}, e.signals = {"load"};
-         const auto early = e.Strength(2, 100);  // torque limit over the torque at which the amplifier saturates
+         const auto early = e.Strength(1.5, 8);  // torque limit over the torque at which the amplifier saturates
          OnJoint(a, r, e, [&a, early](const Motion& m, const MatrixXd& links, int j) -> ArrayXd {
            const ArrayXd tau = links.col(j).array() + a.coulomb[j] * S(m, j) + a.viscous[j] * V(m, j);
            const double edge = a.torque_limit[j] / *early;

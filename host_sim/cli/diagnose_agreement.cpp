@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 #include <fmt/ranges.h>
+#include <Eigen/QR>
 #include <algorithm>
 #include <optional>
 #include <set>
@@ -14,7 +15,8 @@ using Strings = std::vector<std::string>;
 
 namespace {
 
-constexpr double kFalls = 0.995;  // as much as a term may worsen a joint without being refuted
+constexpr double kFalls = 0.995;   // as much as a term may worsen a joint without being refuted
+constexpr double kSameForm = 0.5;  // of the larger one's spread: two fits of one effect differ by less
 
 std::string JointText(const ordered_json& term) {
   const ordered_json& joint = term["joint"];
@@ -55,14 +57,49 @@ std::optional<Strings> Common(const Agreement& a, const ordered_json& term) {
   return both;
 }
 
-// Adds that of the terms which has most in common with the agreement. False: there is none.
-bool Extend(Agreement& a, const std::string& held_out, const ordered_json& verdict, const ordered_json& terms) {
+// The curve at x, linear between its points; nothing outside of them.
+std::optional<double> At(const std::vector<double>& xs, const std::vector<double>& ys, double x) {
+  const auto right = std::lower_bound(xs.begin(), xs.end(), x);
+  if (right == xs.end() || (right == xs.begin() && x < xs[0])) return {};
+  const std::size_t k = static_cast<std::size_t>(right - xs.begin());
+  if (k == 0) return ys[0];
+  return ys[k - 1] + (ys[k] - ys[k - 1]) * (x - xs[k - 1]) / (xs[k] - xs[k - 1]);
+}
+
+// Over the range that both held-out runs show, and but for what the declared model takes itself: a constant, and over
+// speed Coulomb and viscous friction. What has memory, or acts on the measurement, has no form over a signal.
+bool SameForm(const ordered_json& one, const ordered_json& other) {
+  if (one["class"] != "static" || other["class"] != "static") return true;
+  const ordered_json &a = one["dependence"], &b = other["dependence"];
+  if (a["over"] != b["over"]) return false;
+  const std::vector<double> xa = a["x"], ya = a["term"], xb = b["x"], yb = b["term"];
+  std::vector<double> x, first, second;
+  for (std::size_t k = 0; k < xa.size(); ++k)
+    if (const auto y = At(xb, yb, xa[k])) x.push_back(xa[k]), first.push_back(ya[k]), second.push_back(*y);
+  const auto map = [](const std::vector<double>& v) {
+    return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
+  };
+  const bool over_speed = !one["signals"].empty() && one["signals"][0].get<std::string>().starts_with("qd");
+  Eigen::MatrixXd own = Eigen::MatrixXd::Ones(map(x).size(), over_speed ? 3 : 1);
+  if (over_speed) own.rightCols(2) << map(x), map(x).cwiseSign();
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(own);
+  const auto left = [&](const Eigen::VectorXd& v) { return (v - own * solver.solve(v)).norm(); };
+  return left(map(first) - map(second)) < kSameForm * std::max(left(map(first)), left(map(second)));
+}
+
+// Adds that term of the verdict which has most in common with the agreement. False: there is none. other_form: one of a
+// fitting name has another form.
+bool Extend(Agreement& a, const std::string& held_out, const ordered_json& verdict, bool& other_form) {
   std::optional<Occurrence> best;
   Strings best_kinds;
-  for (const ordered_json& term : terms) {
+  for (const ordered_json& term : verdict.value("terms", ordered_json::array())) {
     const auto kinds = Common(a, term);
     const auto occurrence = Helps(held_out, verdict, term);
     if (!kinds || !occurrence || (best && kinds->size() <= best_kinds.size())) continue;
+    if (!std::all_of(a.split.begin(), a.split.end(), [&](const Occurrence& o) { return SameForm(o.term, term); })) {
+      other_form = true;
+      continue;
+    }
     best = occurrence, best_kinds = *kinds;
   }
   if (!best) return false;
@@ -75,30 +112,34 @@ bool Extend(Agreement& a, const std::string& held_out, const ordered_json& verdi
 
 Agreed Agree(const Verdicts& splits) {
   Agreed out;
-  std::set<std::pair<std::string, std::string>> used;  // held-out run and record of a term in an agreement
+  std::set<std::string> used;  // terms of an agreement
   const auto key = [](const std::string& held_out, const ordered_json& term) {
-    return std::pair{held_out, term["record"].get<std::string>() + JointText(term) + term["signals"].dump()};
+    return held_out + term["record"].get<std::string>() + JointText(term) + term["signals"].dump();
   };
-  for (const auto& [first, verdict] : splits)
+  for (const auto& [held_out, verdict] : splits)
     for (const ordered_json& term : verdict.value("terms", ordered_json::array())) {
-      if (used.contains(key(first, term))) continue;
-      Agreement a{Kinds(term), JointText(term), term["signals"].get<Strings>(), {}};
-      Strings missing;
-      for (const auto& [name, other] : splits) {
-        const ordered_json terms =
-            name == first ? ordered_json::array({term}) : other.value("terms", ordered_json::array());
-        if (!Extend(a, name, other, terms)) missing.push_back(name);
-      }
-      if (missing.empty()) {
-        for (const Occurrence& o : a.split) used.insert(key(o.held_out, o.term));
-        out.holds.push_back(a);
+      if (used.contains(key(held_out, term))) continue;
+      const auto here = Helps(held_out, verdict, term);
+      if (!here) {
+        const bool refuted = !term["confirmed"].get<bool>();
+        out.does_not.push_back({held_out, term["kind"], JointText(term),
+                                refuted ? "refuted by the held-out run" : "does not lower the held-out error"});
         continue;
       }
-      const bool here = Helps(first, verdict, term).has_value();
-      out.does_not.push_back({first, term["kind"], a.joint,
-                              !term["confirmed"].get<bool>() ? "refuted by the held-out run"
-                              : !here                        ? "does not lower the held-out error"
-                                      : fmt::format("not with {} held out", fmt::join(missing, ", "))});
+      Agreement a{Kinds(term), JointText(term), term["signals"].get<Strings>(), {*here}};
+      Strings missing;
+      bool other_form = false;
+      for (const auto& [name, other] : splits)
+        if (name != held_out && !Extend(a, name, other, other_form)) missing.push_back(name);
+      if (!missing.empty()) {
+        out.does_not.push_back({held_out, term["kind"], a.joint,
+                                fmt::format("{} with {} held out", other_form ? "of another form" : "not found",
+                                            fmt::join(missing, ", "))});
+        continue;
+      }
+      for (const Occurrence& o : a.split) used.insert(key(o.held_out, o.term));
+      std::sort(a.split.begin(), a.split.end(), [](auto& x, auto& y) { return x.held_out < y.held_out; });
+      out.holds.push_back(a);
     }
   return out;
 }

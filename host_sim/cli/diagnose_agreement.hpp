@@ -27,9 +27,9 @@ struct Disagreement {
   std::string held_out, kind, joint, why;
 };
 
-// A term holds if every split found it from its training runs alone (the same kind, or kinds that fit equally, or a
-// curve over the same signals; on the same joint), its held-out run confirmed it, and there it takes half a per cent
-// off a joint's error: of the declared model's, and of that of the model without it.
+// A term holds if every split found it from its training runs alone: on the same joint, of the same kind (or kinds that
+// fit equally, or a curve over the same signals), and of the same form. The held-out run must have confirmed it, and
+// there it takes half a per cent off a joint's error: of the declared model's, and of the model's without it.
 struct Agreed {
   std::vector<Agreement> holds;
   std::vector<Disagreement> does_not;

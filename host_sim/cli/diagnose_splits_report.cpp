@@ -16,6 +16,8 @@ using nlohmann::ordered_json;
 
 namespace {
 
+constexpr int kWidth_px = 1000;  // six legend entries beside the title
+
 std::string Title(const Agreement& a) { return fmt::format("{}, joint {}", Name(a), a.joint); }
 
 int FoldsThatImprove(const ordered_json& term) {
@@ -56,12 +58,19 @@ report::Table ErrorTable(const Verdicts& splits) {
   return t;
 }
 
+// How much of the runs' names is the same in all: a legend is short.
+std::size_t CommonPrefix(const Verdicts& splits) {
+  const std::string &first = splits.begin()->first, &last = splits.rbegin()->first;  // in alphabetical order
+  const auto same = std::mismatch(first.begin(), first.end(), last.begin(), last.end()).first;
+  return same == first.end() ? 0 : static_cast<std::size_t>(same - first.begin());
+}
+
 report::Bars ErrorBars(const Verdicts& splits) {
-  report::Bars bars{{"error on the run held out, where the joint moves", "", "RMS error / RMS torque, %"}, {}, {}, {}};
+  report::Bars bars{{"error, held out", "", "RMS error / RMS torque, %", kWidth_px}, {}, {}, {}};
   for (const auto& [name, v] : splits) {
     if (v["verdict"] == "failed") continue;
     for (const char* when : {"before", "after"}) {
-      bars.series.push_back(fmt::format("{} {}", name, when));
+      bars.series.push_back(fmt::format("{}: {}", name.substr(CommonPrefix(splits)), when));
       bars.value.emplace_back();
       const ordered_json &error = v[std::string(when) + "_moving"], &torque = v["torque_moving"];
       for (std::size_t j = 0; j < error.size(); ++j)
@@ -74,13 +83,14 @@ report::Bars ErrorBars(const Verdicts& splits) {
   return bars;
 }
 
-report::Plot TermPlot(const Agreement& a) {
+report::Plot TermPlot(const Verdicts& splits, const Agreement& a) {
   const ordered_json& first = a.split[0].term["dependence"];
-  report::Plot plot{{Title(a), first["over"], fmt::format("torque of joint {} / N m", first["torque_of"].dump())}, {}};
+  report::Plot plot{{Title(a), first["over"], first["torque"], kWidth_px}, {}};
   for (const Occurrence& o : a.split) {
     const ordered_json& d = o.term["dependence"];
-    plot.series.push_back({o.held_out + ": residual", d["x"], d["without"], report::Style::kPoints});
-    plot.series.push_back({"the term", d["x"], d["term"], report::Style::kLine});
+    const std::string run = o.held_out.substr(CommonPrefix(splits));
+    plot.series.push_back({run + ": residual", d["x"], d["without"], report::Style::kPoints});
+    plot.series.push_back({run + ": term", d["x"], d["term"], report::Style::kLine});
   }
   return plot;
 }
@@ -126,7 +136,7 @@ void WritePictures(const fs::path& folder, const Verdicts& splits, const Agreed&
   io::AtomicWrite(folder / "errors.svg", report::SvgFile(report::Svg(ErrorBars(splits))));
   for (std::size_t k = 0; k < agreed.holds.size(); ++k)
     io::AtomicWrite(folder / fmt::format("term_{}.svg", k + 1),
-                    report::SvgFile(report::Svg(TermPlot(agreed.holds[k]))));
+                    report::SvgFile(report::Svg(TermPlot(splits, agreed.holds[k]))));
 }
 
 void WriteSplitsPage(const fs::path& path, const std::string& robot, const Verdicts& splits, const Agreed& agreed) {
@@ -136,7 +146,7 @@ void WriteSplitsPage(const fs::path& path, const std::string& robot, const Verdi
   for (const Agreement& a : agreed.holds) {
     page.Section(Title(a));
     page.Add(HoldsTable(a));
-    page.Add(TermPlot(a), kTermCaption);
+    page.Add(TermPlot(splits, a), kTermCaption);
   }
   if (!agreed.does_not.empty()) {
     page.Section("Not claimed");

@@ -54,6 +54,9 @@ Dependence DependenceOf(const DiagnosisView& v, std::size_t term) {
   const VectorXd own = v.term_torque[term].col(d.joint), remains = v.held_out->after.col(d.joint);
   const auto moving = v.test->moving.col(d.joint);
   d.signal = label;
+  const bool slides = v.model->robot().joint[d.joint].kinematics.type == codegen::JointType::kPrismatic;
+  d.torque =
+      slides ? fmt::format("force of joint {} / N", d.joint + 1) : fmt::format("torque of joint {} / N m", d.joint + 1);
   d.without = Binned("without the term", x, remains + own, moving);
   d.term = Binned("the term", x, own, moving);
   d.remains = Binned("what remains", x, remains, moving);

@@ -30,7 +30,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["terms"] = nlohmann::ordered_json::array();
   for (std::size_t n = 0; n < f.terms.size(); ++n) {
     const Term& t = f.terms[n];
-    nlohmann::ordered_json term{{"kind", t.record->kind}, {"record", t.record->name}};
+    nlohmann::ordered_json term{{"kind", t.record->kind}, {"record", t.record->name}, {"class", t.record->kind_class}};
     if (t.joints.size() == 1 || IsUnknown(t)) term["joint"] = t.joints[0] + 1;
     else term["joint"] = JointName(t);
     term["signals"] = Signals(t);
@@ -49,11 +49,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     if (t.confirmed) {
       const Dependence d = DependenceOf(v, n);
       term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true));
-      term["dependence"] = {{"torque_of", d.joint + 1},
-                            {"over", d.signal},
-                            {"x", d.term.x},
-                            {"without", d.without.y},
-                            {"term", d.term.y}};
+      term["dependence"] = {
+          {"over", d.signal}, {"torque", d.torque}, {"x", d.term.x}, {"without", d.without.y}, {"term", d.term.y}};
     }
     term["score"] = t.score;
     term["folds"] = ToList(t.folds);

@@ -138,8 +138,9 @@ std::string RobotFileWithTerms(const codegen::Model& model, const diagnosis::Fin
     if (!t.confirmed) continue;
     text += fmt::format("\n# Found by armcal diagnose: {}. Record: codegen/effects/{}.toml. {}\n", t.record->title,
                         t.record->name, provenance);
-    if (!t.record->on_target) {
-      text += fmt::format("# {} describes one run only; it is not compiled into the model.\n", t.record->name);
+    if (!t.record->in_model()) {
+      text += fmt::format("# {} describes {}; it is not compiled into the model.\n", t.record->name,
+                          t.record->on_target ? "the measurement" : "one run only");
       continue;
     }
     text += fmt::format("[[effect]]\nname = \"{}\"\nstate = \"estimated\"\n", t.record->name);

@@ -55,7 +55,7 @@ std::string JointName(const diagnosis::Term& term);
 // back, the term, and the residual. (diagnosis_dependence.cpp)
 struct Dependence {
   int joint = 0;
-  std::string signal;  // with unit
+  std::string signal, torque;  // what they are, with unit
   report::Series without, term, remains;
 };
 Dependence DependenceOf(const DiagnosisView& v, std::size_t term);

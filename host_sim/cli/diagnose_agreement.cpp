@@ -40,7 +40,12 @@ std::optional<Occurrence> Helps(const std::string& held_out, const ordered_json&
                  without = term["without_moving"][j];
     if (after >= kFalls * before || after >= kFalls * without) continue;
     if (!best || after / without < best->after / best->without)
-      best = Occurrence{held_out, term["kind"], static_cast<int>(j), before, after, without, term};
+      best = Occurrence{held_out, term["kind"], static_cast<int>(j), before, after, without, -1, -1, term};
+  }
+  for (std::size_t j = 0; best && j < verdict["after_moving"].size(); ++j) {
+    const double change = verdict["after_moving"][j].get<double>() / verdict["before_moving"][j].get<double>() - 1;
+    if (static_cast<int>(j) != best->joint && change > best->change)
+      best->other_joint = static_cast<int>(j), best->change = change;
   }
   return best;
 }
@@ -66,8 +71,8 @@ std::optional<double> At(const std::vector<double>& xs, const std::vector<double
   return ys[k - 1] + (ys[k] - ys[k - 1]) * (x - xs[k - 1]) / (xs[k] - xs[k - 1]);
 }
 
-// Over the range that both held-out runs show, and but for what the declared model takes itself: a constant, and over
-// speed Coulomb and viscous friction. What has memory, or acts on the measurement, has no form over a signal.
+// Over the range that both held-out runs show: as it is, or but for what the declared model takes itself (a constant,
+// and over speed Coulomb and viscous friction). What has memory, or acts on the measurement, has no form over a signal.
 bool SameForm(const ordered_json& one, const ordered_json& other) {
   if (one["class"] != "static" || other["class"] != "static") return true;
   const ordered_json &a = one["dependence"], &b = other["dependence"];
@@ -76,6 +81,7 @@ bool SameForm(const ordered_json& one, const ordered_json& other) {
   std::vector<double> x, first, second;
   for (std::size_t k = 0; k < xa.size(); ++k)
     if (const auto y = At(xb, yb, xa[k])) x.push_back(xa[k]), first.push_back(ya[k]), second.push_back(*y);
+  if (x.size() < 4) return false;
   const auto map = [](const std::vector<double>& v) {
     return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
   };
@@ -84,7 +90,9 @@ bool SameForm(const ordered_json& one, const ordered_json& other) {
   if (over_speed) own.rightCols(2) << map(x), map(x).cwiseSign();
   const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(own);
   const auto left = [&](const Eigen::VectorXd& v) { return (v - own * solver.solve(v)).norm(); };
-  return left(map(first) - map(second)) < kSameForm * std::max(left(map(first)), left(map(second)));
+  const Eigen::VectorXd y1 = map(first), y2 = map(second);
+  return (y1 - y2).norm() < kSameForm * std::max(y1.norm(), y2.norm()) ||
+         left(y1 - y2) < kSameForm * std::max(left(y1), left(y2));
 }
 
 // Adds that term of the verdict which has most in common with the agreement. False: there is none. other_form: one of a

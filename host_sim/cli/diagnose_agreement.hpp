@@ -8,12 +8,15 @@
 
 namespace armcal::cli {
 
-// A term as one split has it. Its joint is the one whose error it lowers most; RMS where that joint moves.
+// A term as one split has it. Its joint is the one whose error it lowers most; RMS where that joint moves. other_joint:
+// what the split's terms together do worst to another joint; change: after over before, less one; -1: there is none.
 struct Occurrence {
   std::string held_out, kind;
   int joint = 0;                              // 0-based
   double before = 0, after = 0, without = 0;  // without: after, with this term's torque put back
-  nlohmann::ordered_json term;                // as in the verdict
+  int other_joint = -1;
+  double change = -1;
+  nlohmann::ordered_json term;  // as in the verdict
 };
 
 struct Agreement {

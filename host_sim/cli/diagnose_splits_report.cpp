@@ -26,12 +26,15 @@ int FoldsThatImprove(const ordered_json& term) {
 }
 
 report::Table HoldsTable(const Agreement& a) {
-  report::Table t{{"held out", "named", "torque of joint", "before", "after", "without it", "score", "folds"}, {}};
+  report::Table t{{"held out", "named", "torque of joint", "before", "after", "without it", "score", "folds",
+                   "another joint at worst"},
+                  {}};
   for (const Occurrence& o : a.split)
     t.rows.push_back({o.held_out, o.kind, std::to_string(o.joint + 1), report::Number(o.before, 4),
                       report::Number(o.after, 4), report::Number(o.without, 4),
                       fmt::format("{:.0f}", o.term["score"].get<double>()),
-                      fmt::format("{} of {}", FoldsThatImprove(o.term), o.term["folds"].size())});
+                      fmt::format("{} of {}", FoldsThatImprove(o.term), o.term["folds"].size()),
+                      o.other_joint < 0 ? "-" : fmt::format("joint {}: {:+.1f} %", o.other_joint + 1, 100 * o.change)});
   return t;
 }
 
@@ -120,7 +123,8 @@ ordered_json SplitsJson(const Verdicts& splits, const Agreed& agreed) {
     for (const Occurrence& o : a.split)
       of_run[o.held_out] = {{"kind", o.kind},           {"torque_of", o.joint + 1},
                             {"before", o.before},       {"after", o.after},
-                            {"without", o.without},     {"parameters", o.term["parameters"]},
+                            {"without", o.without},     {"other_joint", o.other_joint + 1},
+                            {"other_change", o.change}, {"parameters", o.term["parameters"]},
                             {"score", o.term["score"]}, {"folds", o.term["folds"]}};
     json["holds"].push_back({{"kinds", a.kinds}, {"joint", a.joint}, {"signals", a.signals}, {"splits", of_run}});
   }

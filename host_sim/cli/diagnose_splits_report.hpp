@@ -8,8 +8,8 @@ namespace armcal::cli {
 std::string SplitsText(const Verdicts& splits, const Agreed& agreed);
 
 // {"verdict", "holds": [{"kinds", "joint", "signals", "splits": {run: {"kind", "torque_of", "before", "after",
-// "without", "parameters", "score", "folds"}}}], "does_not_hold": [{"held_out", "kind", "joint", "why"}],
-// "splits": {run: {"before_moving", "after_moving", "torque_moving"} or {"error"}}}
+// "without", "other_joint", "other_change", "parameters", "score", "folds"}}}], "does_not_hold": [{"held_out", "kind",
+// "joint", "why"}], "splits": {run: {"before_moving", "after_moving", "torque_moving"} or {"error"}}}
 nlohmann::ordered_json SplitsJson(const Verdicts& splits, const Agreed& agreed);
 
 // errors.svg: error over torque of every held-out run; term_1.svg, ...: what holds, over the signal it depends on.

@@ -28,3 +28,12 @@ lwr_runs=("${lwr}_1.csv.gz,${lwr}_2.csv.gz" "${lwr}_3.csv.gz")
 splits kuka_lwr4 kuka_lwr4 kuka_lwr4 "${lwr_runs[@]}"
 sed 's/^tick_rate_Hz/prior = "none"\n&/' codegen/robots/kuka_lwr4.toml >"$out/kuka_lwr4_free.toml"
 splits kuka_lwr4_free kuka_lwr4 "$out/kuka_lwr4_free.toml" "${lwr_runs[@]}"
+
+echo "== kuka_lwr4: do the joints move apart? Correlation of positions with joint 7 and with joint 5"
+for run in 1 3; do
+  gzip -dc "${lwr}_$run.csv.gz" | awk -F, -v run="$run" '
+    NR > 1 { n++; for (i = 2; i <= 8; i++) { s[i] += $i; for (j = 2; j <= 8; j++) p[i, j] += $i * $j } }
+    function c(i, j) { return p[i, j] / n - s[i] * s[j] / n / n }
+    END { for (k = 8; k >= 6; k -= 2) { printf "run %d, joint %d:", run, k - 1
+      for (i = 2; i <= 8; i++) printf " %.2f", c(i, k) / sqrt(c(i, i) * c(k, k)); print "" } }'
+done

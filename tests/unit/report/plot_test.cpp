@@ -87,6 +87,14 @@ TEST(Bars, OnePerValue_NanLeftOut) {
   EXPECT_EQ(Count(Svg(bars), "<title>"), 3u);
 }
 
+TEST(SvgFile, StandsAlone_WithTheSameDrawing) {
+  const std::string svg = Svg(Line(100)), file = SvgFile(svg);
+  EXPECT_TRUE(file.starts_with("<svg xmlns='http://www.w3.org/2000/svg' viewBox="));
+  EXPECT_EQ(file.find("var("), file.npos);  // viewers without a style sheet show it, too
+  EXPECT_NE(file.find("svg .s0{stroke:#0072b2}"), file.npos);
+  EXPECT_NE(file.find(svg.substr(svg.find("<path"))), file.npos);
+}
+
 TEST(Axis, TicksAreRoundAndInsideTheRange) {
   for (const double high : {0.0013, 0.7, 1.0, 9.9, 123.0, 4e5}) {
     const Axis axis({0, high}, false, false);

@@ -17,11 +17,13 @@ constexpr double kExchanged = 2;  // by how much an exchange of two columns must
 constexpr double kScale = 20;     // a torque this much larger or smaller than the bodies need is in another unit
 constexpr double kTelling =
     0.5;  // of a torque without friction must be explained by the bodies before its scale is judged
+constexpr double kTiny = 0.01;  // of the torque limit: what the bodies need of less, a cable may need, too
 
 struct Match {
   double log_left = 0;  // log of the share of variance left
   double told = 0;      // share of what friction leaves that the bodies explain
   double scale = 1;     // measured over needed
+  double needed = 0;    // RMS about its mean
 };
 
 // torque = scale needed + Coulomb, viscous, offset, over rows of one joint.
@@ -33,7 +35,8 @@ Match Compare(const VectorXd& torque, const VectorXd& needed, const VectorXd& sp
   const double all = (torque.array() - torque.mean()).square().sum();
   const MatrixXd friction = A.rightCols(3);
   const double without = (torque - friction * friction.colPivHouseholderQr().solve(torque)).squaredNorm();
-  return {std::log(std::max(left, 1e-12 * all) / std::max(all, 1e-300)), 1 - left / std::max(without, 1e-300), x[0]};
+  return {std::log(std::max(left, 1e-12 * all) / std::max(all, 1e-300)), 1 - left / std::max(without, 1e-300), x[0],
+          std::sqrt((needed.array() - needed.mean()).square().mean())};
 }
 
 codegen::Signals EveryOf(const Dataset& d, MatrixXd& tau) {
@@ -102,7 +105,8 @@ void CheckAgainstModel(const codegen::Model& model, const Dataset& data) {
   const std::vector<Match> match = checker.Compare(checker.signals(), checker.tau());
   for (int j = 0; j < model.joints(); ++j) {
     const Match& m = match[static_cast<std::size_t>(j)];
-    if (m.told < kTelling || (m.scale > 1 / kScale && m.scale < kScale)) continue;
+    if (m.needed < kTiny * model.robot().joint[j].torque_limit_Nm || m.told < kTelling) continue;
+    if (m.scale > 1 / kScale && m.scale < kScale) continue;
     throw io::InputError(
         data.source + fmt::format(": joint {}: torque is {:.2g} times what the robot file's bodies need, expected N m "
                                   "(N) on the joint side with the sign of q",

@@ -28,7 +28,7 @@ ordered_json ReadJson(const std::string& path) { return ordered_json::parse(io::
 // Whether a confirmed term can be part of a committed model at all.
 bool Flashable(const diagnosis::Finding& finding) {
   for (const diagnosis::Term& t : finding.terms)
-    if (t.confirmed && t.record->on_target) return true;
+    if (t.confirmed && t.record->in_model()) return true;
   return false;
 }
 

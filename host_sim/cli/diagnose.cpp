@@ -75,7 +75,7 @@ namespace {
 
 int Run(const DiagnoseOptions& o) {
   if (o.robot.empty() || o.train.empty() || o.test.empty())
-    throw io::InputError("expected --robot, --train and --test, or --batch, or --summary");
+    throw io::InputError("expected --robot, --train and --test, or --batch, or --splits, or --summary");
   const auto run = RunDiagnosis(o);
   if (!o.report.empty()) {
     report::Page page("What the model of " + run->model->robot().name + " lacks",
@@ -100,7 +100,8 @@ void AddDiagnose(CLI::App& app, Action& action) {
       "find what the model lacks: residual, cause, new model, error before and after\nexample: armcal diagnose --robot "
       "er20_like --train train.csv.gz --test test.csv.gz --json out.json --report out.html --model-out new.toml\n"
       "example, many logs: armcal diagnose --batch logs --robot er20_like --out verdicts --json all.json --report "
-      "all.html");
+      "all.html\nexample, which terms hold whatever run is held out: armcal diagnose --robot kuka_lwr4 --splits "
+      "run1.csv,run2.csv run3.csv --out splits");
   auto o = std::make_shared<DiagnoseOptions>();
   verb->add_option("--robot", o->robot, "robot file or name");
   verb->add_option("--train", o->train, "log(s) on which everything is decided");

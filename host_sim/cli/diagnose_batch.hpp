@@ -1,4 +1,4 @@
-// cli - armcal diagnose --batch: the logs of many arms; knows how they lie in a folder, no search.
+// cli - armcal diagnose --batch and --splits: what they share on the command line; --batch: the logs of many arms.
 #pragma once
 
 #include <string>
@@ -11,9 +11,9 @@ namespace armcal::cli {
 
 struct BatchOptions {
   std::string folder, out, part;
-  std::vector<std::string> summary;
+  std::vector<std::string> summary, splits;
   int jobs = 0;
-  bool asked() const { return !folder.empty() || !summary.empty(); }
+  bool asked() const { return !folder.empty() || !summary.empty() || !splits.empty(); }
 };
 
 void AddBatchOptions(CLI::App& verb, BatchOptions& options);

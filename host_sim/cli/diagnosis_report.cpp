@@ -16,9 +16,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-// Of a curve that names no cause the joint is the one whose torque it changes; the other is among the signals.
-bool IsUnknown(const Term& t) { return t.record->kind != t.record->name; }
-
 std::string Amplitudes(const Term& t) {
   std::string out;
   for (std::size_t k = 0; k < t.eta.size(); ++k)
@@ -28,51 +25,6 @@ std::string Amplitudes(const Term& t) {
                        t.sd[c], t.columns[c].unit);
   if (t.columns.size() > 4) out += ", ...";
   return out;
-}
-
-std::vector<std::string> Signals(const Term& t) {
-  std::vector<std::string> out;
-  const std::string joint = t.joints.empty() ? "" : std::to_string(t.joints[0] + 1);
-  for (std::string s : t.record->signals) {
-    if (s == "t") out.push_back("time");
-    else if (s.ends_with("[k]")) out.push_back(s.substr(0, s.size() - 3) + std::to_string(t.joints.at(1) + 1));
-    else if (s.back() == ')') out.push_back(s.insert(s.size() - 1, joint));
-    else out.push_back(s == "tau_rigid" ? "load" + joint : s + joint);
-  }
-  return out;
-}
-
-// The signal over which the term's dependence is drawn, over the test log.
-std::pair<std::string, VectorXd> Abscissa(const DiagnosisView& v, const Term& t) {
-  const auto& s = v.test->s;
-  const int j = t.joints.empty() ? v.model->joints() - 1 : t.joints[0];
-  const std::string& signal = t.record->signals.empty() ? "qd" : t.record->signals[0];
-  const std::string number = std::to_string(j + 1);
-  if (signal == "qd[k]")
-    return {"speed of joint " + std::to_string(t.joints.at(1) + 1) + " / rad/s", s.qd.col(t.joints.at(1))};
-  if (signal == "q[k]") return {"q" + std::to_string(t.joints.at(1) + 1) + " / rad", s.q.col(t.joints.at(1))};
-  if (signal == "q") return {"q" + number + " / rad", s.q.col(j)};
-  if (signal == "temp" && s.temp.cols() > j) return {"temperature " + number + " / deg C", s.temp.col(j)};
-  if (signal == "t") return {"time / s", s.t};
-  if (signal == "tau_rigid") return {"torque of joint " + number + " / N m", v.test->tau.col(j)};
-  return {"speed of joint " + number + " / rad/s", s.qd.col(j)};
-}
-
-// Mean of y in equal bins of x, where `use` holds.
-report::Series Binned(const std::string& name, const VectorXd& x, const VectorXd& y, const Eigen::VectorXi& use) {
-  constexpr int kBins = 60;
-  const double lo = x.minCoeff(), hi = x.maxCoeff();
-  std::vector<double> sum(kBins, 0), count(kBins, 0);
-  for (Eigen::Index k = 0; k < x.size(); ++k) {
-    if (!use[k] || hi <= lo) continue;
-    const int b = std::min(kBins - 1, static_cast<int>((x[k] - lo) / (hi - lo) * kBins));
-    sum[b] += y[k];
-    ++count[b];
-  }
-  report::Series s{name, {}, {}, report::Style::kLine};
-  for (int b = 0; b < kBins; ++b)
-    if (count[b] >= 3) s.x.push_back(lo + (b + 0.5) * (hi - lo) / kBins), s.y.push_back(sum[b] / count[b]);
-  return s;
 }
 
 // Residual of joint j where it moves, a gap elsewhere.
@@ -90,55 +42,12 @@ bool AnyConfirmed(const diagnosis::Finding& f) {
   return std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed; });
 }
 
+bool IsUnknown(const Term& t) { return t.record->kind != t.record->name; }
+
 std::string JointName(const Term& t) {
   if (t.joints.size() == 1 || IsUnknown(t)) return std::to_string(t.joints[0] + 1);
   if (t.joints.size() == 2) return fmt::format("{}-{}", t.joints[0] + 1, t.joints[1] + 1);
   return t.record->place;
-}
-
-nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
-  const auto& f = *v.finding;
-  nlohmann::ordered_json j;
-  j["verdict"] = AnyConfirmed(f) ? "effect" : "none";
-  j["joint_base"] = 1;
-  j["terms"] = nlohmann::ordered_json::array();
-  for (const Term& t : f.terms) {
-    nlohmann::ordered_json term{{"kind", t.record->kind}, {"record", t.record->name}};
-    if (t.joints.size() == 1 || IsUnknown(t)) term["joint"] = t.joints[0] + 1;
-    else term["joint"] = JointName(t);
-    term["signals"] = Signals(t);
-    nlohmann::ordered_json parameters, deviations;
-    for (std::size_t k = 0; k < t.eta.size(); ++k) {
-      parameters[t.unknowns[k].name] = t.eta[k];
-      if (t.eta_sd[static_cast<Eigen::Index>(k)] > 0)
-        deviations[t.unknowns[k].name] = t.eta_sd[static_cast<Eigen::Index>(k)];
-    }
-    for (std::size_t c = 0; c < t.columns.size(); ++c)
-      parameters[t.columns[c].name] = t.amplitude[c], deviations[t.columns[c].name] = t.sd[c];
-    term["parameters"] = parameters;
-    term["parameter_sd"] = deviations;
-    term["also_fits"] = t.also_fits;
-    term["confirmed"] = t.confirmed;
-    term["score"] = t.score;
-    term["folds"] = ToList(t.folds);
-    term["runner_up"] = t.runner_up;
-    term["runner_up_score"] = t.runner_up_score;
-    j["terms"].push_back(term);
-  }
-  const auto& test = *v.test;
-  j["before"] = ToList(calibration::Rms(test, v.held_out->before, false));
-  j["after"] = ToList(calibration::Rms(test, v.held_out->after, false));
-  j["before_moving"] = ToList(calibration::Rms(test, v.held_out->before, true));
-  j["after_moving"] = ToList(calibration::Rms(test, v.held_out->after, true));
-  std::vector<double> share;
-  for (int k = 0; k < test.joints(); ++k) share.push_back(test.moving.col(k).cast<double>().mean());
-  j["moving_share"] = share;
-  j["noise_floor"] = ToList(f.sigma);
-  j["noise_innovation"] = ToList(f.innovation);
-  j["smallest_detectable"] = ToList(f.smallest);
-  if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
-  j["seconds"] = v.seconds;
-  return j;
 }
 
 std::string DiagnosisText(const DiagnosisView& v) {
@@ -206,15 +115,11 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
          {"fits equally", t.also_fits.empty() ? "nothing else in the catalogue"
                                               : fmt::format("{}{}", t.also_fits[0],
                                                             t.also_fits.size() > 1 ? ", " + t.also_fits[1] : "")}});
-    const int j = t.joints.empty() ? 1 % test.joints() : t.joints[0];
-    const auto [label, x] = Abscissa(v, t);
-    const VectorXd without =
-        v.held_out->after.col(j) + v.term_torque[k].col(j);  // what this term alone explains is put back
+    const Dependence d = DependenceOf(v, k);
+    const int j = d.joint;
     report::Plot dependence{
-        {fmt::format("what gave it away: residual of joint {}, mean over bins", j + 1), label, "torque / N m"},
-        {Binned("without the term", x, without, test.moving.col(j)),
-         Binned("the term", x, v.term_torque[k].col(j), test.moving.col(j)),
-         Binned("what remains", x, v.held_out->after.col(j), test.moving.col(j))}};
+        {fmt::format("what gave it away: residual of joint {}, mean over bins", j + 1), d.signal, "torque / N m"},
+        {d.without, d.term, d.remains}};
     page.Add(dependence, "Held-out log, moving samples.");
     report::Plot time{{fmt::format("residual of joint {} over time", j + 1), "time / s", "torque / N m"},
                       {{"before", Values(test.s.t), Moving(test, v.held_out->before, j), report::Style::kLine},
@@ -233,8 +138,9 @@ std::string RobotFileWithTerms(const codegen::Model& model, const diagnosis::Fin
     if (!t.confirmed) continue;
     text += fmt::format("\n# Found by armcal diagnose: {}. Record: codegen/effects/{}.toml. {}\n", t.record->title,
                         t.record->name, provenance);
-    if (!t.record->on_target) {
-      text += fmt::format("# {} describes one run only; it is not compiled into the model.\n", t.record->name);
+    if (!t.record->in_model()) {
+      text += fmt::format("# {} describes {}; it is not compiled into the model.\n", t.record->name,
+                          t.record->on_target ? "the measurement" : "one run only");
       continue;
     }
     text += fmt::format("[[effect]]\nname = \"{}\"\nstate = \"estimated\"\n", t.record->name);

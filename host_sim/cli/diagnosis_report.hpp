@@ -45,8 +45,20 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options);
 // At least one term held on the held-out log.
 bool AnyConfirmed(const diagnosis::Finding& finding);
 
+// A curve that names no cause: its joint is the one whose torque it changes; another joint is among the signals.
+bool IsUnknown(const diagnosis::Term& term);
+
 // "3", "5-6", "all", "base", "flange": how a report names the joints of a term.
 std::string JointName(const diagnosis::Term& term);
+
+// Means over bins of a signal, over the held-out log where the joint moves: the residual with the term's torque put
+// back, the term, and the residual. (diagnosis_dependence.cpp)
+struct Dependence {
+  int joint = 0;
+  std::string signal, torque;  // what they are, with unit
+  report::Series without, term, remains;
+};
+Dependence DependenceOf(const DiagnosisView& v, std::size_t term);
 
 // The JSON of design.md section 7.
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);

@@ -4,14 +4,13 @@
 #include <fmt/format.h>
 
 #include "host_sim/io/files.hpp"
+#include "host_sim/report/style.hpp"
 
 namespace armcal::report {
 namespace {
 
-// Colours after Okabe and Ito (told apart by colour-blind readers), lightened for dark ground.
+// Colours lightened for dark ground.
 constexpr std::string_view kStyle = R"css(
-:root{--ink:#1b1f24;--soft:#59636e;--rule:#d5dae0;--faint:#eef1f4;--ground:#fff;--plate:#fffd;
---c0:#0072b2;--c1:#d55e00;--c2:#009e73;--c3:#cc79a7;--c4:#b88600;--c5:#3a9bdc;--c6:#555;--good:#009e73;--warn:#d55e00}
 @media(prefers-color-scheme:dark){:root{--ink:#e4e8ec;--soft:#9aa5b1;--rule:#3a424b;--faint:#22272d;--ground:#15191e;
 --plate:#15191edd;--c0:#58b4e8;--c1:#ff8c42;--c2:#3ecf9e;--c3:#e59cc4;--c4:#f0c24b;--c5:#8fd0ff;--c6:#b5bec7;
 --good:#3ecf9e;--warn:#ff8c42}}
@@ -38,11 +37,6 @@ details{margin:.7rem 0}summary{cursor:pointer;color:var(--soft)}
 figure{margin:1rem 0}figcaption{color:var(--soft);font-size:.9rem;margin-top:.2rem;max-width:48rem}
 .grid2{display:grid;grid-template-columns:repeat(auto-fit,minmax(20rem,1fr));gap:.8rem}
 svg{display:block;width:100%;height:auto;font:12px system-ui,"DejaVu Sans",sans-serif}
-svg .title{font-size:13.5px;font-weight:600;fill:var(--ink)}svg .tick{fill:var(--soft)}svg .label{fill:var(--soft)}
-svg .grid{stroke:var(--rule);stroke-width:.6;fill:none}svg .zero{stroke:var(--soft);stroke-width:.8;fill:none}
-svg .axis{stroke:var(--soft);stroke-width:1;fill:none}svg .plate{fill:var(--plate)}
-svg .line{fill:none;stroke-width:1.3;stroke-linejoin:round}
-svg .dots{fill:none;stroke-width:3.4;stroke-linecap:round;stroke-opacity:.55}
 )css";
 
 std::string Cell(std::string_view tag, const std::string& text, bool number) {
@@ -123,10 +117,9 @@ std::string Page::Html() const {
       "<meta name='viewport' content='width=device-width,initial-scale=1'>"
       "<meta name='color-scheme' content='light dark'><title>" +
       Escape(title_) + "</title><style>";
+  html += fmt::format("\n:root{{{}}}", kLight);
   html += kStyle;
-  for (int k = 0; k < kColours; ++k)
-    html += fmt::format("svg .s{0}{{stroke:var(--c{0})}}svg .f{0}{{fill:var(--c{0})}}\n", k);
-  return html + "</style></head><body><main>\n" + body_ + "</main></body></html>\n";
+  return html + PictureStyle() + "</style></head><body><main>\n" + body_ + "</main></body></html>\n";
 }
 
 void Page::Write(const std::filesystem::path& path) const { io::AtomicWrite(path, Html()); }

@@ -1,4 +1,5 @@
-// end-to-end tests - many logs at once: a folder of small arms, one of them lacking a term, some of them bad.
+// end-to-end tests - many logs at once: a folder of small arms, one of them lacking a term, some of them bad; and runs
+// of one arm, each held out once.
 #include "host_sim/io/log.hpp"
 #include "tests/e2e/tool.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
@@ -91,8 +92,7 @@ TEST_F(Batch, GivesEveryLogALine_AndABadOneStopsNoOther) {
   EXPECT_EQ(Run(merge).code, kPartial);
   int waiting = 0;
   const nlohmann::json merged = ReadJson(Path("merged.json"));
-  for (const auto& v : merged.at("verdicts"))
-    waiting += v.value("error", "").starts_with("no verdict");
+  for (const auto& v : merged.at("verdicts")) waiting += v.value("error", "").starts_with("no verdict");
   EXPECT_EQ(waiting, 2);  // of the second job's
   part("2/2");
   EXPECT_EQ(Run(merge).code, kPartial);
@@ -108,6 +108,57 @@ TEST_F(Batch, OptionsThatMakeNoSense_AreRefused) {
   ExpectOneLine(Run({"--batch", logs().string(), "--out", empty, "--part", "3/2"}), kBadInput, "--part 3/2");
   ExpectOneLine(Run({"--batch", logs().string(), "--out", empty, "--test", "x.csv"}), kBadInput, "--test");
   ExpectOneLine(Run({"--summary", empty}), kBadInput, "--summary");
+}
+
+// Runs of one arm that lacks an offset on joint 2; the last one lacks one on joint 1, too.
+class Splits : public testing::Test {
+ protected:
+  static fs::path folder() {
+    static const fs::path folder = FreshFolder("splits");
+    return folder;
+  }
+  static std::string Run(const std::string& name) { return (folder() / (name + ".csv.gz")).string(); }
+  static void SetUpTestSuite() {
+    SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 7);
+    const Effect lacking = [](const State& s) { return s.joint == 1 ? 0.8 : 0.0; };
+    WriteRun(Run("run_a"), arm, 71, lacking);
+    WriteRun(Run("run_b"), arm, 72, lacking);
+    WriteRun(Run("run_c"), arm, 73, [=](const State& s) { return s.joint == 0 ? 2.0 : lacking(s); });
+  }
+};
+
+TEST_F(Splits, ClaimWhatHoldsWhicheverRunIsHeldOut_AndNoMore) {
+  const fs::path out = folder() / "out";
+  const Outcome o = Tool({"diagnose", "--robot", "two_link", "--splits", Run("run_a") + "," + Run("run_b"),
+                          Run("run_c"), "--out", out.string(), "--json", (folder() / "splits.json").string(),
+                          "--report", (folder() / "splits.html").string()});
+  ASSERT_EQ(o.code, 0) << o.err << o.out;
+  const nlohmann::json s = ReadJson(folder() / "splits.json");
+  EXPECT_EQ(s.at("splits").at("run_a").at("train"), nlohmann::json({"run_c"}));  // never its own group
+  EXPECT_EQ(s.at("splits").at("run_c").at("train"), nlohmann::json({"run_a", "run_b"}));
+  ASSERT_EQ(s.at("holds").size(), 1u) << s.at("holds");
+  EXPECT_EQ(s.at("holds")[0].at("joint"), "2");
+  for (const auto& [run, split] : s.at("holds")[0].at("splits").items()) {
+    EXPECT_EQ(split.at("torque_of"), 2) << run;
+    EXPECT_LT(split.at("after").get<double>(), 0.5 * split.at("before").get<double>()) << run;
+  }
+  for (const auto& d : s.at("does_not_hold")) EXPECT_EQ(d.at("joint"), "1") << d;  // the offset of one run
+  for (const char* picture : {"errors.svg", "term_1.svg"}) {
+    const std::string svg = ReadText(out / picture);
+    EXPECT_TRUE(svg.starts_with("<svg xmlns=")) << picture;
+    EXPECT_EQ(svg.find("var(--"), std::string::npos) << picture;
+  }
+  EXPECT_NE(ReadText(folder() / "splits.html").find("joint 2"), std::string::npos);
+}
+
+TEST_F(Splits, OptionsThatMakeNoSense_AreRefused) {
+  const auto run = [](std::vector<std::string> words) {
+    words.insert(words.begin(), {"diagnose", "--robot", "two_link", "--out", folder().string(), "--splits"});
+    return Tool(words);
+  };
+  ExpectOneLine(run({Run("run_a") + "," + Run("run_b")}), kBadInput, "two groups");
+  ExpectOneLine(run({Run("run_a"), Run("run_a")}), kBadInput, "one run of this name");
+  ExpectOneLine(run({Run("run_a"), Run("run_b"), "--test", "x.csv"}), kBadInput, "--test");
 }
 
 }  // namespace

@@ -64,6 +64,9 @@ struct EffectRecord {
   bool friction_law = false;   // the robot's own friction, not a candidate
   double generic_penalty = 0;  // added to the score a flexible term must beat
   Search search;
+
+  // A model can hold it: it acts on the arm, not on the measurement, and in every run.
+  bool in_model() const { return on_target && kind_class != "sensor"; }
 };
 
 // Throws io::InputError: file, key, what was expected.

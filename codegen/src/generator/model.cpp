@@ -101,7 +101,7 @@ void Model::AddEffects(const Catalogue& catalogue, const ModelQuantities& quanti
   for (const EffectUse& use : uses) {
     const std::string where = robot_.path + ": effect." + use.effect;
     const EffectRecord& found = Find(catalogue, robot_, use.effect);
-    if (!found.on_target || found.kind_class == "sensor")
+    if (!found.in_model())
       throw io::InputError(where + ": expected an effect that a model can hold; " + found.name +
                            " is for the host only");
     const EffectRecord& record = record_.emplace(found.name, found).first->second;

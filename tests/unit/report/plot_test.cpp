@@ -1,5 +1,6 @@
 // report tests - pictures: every sample's peak survives, nothing is drawn from what is not a number.
 #include "host_sim/report/plot.hpp"
+#include "host_sim/report/svg_file.hpp"
 
 #include <gtest/gtest.h>
 
@@ -84,6 +85,14 @@ TEST(Plot, LengthsThatDiffer_AreRefused) {
 TEST(Bars, OnePerValue_NanLeftOut) {
   const Bars bars{{}, {"j1", "j2"}, {"before", "after"}, {{1, 2}, {0.5, NAN}}};
   EXPECT_EQ(Count(Svg(bars), "<title>"), 3u);
+}
+
+TEST(SvgFile, StandsAlone_WithTheSameDrawing) {
+  const std::string svg = Svg(Line(100)), file = SvgFile(svg);
+  EXPECT_TRUE(file.starts_with("<svg xmlns='http://www.w3.org/2000/svg' viewBox="));
+  EXPECT_EQ(file.find("var("), file.npos);  // viewers without a style sheet show it, too
+  EXPECT_NE(file.find("svg .s0{stroke:#0072b2}"), file.npos);
+  EXPECT_NE(file.find(svg.substr(svg.find("<path"))), file.npos);
 }
 
 TEST(Axis, TicksAreRoundAndInsideTheRange) {

@@ -10,6 +10,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kRescored = 14;  // candidates whose likelihood is computed with their own noise model
+constexpr int kCurvesOfAJoint = 3;
 constexpr double kKeepsOutOfFold = 0.35;
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kOnce = 0.8;              // of a trace in one fold: the others cannot tell of it
@@ -85,6 +86,11 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
     something.insert({c->record().name, c->joints()});
   }
   std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
+  // Many curves fit the same torque about as well: the best ones of a joint stand for the others.
+  std::map<std::vector<int>, int> curves;
+  std::erase_if(ranked, [&](const Found& f) {
+    return f.candidate->is_curve() && ++curves[f.candidate->rows()] > kCurvesOfAJoint;
+  });
   if (ranked.size() > kRescored) ranked.resize(kRescored);
   return ranked;
 }

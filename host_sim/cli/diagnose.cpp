@@ -7,6 +7,7 @@
 #include "host_sim/cli/diagnosis_report.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
+#include "host_sim/diagnosis/model_file.hpp"
 #include "host_sim/io/files.hpp"
 #include "host_sim/io/input_error.hpp"
 #include "host_sim/report/table.hpp"
@@ -31,14 +32,14 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   for (const std::string& p : o.train)
     provenance +=
         " " + std::filesystem::path(p).filename().string() + " (sha256 " + io::FileHash(p).substr(0, 16) + ")";
-  const std::string before_test = RobotFileWithTerms(model, finding, provenance);
+  const std::string before_test = diagnosis::ModelFile(model, finding, provenance);
   if (!o.model_out.empty()) {
     io::AtomicWrite(o.model_out, before_test);
     model_hash = io::FileHash(o.model_out);
   }
   run->test = read.One(o.test);
   run->held_out = run->diagnosis->Judge(run->test);
-  const std::string after_test = RobotFileWithTerms(model, finding, provenance);
+  const std::string after_test = diagnosis::ModelFile(model, finding, provenance);
   if (!o.model_out.empty() && after_test != before_test)
     io::AtomicWrite(o.model_out, after_test);  // what was not confirmed is taken out
 

@@ -4,7 +4,6 @@
 #include <fmt/core.h>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/report/axis.hpp"
@@ -222,37 +221,6 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
     page.Add(time,
              "Held-out log, where the joint moves; at standstill friction holds any torque up to its breakaway level.");
   }
-}
-
-std::string RobotFileWithTerms(const codegen::Model& model, const diagnosis::Finding& finding,
-                               const std::string& provenance) {
-  std::ifstream in(model.robot().path);
-  std::string text(std::istreambuf_iterator<char>(in), {});
-  if (!text.empty() && text.back() != '\n') text += '\n';
-  for (const Term& t : finding.terms) {
-    if (!t.confirmed) continue;
-    text += fmt::format("\n# Found by armcal diagnose: {}. Record: codegen/effects/{}.toml. {}\n", t.record->title,
-                        t.record->name, provenance);
-    if (!t.record->on_target) {
-      text += fmt::format("# {} describes one run only; it is not compiled into the model.\n", t.record->name);
-      continue;
-    }
-    text += fmt::format("[[effect]]\nname = \"{}\"\nstate = \"estimated\"\n", t.record->name);
-    std::string joints;
-    for (const int j : t.joints) joints += fmt::format("{}{}", joints.empty() ? "" : ", ", j + 1);
-    if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
-    std::string mean, nonlinear;
-    for (std::size_t c = 0; c < t.columns.size(); ++c) {
-      mean += fmt::format("{}{} = {:.9e}", mean.empty() ? "" : ", ", t.columns[c].key, t.amplitude[c]);
-      text +=
-          fmt::format("# {} = {:.5g} +- {:.2g} {}\n", t.columns[c].name, t.amplitude[c], t.sd[c], t.columns[c].unit);
-    }
-    for (std::size_t k = 0; k < t.eta.size(); ++k)
-      nonlinear += fmt::format("{}{} = {:.9e}", nonlinear.empty() ? "" : ", ", t.unknowns[k].key, t.eta[k]);
-    text += "mean = { " + mean + " }\n";
-    if (!nonlinear.empty()) text += "nonlinear = { " + nonlinear + " }\n";
-  }
-  return text;
 }
 
 }  // namespace armcal::cli

@@ -57,8 +57,4 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v);
 // Short lines for the terminal.
 std::string DiagnosisText(const DiagnosisView& v);
 
-// The robot file with the terms added (those not confirmed left out), with provenance as comments.
-std::string RobotFileWithTerms(const codegen::Model& model, const diagnosis::Finding& finding,
-                               const std::string& provenance);
-
 }  // namespace armcal::cli

@@ -119,9 +119,7 @@ bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& t
   return std::any_of(terms.begin(), terms.end(), [&](const Chosen* t) {
     const auto& like = t->candidate->record().confusable_with;
     const bool confusable = std::find(like.begin(), like.end(), c.record().name) != like.end();
-    // another frequency of the same kind is another term, and so is another part of a signal's range
-    const bool other_part = c.record().search.how == "spectral" || (c.record().search.how == "spline" && c.is_curve());
-    return (t->candidate == &c && !other_part) || (confusable && t->candidate->joints() == c.joints());
+    return (t->candidate == &c && !c.record().repeats()) || (confusable && t->candidate->joints() == c.joints());
   });
 }
 

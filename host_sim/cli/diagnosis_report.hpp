@@ -19,6 +19,7 @@ struct DiagnosisView {
   const diagnosis::HeldOut* held_out = nullptr;
   std::vector<Eigen::MatrixXd> term_torque;  // on the test log
   double seconds = 0;
+  std::string robot;  // as the user named it
 };
 
 struct DiagnoseOptions {
@@ -41,12 +42,6 @@ struct DiagnosisRun {
 // Train, decide, write the model file and take its hash; only then open the held-out log. Prints the verdict.
 // (diagnose.cpp)
 std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options);
-
-// At least one term held on the held-out log.
-bool AnyConfirmed(const diagnosis::Finding& finding);
-
-// "3", "5-6", "all", "base", "flange": how a report names the joints of a term.
-std::string JointName(const diagnosis::Term& term);
 
 // The JSON of design.md section 7.
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);

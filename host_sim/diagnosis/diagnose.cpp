@@ -83,8 +83,8 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
     if (c.delay_s != 0) t.eta[static_cast<std::size_t>(c.candidate->delay())] += c.delay_s;
     t.score = c.found.score, t.gain = c.found.gain.gain;
     t.folds = c.folds, t.also_fits = c.also_fits;
-    t.runner_up = c.runner_up, t.runner_up_score = c.runner_up_score;
-    t.confirmed = c.confirmed;
+    t.rivals = c.rivals;
+    t.training_only = OfTrainingOnly(*c.candidate), t.confirmed = c.confirmed;
     t.amplitude = VectorXd::Zero(c.candidate->columns(c.eta)), t.sd = t.amplitude;
     t.eta_sd = VectorXd::Zero(static_cast<Eigen::Index>(c.eta.size()));
     if (c.confirmed) {
@@ -142,6 +142,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
     const calibration::Dataset seen = AsTermsSay(w.chosen, test);
     const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
     out.after = test.tau - calibration::Predict(model_, seen, w.estimate.x, w.declared.eta);
+    out.tracking.clear();
     std::size_t k = 0;
     for (const Chosen& c : w.chosen) {
       if (!c.confirmed) continue;

@@ -14,15 +14,15 @@ RunState MakeRunState(const Candidate& candidate, const std::vector<double>& eta
     out.variance_ps = 1 / train_s;
     return out;
   }
-  // A spline over time: its coefficients are the level's path from zero on, and its last column stands alone at the
-  // end.
+  // A spline over time: its coefficients are the level's path from zero on. At the end the splines but the first sum up
+  // to one.
   const VectorXd& path = amplitude;
   double changes = path[0] * path[0];
   for (int k = 1; k < path.size(); ++k) changes += (path[k] - path[k - 1]) * (path[k] - path[k - 1]);
   out.time_s = eta[1];
   out.level_sd = path.cwiseAbs().maxCoeff();
   out.variance_ps = changes / train_s;
-  out.amplitude = VectorXd::Unit(path.size(), path.size() - 1);
+  out.amplitude = VectorXd::Ones(path.size());
   return out;
 }
 

@@ -156,7 +156,9 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     if (other == k) continue;
     const Candidate& o = *ranked[other].candidate;
     const std::string& kind = o.record().kind;
-    if (out.runner_up.empty()) out.runner_up = o.name(), out.runner_up_score = ranked[other].score;
+    const Rival rival{&o.record(), o.joints(), ranked[other].score};
+    const bool runner_up = out.rivals.empty();
+    if (runner_up) out.rivals.push_back(rival);
     const bool said = std::find(out.also_fits.begin(), out.also_fits.end(), kind) != out.also_fits.end();
     if (!SharesJoint(o, *f.candidate) || kind == f.candidate->record().kind || kind != o.record().name || said)
       continue;
@@ -164,7 +166,9 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     const double left = own - taken;
     const bool same = left < kIndistinguishable && left < 0.1 * own;
     const bool near = ranked[other].score > 0.95 * f.score;
-    if ((same || near) && out.also_fits.size() < kOtherNames) out.also_fits.push_back(kind);
+    if ((!same && !near) || out.also_fits.size() >= kOtherNames) continue;
+    out.also_fits.push_back(kind);
+    if (!runner_up) out.rivals.push_back(rival);
   }
   return true;
 }

@@ -5,7 +5,7 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "host_sim/cli/diagnose_batch.hpp"
-#include "host_sim/cli/diagnosis_report.hpp"
+#include "host_sim/cli/diagnosis_words.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/diagnosis/model_file.hpp"
@@ -44,7 +44,9 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   if (!o.model_out.empty() && after_test != before_test)
     io::AtomicWrite(o.model_out, after_test);  // what was not confirmed is taken out
 
-  run->view = {&model, &finding, &run->test, &run->held_out, run->diagnosis->TermTorque(run->test), seconds, o.robot};
+  run->view = {&model, &finding, &run->test, &run->held_out, run->diagnosis->TermTorque(run->test), seconds, {}};
+  for (const diagnosis::Term& t : finding.terms)
+    run->view.separation.push_back(Separations(t, model, run->catalogue, o.robot));
   nlohmann::ordered_json& json = run->json;
   json = DiagnosisJson(run->view);
   json["provenance"] = provenance;

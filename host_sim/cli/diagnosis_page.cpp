@@ -104,7 +104,7 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
                 {"folds", FoldText(t)},
                 {"runner-up", RunnerUp(t)},
                 {"fits equally", AlsoFits(t)}});
-    AddSeparations(page, Separations(t, v.robot));
+    AddSeparations(page, v.separation[k]);
     if (t.training_only) {
       page.Text("Explained in the training log, no property of the arm: it is left out of the comparison above.");
       continue;

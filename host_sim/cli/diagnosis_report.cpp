@@ -32,16 +32,17 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["verdict"] = AnyConfirmed(f) ? "effect" : "none";
   j["joint_base"] = 1;
   j["terms"] = nlohmann::ordered_json::array();
-  for (const Term& t : f.terms) {
+  for (std::size_t k = 0; k < f.terms.size(); ++k) {
+    const Term& t = f.terms[k];
     nlohmann::ordered_json term{{"kind", t.record->kind}, {"record", t.record->name}};
     if (t.joints.size() == 1 || IsUnknown(t)) term["joint"] = t.joints[0] + 1;
     else term["joint"] = JointName(t);
     term["signals"] = Signals(t);
     nlohmann::ordered_json parameters, deviations;
-    for (std::size_t k = 0; k < t.eta.size(); ++k) {
-      parameters[t.unknowns[k].name] = t.eta[k];
-      if (t.eta_sd[static_cast<Eigen::Index>(k)] > 0)
-        deviations[t.unknowns[k].name] = t.eta_sd[static_cast<Eigen::Index>(k)];
+    for (std::size_t u = 0; u < t.eta.size(); ++u) {
+      parameters[t.unknowns[u].name] = t.eta[u];
+      if (t.eta_sd[static_cast<Eigen::Index>(u)] > 0)
+        deviations[t.unknowns[u].name] = t.eta_sd[static_cast<Eigen::Index>(u)];
     }
     for (std::size_t c = 0; c < t.columns.size(); ++c)
       parameters[t.columns[c].name] = t.amplitude[c], deviations[t.columns[c].name] = t.sd[c];
@@ -54,7 +55,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["runner_up"] = t.rivals.empty() ? "" : RivalName(t.rivals[0]);
     term["runner_up_score"] = t.rivals.empty() ? 0 : t.rivals[0].score;
     term["separate"] = nlohmann::ordered_json::array();
-    for (const Separation& s : Separations(t, v.robot))
+    for (const Separation& s : v.separation[k])
       term["separate"].push_back({{"from", s.from}, {"how", s.how}, {"command", s.command}});
     term["training_only"] = t.training_only;
     term["in_model"] = t.confirmed && t.record->on_target;
@@ -79,12 +80,13 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
 
 std::string DiagnosisText(const DiagnosisView& v) {
   std::string out = "verdict: " + Headline(*v.finding) + "\n";
-  for (const Term& t : v.finding->terms) {
+  for (std::size_t k = 0; k < v.finding->terms.size(); ++k) {
+    const Term& t = v.finding->terms[k];
     out += fmt::format("  {}, joint {}{}: {}\n", t.record->kind, JointName(t), Remark(t), t.record->title);
     if (t.confirmed) out += fmt::format("    {}\n", Parameters(t));
     out += fmt::format("    score {}; {}\n", ScoreText(t), FoldText(t));
     out += fmt::format("    runner-up: {}; fits equally: {}\n", RunnerUp(t), AlsoFits(t));
-    for (const Separation& s : Separations(t, v.robot)) {
+    for (const Separation& s : v.separation[k]) {
       out += fmt::format("    to tell it from {}: {}\n", s.from, s.how);
       out += fmt::format("      {}\n", s.command.empty() ? kNoMotion : s.command);
     }

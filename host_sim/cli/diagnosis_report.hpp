@@ -11,6 +11,12 @@
 
 namespace armcal::cli {
 
+// How to tell a term from a rival on the same joints: in their records' words and, where a motion alone does it, as a
+// command for a shell.
+struct Separation {
+  std::string from, how, command;  // command: empty where a motion does not do
+};
+
 // Everything that one diagnosis has to show.
 struct DiagnosisView {
   const codegen::Model* model = nullptr;
@@ -19,7 +25,7 @@ struct DiagnosisView {
   const diagnosis::HeldOut* held_out = nullptr;
   std::vector<Eigen::MatrixXd> term_torque;  // on the test log
   double seconds = 0;
-  std::string robot;  // as the user named it
+  std::vector<std::vector<Separation>> separation;  // per term
 };
 
 struct DiagnoseOptions {

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "host_sim/excitation/observation.hpp"
+#include "host_sim/excitation/target.hpp"
 
 namespace armcal::cli {
 
@@ -93,7 +93,8 @@ std::string AlsoFits(const Term& t) {
   return t.also_fits.empty() ? "nothing else in the catalogue" : fmt::format("{}", fmt::join(t.also_fits, ", "));
 }
 
-std::vector<Separation> Separations(const Term& t, const std::string& robot) {
+std::vector<Separation> Separations(const Term& t, const codegen::Model& model, const codegen::Catalogue& records,
+                                    const std::string& robot) {
   std::vector<Separation> out;
   for (const Rival& rival : t.rivals) {
     if (Apart(t.joints, rival.joints) || (rival.record == t.record && rival.joints == t.joints)) continue;
@@ -101,9 +102,9 @@ std::vector<Separation> Separations(const Term& t, const std::string& robot) {
     const std::string& other = rival.record->separate;
     if (other != s.how && !other.empty()) s.how += (s.how.empty() ? "" : "; ") + other;
     if (s.how.empty()) s.how = "motion in which what they depend on does not go together";
-    if (excitation::MotionShows(*t.record) && excitation::MotionShows(*rival.record))
-      s.command = fmt::format("armcal excite --separate {},{} --robot {} --out separate.csv",
-                              Asked(*t.record, t.joints), Asked(*rival.record, rival.joints), robot);
+    const std::string one = Asked(*t.record, t.joints), another = Asked(*rival.record, rival.joints);
+    if (excitation::CanSeparate(model.robot(), records, {one, another}))
+      s.command = fmt::format("armcal excite --separate {},{} --robot {} --out separate.csv", one, another, robot);
     out.push_back(s);
   }
   return out;

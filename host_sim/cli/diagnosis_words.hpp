@@ -33,12 +33,9 @@ std::string RivalName(const diagnosis::Rival& rival);
 std::string RunnerUp(const diagnosis::Term& t);
 std::string AlsoFits(const diagnosis::Term& t);
 
-// How to tell a term from a rival on the same joints: in their records' words and, where a motion alone does it, as a
-// command for a shell.
-struct Separation {
-  std::string from, how, command;  // command: empty where a motion does not do
-};
-std::vector<Separation> Separations(const diagnosis::Term& t, const std::string& robot);
+// robot: as the user named the model's robot file.
+std::vector<Separation> Separations(const diagnosis::Term& t, const codegen::Model& model,
+                                    const codegen::Catalogue& records, const std::string& robot);
 
 // What the words say where there is no command.
 inline constexpr const char* kNoMotion = "armcal excite cannot search a motion for it";

@@ -77,6 +77,7 @@ std::string ScoreText(const Term& t) {
 }
 
 std::string FoldText(const Term& t) {
+  if (t.training_only) return "not asked blocks that it was not fitted to: an event of one part is in no other";
   return fmt::format("improves {} of {} blocks of the training log that it was not fitted to",
                      (t.folds.array() > 0).count(), t.folds.size());
 }

@@ -55,7 +55,7 @@ class NewModelFile : public testing::Test {
       t.amplitude[c] = made.columns[c].sd * (0.125 + 0.0625 * static_cast<double>(c));
     for (const auto& u : made.unknowns) t.eta.push_back(u.initial + 0.125 * (u.upper - u.initial));
     t.eta_sd.setConstant(static_cast<Eigen::Index>(t.eta.size()), 0.5);
-    t.score = 99, t.folds = Eigen::VectorXd::Ones(5);
+    t.score = 99;
     return t;
   }
   Term Found(const std::string& record, const codegen::Model& declared, int use = 0) {

@@ -60,6 +60,47 @@ calibration::Dataset AsTermsSay(const std::vector<Chosen>& chosen, const calibra
 // An event at a time of the training log: it says nothing about another log.
 bool OfTrainingOnly(const Candidate& c) { return c.record().search.how == "window"; }
 
+// What the declared model with these terms leaves of another log, [N x n]; w keeps their estimate. tracking: how run
+// states among them were followed.
+MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
+                std::string* tracking = nullptr) {
+  w.estimate = w.Solve(terms);
+  const calibration::Dataset seen = AsTermsSay(w.chosen, log);
+  const Quantities q = MakeQuantities(w.model, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
+  MatrixXd left = log.tau - calibration::Predict(w.model, seen, w.estimate.x, w.declared.eta);
+  if (tracking) tracking->clear();
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    const Chosen& c = *terms[k];
+    if (OfTrainingOnly(*c.candidate)) continue;
+    if (c.candidate->record().kind_class == "run_state") {
+      const auto& t = w.train[0]->s.t;
+      const RunState state = MakeRunState(*c.candidate, c.eta, w.estimate.amplitude[k], t[t.size() - 1] - t[0]);
+      left -= Track(state, q, left, w.estimate.sigma);
+      if (tracking) *tracking = "run states followed one step ahead; delay one sample";
+    } else {
+      left -= CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[k]);
+    }
+  }
+  return left;
+}
+
+// The weakest term that makes a joint worse: than the declared model is, or than the other terms are without it. A
+// delay is judged with all others, which were found on logs that it had aligned.
+Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after) {
+  for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
+    if (!c->confirmed || OfTrainingOnly(*c->candidate)) continue;
+    const auto is_worse_than = [&](const VectorXd& error) {
+      const auto& rows = c->candidate->rows();
+      return std::any_of(rows.begin(), rows.end(), [&](int j) { return after[j] > kWorse * error[j]; });
+    };
+    if (is_worse_than(before)) return &*c;
+    const std::vector<const Chosen*> others = Confirmed(w.chosen, &*c);
+    if (others.empty() || c->delay_s != 0) continue;
+    if (is_worse_than(calibration::Rms(log, Leaves(w, others, log), true))) return &*c;
+  }
+  return nullptr;
+}
+
 // Parameters of every use of a record: F_1, F_2 where there are two.
 template <class Parameter>
 void Repeat(const std::vector<Parameter>& once, std::size_t count, std::vector<Parameter>& out) {
@@ -138,31 +179,10 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
   const VectorXd before = calibration::Rms(test, out.before, true);
   for (;;) {
-    w.estimate = w.Solve(Confirmed(w.chosen));
-    const calibration::Dataset seen = AsTermsSay(w.chosen, test);
-    const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
-    out.after = test.tau - calibration::Predict(model_, seen, w.estimate.x, w.declared.eta);
-    out.tracking.clear();
-    std::size_t k = 0;
-    for (const Chosen& c : w.chosen) {
-      if (!c.confirmed) continue;
-      const VectorXd& amplitude = w.estimate.amplitude[k++];
-      if (OfTrainingOnly(*c.candidate)) continue;
-      if (c.candidate->record().kind_class == "run_state") {
-        const auto& t = w.train[0]->s.t;
-        const RunState state = MakeRunState(*c.candidate, c.eta, amplitude, t[t.size() - 1] - t[0]);
-        out.after -= Track(state, q, out.after, w.estimate.sigma);
-        out.tracking = "run states followed one step ahead; delay one sample";
-      } else {
-        out.after -= CandidateTorque(*c.candidate, q, c.eta, amplitude);
-      }
-    }
-    const VectorXd after = calibration::Rms(test, out.after, true);
-    Chosen* refuted = nullptr;
-    for (Chosen& c : w.chosen)
-      for (const int j : c.candidate->rows())
-        if (c.confirmed && !OfTrainingOnly(*c.candidate) && after[j] > kWorse * before[j])
-          refuted = &c;  // the weakest one: they are sorted
+    out.after = Leaves(w, Confirmed(w.chosen), test, &out.tracking);
+    Work::Estimate with_all = w.estimate;
+    Chosen* refuted = Refuted(w, test, before, calibration::Rms(test, out.after, true));
+    w.estimate = std::move(with_all);
     if (!refuted) break;
     refuted->confirmed = false;
     if (refuted->delay_s != 0) w.SetDelay(TotalDelay_s(w.chosen));

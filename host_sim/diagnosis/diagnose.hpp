@@ -63,8 +63,9 @@ class Diagnosis {
 
   const Finding& finding() const { return finding_; }
 
-  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint by more than 0.5 % as not
-  // confirmed and leaves them out of `after`; kinds and parameters do not change.
+  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint by more than 0.5 %,
+  // against the declared model or against the other terms, as not confirmed and leaves them out of `after`; kinds and
+  // parameters do not change.
   HeldOut Judge(const calibration::Dataset& test);
 
   // One N x n torque a term on a log (run-state terms: as windows of that log's own time would give).

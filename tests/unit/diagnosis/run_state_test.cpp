@@ -67,8 +67,8 @@ TEST(RunStateTracker, FollowsADriftAsDenseAlgebraDoes) {
   const Candidate drift(tests::Records().at("torque_drift"), run.arm.model().robot(), {1});
   const VectorXd path = (VectorXd(6) << 0.2, 0.5, 0.9, 1.1, 1.6, 1.5).finished();
   RunState state = MakeRunState(drift, {0, 40}, path, 40);
-  // the level's squared changes from zero on over the run, its largest value
-  EXPECT_NEAR(state.variance_ps, (0.2 * 0.2 + 0.3 * 0.3 + 0.4 * 0.4 + 0.2 * 0.2 + 0.5 * 0.5 + 0.1 * 0.1) / 40, 1e-12);
+  // a tenth of the level's squared changes from zero on over the run, its largest value
+  EXPECT_NEAR(state.variance_ps, (0.2 * 0.2 + 0.3 * 0.3 + 0.4 * 0.4 + 0.2 * 0.2 + 0.5 * 0.5 + 0.1 * 0.1) / 400, 1e-12);
   EXPECT_EQ(state.level_sd, 1.6);
   state.variance_ps = 2;  // so that it wanders within this short run
   MatrixXd residual = run.Zero(), shape = run.Zero();

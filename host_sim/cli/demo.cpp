@@ -28,7 +28,7 @@ ordered_json ReadJson(const std::string& path) { return ordered_json::parse(io::
 // Whether a confirmed term can be part of a committed model at all.
 bool Flashable(const diagnosis::Finding& finding) {
   for (const diagnosis::Term& t : finding.terms)
-    if (t.confirmed && t.record->in_model()) return true;
+    if (t.confirmed && t.record->on_target) return true;
   return false;
 }
 
@@ -90,7 +90,7 @@ class Demo {
       if (result["model"]["by_table"].get<bool>()) {
         path = Flashable(run->diagnosis->finding())
                    ? "the effect was compiled in and on standby; a table switched it on"
-                   : "the effect belongs to one run; the table stays without it";
+                   : "no model can hold what was found; the table stays without it";
       } else {
         Stage("generate the new model, build the drive with it, restart it");
         BuildDrive(final_robot);

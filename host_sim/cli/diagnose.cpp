@@ -1,12 +1,14 @@
 // cli - armcal diagnose: logs -> what the model lacks, decided on train, judged on test.
 #include <fmt/core.h>
+#include <algorithm>
 #include <chrono>
 
 #include "codegen/src/generator/emit.hpp"
 #include "host_sim/cli/diagnose_batch.hpp"
-#include "host_sim/cli/diagnosis_report.hpp"
+#include "host_sim/cli/diagnosis_words.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
+#include "host_sim/diagnosis/model_file.hpp"
 #include "host_sim/io/files.hpp"
 #include "host_sim/io/input_error.hpp"
 #include "host_sim/report/table.hpp"
@@ -31,18 +33,20 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   for (const std::string& p : o.train)
     provenance +=
         " " + std::filesystem::path(p).filename().string() + " (sha256 " + io::FileHash(p).substr(0, 16) + ")";
-  const std::string before_test = RobotFileWithTerms(model, finding, provenance);
+  const std::string before_test = diagnosis::ModelFile(model, finding, provenance);
   if (!o.model_out.empty()) {
     io::AtomicWrite(o.model_out, before_test);
     model_hash = io::FileHash(o.model_out);
   }
   run->test = read.One(o.test);
   run->held_out = run->diagnosis->Judge(run->test);
-  const std::string after_test = RobotFileWithTerms(model, finding, provenance);
+  const std::string after_test = diagnosis::ModelFile(model, finding, provenance);
   if (!o.model_out.empty() && after_test != before_test)
     io::AtomicWrite(o.model_out, after_test);  // what was not confirmed is taken out
 
-  run->view = {&model, &finding, &run->test, &run->held_out, run->diagnosis->TermTorque(run->test), seconds};
+  run->view = {&model, &finding, &run->test, &run->held_out, run->diagnosis->TermTorque(run->test), seconds, {}};
+  for (const diagnosis::Term& t : finding.terms)
+    run->view.separation.push_back(Separations(t, model, run->catalogue, o.robot));
   nlohmann::ordered_json& json = run->json;
   json = DiagnosisJson(run->view);
   json["provenance"] = provenance;
@@ -55,18 +59,23 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
                      {"by_table", codegen::Schema(next) == codegen::Schema(model)}};
   }
   fmt::print("{}", DiagnosisText(run->view));
-  report::Table table{{"joint", "before", "after", "before, moving", "after, moving", "noise floor"}, {}};
+  report::Table table{
+      {"joint", "before", "after", "before, moving", "after, moving", "noise floor", "smallest effect seen"}, {}};
   for (int j = 0; j < model.joints(); ++j) {
     std::vector<std::string> row{std::to_string(j + 1)};
-    for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor"})
+    for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor", "smallest_detectable"})
       row.push_back(fmt::format("{:.4g}", json[key][j].get<double>()));
     table.rows.push_back(row);
   }
   fmt::print("held out: {}, RMS of measured minus predicted torque\n{}", o.test, report::Text(table));
-  if (!o.model_out.empty() && !finding.terms.empty())
-    fmt::print(
-        "new model: {} ({})\n", o.model_out,
-        json["model"]["by_table"].get<bool>() ? "a table switches it on" : "generate it and build the drive anew");
+  if (!o.model_out.empty() && !finding.terms.empty()) {
+    const bool held = std::any_of(json["terms"].begin(), json["terms"].end(),
+                                  [](const auto& t) { return t["in_model"].template get<bool>(); });
+    fmt::print("new model: {} ({})\n", o.model_out,
+               !held                                   ? "with what was found as comments: no model can hold it"
+               : json["model"]["by_table"].get<bool>() ? "a table switches it on"
+                                                       : "generate it and build the drive anew");
+  }
   WriteJson(o.json, json);
   return run;
 }

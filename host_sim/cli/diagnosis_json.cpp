@@ -1,5 +1,5 @@
 // cli - a diagnosis as JSON.
-#include "host_sim/cli/diagnosis_report.hpp"
+#include "host_sim/cli/diagnosis_words.hpp"
 #include "host_sim/cli/logs.hpp"
 
 namespace armcal::cli {
@@ -46,7 +46,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["parameter_sd"] = deviations;
     term["also_fits"] = t.also_fits;
     term["confirmed"] = t.confirmed;
-    if (t.confirmed) {
+    if (t.confirmed && !t.training_only) {
       const Dependence d = DependenceOf(v, n);
       term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true));
       term["dependence"] = {
@@ -54,8 +54,14 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     }
     term["score"] = t.score;
     term["folds"] = ToList(t.folds);
-    term["runner_up"] = t.runner_up;
-    term["runner_up_score"] = t.runner_up_score;
+    term["runner_up"] = t.rivals.empty() ? "" : RivalName(t.rivals[0]);
+    term["runner_up_score"] = t.rivals.empty() ? 0 : t.rivals[0].score;
+    term["separate"] = nlohmann::ordered_json::array();
+    for (const Separation& apart : v.separation[n])
+      term["separate"].push_back({{"from", apart.from}, {"how", apart.how}, {"command", apart.command}});
+    term["training_only"] = t.training_only;
+    term["in_model"] = t.confirmed && t.record->on_target;
+    if (!t.record->on_target) term["remedy"] = t.record->remedy;
     j["terms"].push_back(term);
   }
   const auto& test = *v.test;

@@ -11,6 +11,12 @@
 
 namespace armcal::cli {
 
+// How to tell a term from a rival on the same joints: in their records' words and, where a motion alone does it, as a
+// command for a shell.
+struct Separation {
+  std::string from, how, command;  // command: empty where a motion does not do
+};
+
 // Everything that one diagnosis has to show.
 struct DiagnosisView {
   const codegen::Model* model = nullptr;
@@ -19,6 +25,7 @@ struct DiagnosisView {
   const diagnosis::HeldOut* held_out = nullptr;
   std::vector<Eigen::MatrixXd> term_torque;  // on the test log
   double seconds = 0;
+  std::vector<std::vector<Separation>> separation;  // per term
 };
 
 struct DiagnoseOptions {
@@ -42,15 +49,6 @@ struct DiagnosisRun {
 // (diagnose.cpp)
 std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options);
 
-// At least one term held on the held-out log.
-bool AnyConfirmed(const diagnosis::Finding& finding);
-
-// A curve that names no cause: its joint is the one whose torque it changes; another joint is among the signals.
-bool IsUnknown(const diagnosis::Term& term);
-
-// "3", "5-6", "all", "base", "flange": how a report names the joints of a term.
-std::string JointName(const diagnosis::Term& term);
-
 // Means over bins of a signal, over the held-out log where the joint moves: the residual with the term's torque put
 // back, the term, and the residual. (diagnosis_dependence.cpp)
 struct Dependence {
@@ -68,9 +66,5 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v);
 
 // Short lines for the terminal.
 std::string DiagnosisText(const DiagnosisView& v);
-
-// The robot file with the terms added (those not confirmed left out), with provenance as comments.
-std::string RobotFileWithTerms(const codegen::Model& model, const diagnosis::Finding& finding,
-                               const std::string& provenance);
 
 }  // namespace armcal::cli

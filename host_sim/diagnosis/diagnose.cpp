@@ -17,7 +17,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kMaxTerms = 4;
-constexpr double kWorse = 1.005;  // held-out: a joint that gets worse by more than this refutes the term
+constexpr double kWorse = 1.005;          // held-out: a joint of its own that gets worse by more refutes a term
+constexpr double kWorseElsewhere = 1.02;  // any joint: the base fit moves a little with every term
 
 double TotalDelay_s(const std::vector<Chosen>& chosen) {
   double sum = 0;
@@ -60,6 +61,52 @@ calibration::Dataset AsTermsSay(const std::vector<Chosen>& chosen, const calibra
 // An event at a time of the training log: it says nothing about another log.
 bool OfTrainingOnly(const Candidate& c) { return c.record().search.how == "window"; }
 
+// What the declared model with these terms leaves of another log, [N x n]; w keeps their estimate. tracking: how run
+// states among them were followed.
+MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
+                std::string* tracking = nullptr) {
+  w.estimate = w.Solve(terms);
+  const calibration::Dataset seen = AsTermsSay(w.chosen, log);
+  const Quantities q = MakeQuantities(w.model, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
+  MatrixXd left = log.tau - calibration::Predict(w.model, seen, w.estimate.x, w.declared.eta);
+  if (tracking) tracking->clear();
+  // Run states are followed in what is left once everything else has been taken off.
+  for (const bool run_states : {false, true})
+    for (std::size_t k = 0; k < terms.size(); ++k) {
+      const Chosen& c = *terms[k];
+      const bool is_run_state = c.candidate->record().kind_class == "run_state";
+      if (OfTrainingOnly(*c.candidate) || is_run_state != run_states) continue;
+      if (!is_run_state) {
+        left -= CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[k]);
+        continue;
+      }
+      const auto& t = w.train[0]->s.t;
+      const RunState state = MakeRunState(*c.candidate, c.eta, w.estimate.amplitude[k], t[t.size() - 1] - t[0]);
+      left -= Track(state, q, left, w.estimate.sigma);
+      if (tracking) *tracking = "run states followed one step ahead; delay one sample";
+    }
+  return left;
+}
+
+// The weakest term that makes a joint worse: than the declared model is, or than the other terms are without it. A
+// delay is judged with all others, which were found on logs that it had aligned.
+Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after) {
+  for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
+    if (!c->confirmed || OfTrainingOnly(*c->candidate)) continue;
+    const auto is_worse_than = [&](const VectorXd& error) {
+      const VectorXd ratio = after.cwiseQuotient(error.cwiseMax(1e-300));
+      const auto& rows = c->candidate->rows();
+      return ratio.maxCoeff() > kWorseElsewhere ||
+             std::any_of(rows.begin(), rows.end(), [&](int j) { return ratio[j] > kWorse; });
+    };
+    if (is_worse_than(before)) return &*c;
+    const std::vector<const Chosen*> others = Confirmed(w.chosen, &*c);
+    if (others.empty() || c->delay_s != 0) continue;
+    if (is_worse_than(calibration::Rms(log, Leaves(w, others, log), true))) return &*c;
+  }
+  return nullptr;
+}
+
 // Parameters of every use of a record: F_1, F_2 where there are two.
 template <class Parameter>
 void Repeat(const std::vector<Parameter>& once, std::size_t count, std::vector<Parameter>& out) {
@@ -83,8 +130,8 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
     if (c.delay_s != 0) t.eta[static_cast<std::size_t>(c.candidate->delay())] += c.delay_s;
     t.score = c.found.score, t.gain = c.found.gain.gain;
     t.folds = c.folds, t.also_fits = c.also_fits;
-    t.runner_up = c.runner_up, t.runner_up_score = c.runner_up_score;
-    t.confirmed = c.confirmed;
+    t.rivals = c.rivals;
+    t.training_only = OfTrainingOnly(*c.candidate), t.confirmed = c.confirmed;
     t.amplitude = VectorXd::Zero(c.candidate->columns(c.eta)), t.sd = t.amplitude;
     t.eta_sd = VectorXd::Zero(static_cast<Eigen::Index>(c.eta.size()));
     if (c.confirmed) {
@@ -138,32 +185,10 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
   const VectorXd before = calibration::Rms(test, out.before, true);
   for (;;) {
-    w.estimate = w.Solve(Confirmed(w.chosen));
-    const calibration::Dataset seen = AsTermsSay(w.chosen, test);
-    const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
-    out.after = test.tau - calibration::Predict(model_, seen, w.estimate.x, w.declared.eta);
-    // Run states are followed in what is left once everything else has been taken off.
-    std::vector<std::pair<const Chosen*, std::size_t>> run_states;
-    std::size_t k = 0;
-    for (const Chosen& c : w.chosen) {
-      if (!c.confirmed) continue;
-      const std::size_t at = k++;
-      if (OfTrainingOnly(*c.candidate)) continue;
-      if (c.candidate->record().kind_class == "run_state") run_states.emplace_back(&c, at);
-      else out.after -= CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[at]);
-    }
-    for (const auto& [c, at] : run_states) {
-      const auto& t = w.train[0]->s.t;
-      const RunState state = MakeRunState(*c->candidate, c->eta, w.estimate.amplitude[at], t[t.size() - 1] - t[0]);
-      out.after -= Track(state, q, out.after, w.estimate.sigma);
-      out.tracking = "run states followed one step ahead; delay one sample";
-    }
-    const VectorXd after = calibration::Rms(test, out.after, true);
-    Chosen* refuted = nullptr;
-    for (Chosen& c : w.chosen)
-      for (const int j : c.candidate->rows())
-        if (c.confirmed && !OfTrainingOnly(*c.candidate) && after[j] > kWorse * before[j])
-          refuted = &c;  // the weakest one: they are sorted
+    out.after = Leaves(w, Confirmed(w.chosen), test, &out.tracking);
+    Work::Estimate with_all = w.estimate;
+    Chosen* refuted = Refuted(w, test, before, calibration::Rms(test, out.after, true));
+    w.estimate = std::move(with_all);
     if (!refuted) break;
     refuted->confirmed = false;
     if (refuted->delay_s != 0) w.SetDelay(TotalDelay_s(w.chosen));

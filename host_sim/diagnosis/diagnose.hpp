@@ -11,6 +11,15 @@
 
 namespace armcal::diagnosis {
 
+inline constexpr double kAccept = 15;  // score of a term: odds of about e^7 to one after all penalties
+
+// Another candidate, as it was found beside a term.
+struct Rival {
+  const codegen::EffectRecord* record = nullptr;
+  std::vector<int> joints;
+  double score = 0;
+};
+
 struct Term {
   const codegen::EffectRecord* record = nullptr;
   std::vector<int> joints;                     // 0-based; empty: the whole arm or its flange
@@ -22,9 +31,9 @@ struct Term {
   double score = 0, gain = 0;
   Eigen::VectorXd folds;               // improvement of chi^2 out of fold
   std::vector<std::string> also_fits;  // kinds that this log cannot tell from it
-  std::string runner_up;
-  double runner_up_score = 0;
-  bool confirmed = true;  // false: the held-out log did not bear it out
+  std::vector<Rival> rivals;           // the runner-up, then those of also_fits that are not it
+  bool training_only = false;          // an event of the training log: it says nothing about the arm or another log
+  bool confirmed = true;               // false: the held-out log did not bear it out
 };
 
 struct Finding {
@@ -54,8 +63,9 @@ class Diagnosis {
 
   const Finding& finding() const { return finding_; }
 
-  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint by more than 0.5 % as not
-  // confirmed and leaves them out of `after`; kinds and parameters do not change.
+  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint by more than 0.5 %,
+  // against the declared model or against the other terms, as not confirmed and leaves them out of `after`; kinds and
+  // parameters do not change.
   HeldOut Judge(const calibration::Dataset& test);
 
   // One N x n torque a term on a log (run-state terms: as windows of that log's own time would give).

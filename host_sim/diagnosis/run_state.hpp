@@ -16,7 +16,8 @@ struct RunState {
   double variance_ps = 0;     // of the level's random walk, per second
 };
 
-// From the term as fitted to a training run of this length: its level's squared changes over the run's length.
+// From the term as fitted to a training run of this length: its level's squared changes over the run's length,
+// less where it is smooth.
 RunState MakeRunState(const Candidate& candidate, const std::vector<double>& eta, const Eigen::VectorXd& amplitude,
                       double train_s);
 

@@ -130,9 +130,7 @@ bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& t
   return std::any_of(terms.begin(), terms.end(), [&](const Chosen* t) {
     const auto& like = t->candidate->record().confusable_with;
     const bool confusable = std::find(like.begin(), like.end(), c.record().name) != like.end();
-    // another frequency of the same kind is another term, and so is another part of a signal's range
-    const bool other_part = c.record().search.how == "spectral" || (c.record().search.how == "spline" && c.is_curve());
-    return (t->candidate == &c && !other_part) || (confusable && t->candidate->joints() == c.joints());
+    return (t->candidate == &c && !c.record().repeats()) || (confusable && t->candidate->joints() == c.joints());
   });
 }
 
@@ -173,7 +171,9 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     if (other == k) continue;
     const Candidate& o = *ranked[other].candidate;
     const std::string& kind = o.record().kind;
-    if (out.runner_up.empty()) out.runner_up = o.name(), out.runner_up_score = ranked[other].score;
+    const Rival rival{&o.record(), o.joints(), ranked[other].score};
+    const bool runner_up = out.rivals.empty();
+    if (runner_up) out.rivals.push_back(rival);
     const bool said = std::find(out.also_fits.begin(), out.also_fits.end(), kind) != out.also_fits.end();
     if (!SharesJoint(o, *f.candidate) || kind == f.candidate->record().kind || kind != o.record().name || said)
       continue;
@@ -181,7 +181,9 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     const double left = own - taken;
     const bool same = left < kIndistinguishable && left < 0.1 * own;
     const bool near = ranked[other].score > 0.95 * f.score;
-    if ((same || near) && out.also_fits.size() < kOtherNames) out.also_fits.push_back(kind);
+    if ((!same && !near) || out.also_fits.size() >= kOtherNames) continue;
+    out.also_fits.push_back(kind);
+    if (!runner_up) out.rivals.push_back(rival);
   }
   return true;
 }

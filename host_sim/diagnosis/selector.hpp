@@ -10,8 +10,6 @@
 
 namespace armcal::diagnosis {
 
-inline constexpr double kAccept = 15;  // score: odds of about e^7 to one after all penalties
-
 class Selector {
  public:
   explicit Selector(Diagnosis::Work& work) : w_(work) {}

@@ -12,8 +12,7 @@ struct Chosen {
   Found found;
   Eigen::VectorXd folds;
   std::vector<std::string> also_fits;
-  std::string runner_up;
-  double runner_up_score = 0;
+  std::vector<Rival> rivals;
   bool confirmed = true;
   double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
 };

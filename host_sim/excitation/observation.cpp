@@ -11,13 +11,9 @@ namespace {
 
 constexpr Eigen::Index kPiece = 1024;  // samples evaluated at once: rows of a minute would fill the memory
 
-bool MotionAloneExcites(const codegen::Model& model, const std::string& effect) {
-  for (const codegen::EffectInstance& e : model.effects()) {
-    if (e.record->name != effect) continue;
-    for (const std::string& input : e.record->inputs)
-      if (input == "temp" || input == "t" || input == "flag") return false;
-    return e.record->kind_class == "static";
-  }
+bool MotionShows(const codegen::Model& model, const std::string& effect) {
+  for (const codegen::EffectInstance& e : model.effects())
+    if (e.record->name == effect) return excitation::MotionShows(*e.record);
   return true;
 }
 
@@ -51,6 +47,12 @@ Eigen::VectorXd MeanOfColumns(const codegen::Model& model) {
 
 }  // namespace
 
+bool MotionShows(const codegen::EffectRecord& record) {
+  return record.kind_class == "static" && std::none_of(record.inputs.begin(), record.inputs.end(), [](const auto& i) {
+           return i == "temp" || i == "t" || i == "flag";
+         });
+}
+
 Observation::Observation(const codegen::Model& model, Rotors rotors) : model_(model), mean_(MeanOfColumns(model)) {
   for (int c = 0; c < model.columns(); ++c) {
     if (model.is_rigid(c)) {
@@ -59,7 +61,7 @@ Observation::Observation(const codegen::Model& model, Rotors rotors) : model_(mo
     }
     const codegen::TableParameter& parameter = model.table()[model.table_index(c)];
     if (parameter.state != "estimated") continue;
-    if (MotionAloneExcites(model, parameter.effect)) column_.push_back(c);
+    if (MotionShows(model, parameter.effect)) column_.push_back(c);
     else left_out_.push_back(parameter.name);
   }
 }

@@ -9,16 +9,18 @@
 
 namespace armcal::excitation {
 
+// Motion alone shows the effect: it looks at no temperature, time or flag, is no state of the run, and has no memory
+// (a row would then depend on all samples before).
+bool MotionShows(const codegen::EffectRecord& record);
+
 // One convention for the condition number of K: columns are the filter coordinates that are estimated (rigid base,
 // Coulomb, viscous, effects), rows are divided by their joint's torque noise, columns are scaled to unit norm.
 class Observation {
  public:
   enum class Rotors { kAsked, kLeftOut };
 
-  // Left out are columns whose state is not `estimated`, and effects that motion alone does not excite: those that look
-  // at temperature, time or a flag, states of the run, and effects with memory (a row then depends on all samples
-  // before). Rotors::kLeftOut: without the rotor inertias, as in the
-  // survey. The model must outlive the observation.
+  // Left out are columns whose state is not `estimated`, and effects that motion alone does not show.
+  // Rotors::kLeftOut: without the rotor inertias, as in the survey. The model must outlive the observation.
   explicit Observation(const codegen::Model& model, Rotors rotors = Rotors::kAsked);
 
   const codegen::Model& model() const { return model_; }

@@ -2,6 +2,8 @@
 #include "host_sim/excitation/target.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <random>
 #include <sstream>
 
 #include "host_sim/io/input_error.hpp"
@@ -59,6 +61,26 @@ void Add(const std::string& name, const codegen::Catalogue& records, codegen::Ro
     throw io::InputError(name + ": expected joints of " + robot.name + " that " + wanted.record + " can have");
 }
 
+// States as no path has them, slow ones among them: what these do not tell apart, no motion does.
+codegen::Signals AnyStates(const codegen::Robot& robot) {
+  constexpr int kSamples = 1500;
+  std::mt19937_64 random(1);
+  const auto share = [&] { return 2 * (static_cast<double>(random() >> 11) * 0x1p-53) - 1; };
+  codegen::Signals s;
+  s.t.setZero(kSamples);
+  s.q.resize(kSamples, robot.joints()), s.qd = s.q, s.qdd = s.q;
+  for (int j = 0; j < robot.joints(); ++j) {
+    const codegen::Joint& joint = robot.joint[j];
+    const double lower = joint.position_limit_rad[0], upper = joint.position_limit_rad[1];
+    for (int k = 0; k < kSamples; ++k) {
+      s.q(k, j) = 0.5 * (lower + upper) + 0.5 * (upper - lower) * share();
+      s.qd(k, j) = joint.speed_limit_radps * std::pow(share(), 3);
+      s.qdd(k, j) = joint.acceleration_limit_radps2 * share();
+    }
+  }
+  return s;
+}
+
 }  // namespace
 
 Target::Target(const codegen::Robot& robot, const codegen::Catalogue& records, Criterion::Kind kind)
@@ -90,6 +112,16 @@ Target Target::Friction(const codegen::Robot& robot, const codegen::Catalogue& r
       target.criterion_.about.push_back(static_cast<int>(k));
   }
   return target;
+}
+
+bool CanSeparate(const codegen::Robot& robot, const codegen::Catalogue& records,
+                 const std::vector<std::string>& effects) {
+  try {
+    const Target target(robot, records, effects);
+    return std::isfinite(Figure(target.criterion(), target.observation().Gram(AnyStates(robot))));
+  } catch (const io::InputError&) {  // motion alone does not show one of them
+    return false;
+  }
 }
 
 const char* Name(Criterion::Kind kind) {

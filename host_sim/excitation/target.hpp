@@ -30,6 +30,10 @@ class Target {
   Criterion criterion_;
 };
 
+// Some motion within the limits of speed and acceleration tells these effects from each other and from all else.
+bool CanSeparate(const codegen::Robot& robot, const codegen::Catalogue& records,
+                 const std::vector<std::string>& effects);
+
 // "cond(K)", ...
 const char* Name(Criterion::Kind kind);
 

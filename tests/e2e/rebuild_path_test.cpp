@@ -45,5 +45,46 @@ exponent = 2.8
   EXPECT_EQ(result.at("title"), "churning in joint 4 of another arm");
 }
 
+// A base that is not level turns gravity for the whole arm; a drag with the ninth power of speed is in no record.
+TEST_F(RebuildPath, ATiltedBaseAndAnUnknownFriction_AreCompiledIn) {
+  const fs::path folder = FreshFolder("tilt_and_curve");
+  const fs::path scenario = folder / "tilt_and_curve.toml";
+  std::ofstream(scenario) << R"(title = "a base that does not stand level, and a seal that binds at speed"
+robot = "er20_like"
+truth_seed = 31
+noise_seed = 17
+
+[[effect]]
+kind = "base_tilt"
+roll_deg = -0.5
+pitch_deg = 0.6
+
+[[effect]]
+kind = "viscous_cubic"
+joint = 4
+drag_at_1radps_Nm = 1e-4
+exponent = 9.0
+)";
+  const nlohmann::json result = RunDemo(scenario.string(), folder);
+  ASSERT_FALSE(result.is_null());
+  ExpectSoundLoop(result, folder);
+  ExpectFound(result, {"unknown"}, 4);
+  ASSERT_EQ(result.at("terms").size(), 2u);
+  const nlohmann::json &curve = result.at("terms")[0], &tilt = result.at("terms")[1];
+  EXPECT_EQ(curve.at("record"), "curve_friction");
+  EXPECT_EQ(curve.at("signals"), nlohmann::json({"qd4"}));
+  EXPECT_EQ(tilt.at("kind"), "base_tilt");
+  for (const int joint : {1, 2}) ExpectExcessGone(result, joint);
+  EXPECT_FALSE(result.at("model").at("by_table").get<bool>());
+  // the evidence, wherever it is read
+  const std::string page = ReadText(folder / "report.html");
+  for (const nlohmann::json& t : {curve, tilt}) {
+    EXPECT_TRUE(t.at("in_model").get<bool>());
+    ASSERT_FALSE(t.at("separate").empty());
+    EXPECT_NE(page.find(t.at("separate")[0].at("how").get<std::string>()), std::string::npos);
+    EXPECT_NE(page.find(t.at("runner_up").get<std::string>()), std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace armcal::tests

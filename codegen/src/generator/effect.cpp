@@ -92,6 +92,8 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
                 "adds_base",
                 "depends_on_estimate",
                 "on_target",
+                "remedy",
+                "separate",
                 "friction_law",
                 "generic_penalty",
                 "search",
@@ -142,10 +144,18 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
   r.adds_base = in.Texts("adds_base");
   r.replaces = in.Text("replaces", "");
   r.depends_on_estimate = in.Flag("depends_on_estimate", false);
-  r.on_target = in.Flag("on_target", true);
+  // What the measurement underwent, or what belongs to one run, is no property of the arm that a table could state.
+  const bool of_the_arm = r.kind_class == "static" || r.kind_class == "stateful";
+  r.on_target = in.Flag("on_target", of_the_arm);
+  if (r.on_target && !of_the_arm) in.Fail("on_target", "false where class is \"" + r.kind_class + "\"");
+  r.remedy = in.Text("remedy", "");
+  if (r.on_target != r.remedy.empty()) in.Fail("remedy", "a sentence if, and only if, no model can hold the effect");
+  r.separate = in.Text("separate", "");
   r.friction_law = in.Flag("friction_law", false);
   r.generic_penalty = in.Number("generic_penalty", 0);
   r.confusable_with = in.Texts("confusable_with");
+  if (!r.confusable_with.empty() && r.separate.empty())
+    in.Fail("separate", "what tells it from those of confusable_with");
   r.needs = in.Texts("needs");
   if (in.Has("search")) {
     const TomlReader s = in.Table("search");

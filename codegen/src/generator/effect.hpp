@@ -60,13 +60,15 @@ struct EffectRecord {
   std::string replaces;                // the friction law whose place it takes on its joint
   std::vector<std::string> adds_base;  // body parameters that it makes visible
   bool depends_on_estimate = false;
-  bool on_target = true;
+  bool on_target = true;       // a model can hold it: static and stateful ones unless the file says no
+  std::string remedy;          // what to do about one that no model holds
+  std::string separate;        // the motion or log that tells it from those it is confused with
   bool friction_law = false;   // the robot's own friction, not a candidate
   double generic_penalty = 0;  // added to the score a flexible term must beat
   Search search;
 
-  // A model can hold it: it acts on the arm, not on the measurement, and in every run.
-  bool in_model() const { return on_target && kind_class != "sensor"; }
+  // Another frequency, or another part of a signal's range, is another use on the same joints.
+  bool repeats() const { return search.how == "spectral" || (search.how == "spline" && generic_penalty > 0); }
 };
 
 // Throws io::InputError: file, key, what was expected.

@@ -101,7 +101,7 @@ void Model::AddEffects(const Catalogue& catalogue, const ModelQuantities& quanti
   for (const EffectUse& use : uses) {
     const std::string where = robot_.path + ": effect." + use.effect;
     const EffectRecord& found = Find(catalogue, robot_, use.effect);
-    if (!found.in_model())
+    if (!found.on_target)
       throw io::InputError(where + ": expected an effect that a model can hold; " + found.name +
                            " is for the host only");
     const EffectRecord& record = record_.emplace(found.name, found).first->second;
@@ -112,12 +112,15 @@ void Model::AddEffects(const Catalogue& catalogue, const ModelQuantities& quanti
     if (sets.empty()) throw io::InputError(where + ": expected joints = [...]");
     for (const auto& set : sets) {
       // A later entry for the same effect and joints says more about the first one: its state and values, not a second
-      // column.
+      // column. Where a record may be used several times, that one is on standby.
       std::size_t known = effect_.size();
       int ordinal = 1;
-      for (std::size_t e = 0; e < effect_.size(); ++e)
-        if (effect_[e].record == &record && effect_[e].joints == set) known = e, ++ordinal;
-      if (known < effect_.size() && record.search.how != "spectral") {
+      for (std::size_t e = 0; e < effect_.size(); ++e) {
+        if (effect_[e].record != &record || effect_[e].joints != set) continue;
+        ++ordinal;
+        if (!record.repeats() || (known == effect_.size() && use_[e].state == "standby")) known = e;
+      }
+      if (known < effect_.size()) {
         use_[known] = use;
         continue;
       }

@@ -117,6 +117,24 @@ class BadFile : public testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 };
 
+// What a verdict says about an effect is in its record, wherever there is something to say.
+TEST_F(BadFile, RecordWithoutItsWords_IsRefusedWithItsKey) {
+  const auto read = [&](const std::string& words) {
+    return [this, words] {
+      codegen::ReadEffect(Write("x.toml", "name = \"x\"\ntitle = \"x\"\nscope = \"joint\"\n" + words +
+                                              "[[linear]]\nname = \"a\"\nunit = \"N*m\"\nrows = { j = \"1\" }\n"));
+    };
+  };
+  const std::string run = "class = \"run_state\"\n", of_the_arm = "class = \"static\"\n";
+  ExpectError(read(run), "remedy");
+  ExpectError(read(run + "remedy = \"wait\"\non_target = true\n"), "on_target");
+  ExpectError(read(of_the_arm + "remedy = \"wait\"\n"), "remedy");
+  ExpectError(read(of_the_arm + "on_target = false\n"), "remedy");
+  ExpectError(read(of_the_arm + "confusable_with = [\"stribeck\"]\n"), "separate");
+  EXPECT_NO_THROW(read(run + "remedy = \"wait\"\n")());
+  EXPECT_NO_THROW(read(of_the_arm + "on_target = false\nremedy = \"wait\"\n")());
+}
+
 TEST_F(BadFile, Record_IsRefusedWithFileAndKey) {
   const std::string head = "name = \"x\"\ntitle = \"x\"\nclass = \"static\"\nscope = \"joint\"\n";
   ExpectError([&] { codegen::ReadEffect(Write("x.toml", head)); }, "linear");

@@ -13,7 +13,7 @@ inline codegen::Model EveryEffect() {
   robot.effect.clear();
   int free_joint = 0;
   for (const auto& [name, record] : records) {
-    if (record.friction_law || record.kind_class == "sensor" || !record.on_target) continue;
+    if (record.friction_law || !record.on_target) continue;
     codegen::EffectUse use;
     use.effect = name;
     if (!record.replaces.empty()) use.joints = {free_joint++};

@@ -1,0 +1,119 @@
+// cli - words for scores, rivals, and what would separate them.
+#include "host_sim/cli/diagnosis_words.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host_sim/excitation/target.hpp"
+
+namespace armcal::cli {
+
+using diagnosis::Rival;
+using diagnosis::Term;
+
+namespace {
+
+std::string Value(const std::string& name, double value, double sd, const std::string& unit) {
+  return fmt::format("{} = {:.4g}{} {}", name, value, sd > 0 ? fmt::format(" +- {:.2g}", sd) : "", unit);
+}
+
+std::string Numbers(const std::vector<int>& joints) {
+  std::string out;
+  for (const int j : joints) out += fmt::format("{}{}", out.empty() ? "" : "-", j + 1);
+  return out;
+}
+
+// "stribeck:2", "wrist_coupling:5-6", "base_tilt": as armcal excite --separate takes it.
+std::string Asked(const codegen::EffectRecord& record, const std::vector<int>& joints) {
+  return record.name + (joints.empty() ? "" : ":") + Numbers(joints);
+}
+
+bool Apart(const std::vector<int>& a, const std::vector<int>& b) {
+  return !a.empty() && !b.empty() &&
+         std::none_of(a.begin(), a.end(), [&](int j) { return std::find(b.begin(), b.end(), j) != b.end(); });
+}
+
+}  // namespace
+
+bool AnyConfirmed(const diagnosis::Finding& f) {
+  return std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed; });
+}
+
+std::string Headline(const diagnosis::Finding& f) {
+  if (f.terms.empty())
+    return "none. Nothing is missing that these logs could show; what they would have shown is in the table: smallest "
+           "effect seen";
+  if (!AnyConfirmed(f)) return "none. What the training logs suggested did not hold on the held-out log";
+  const bool of_the_arm =
+      std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed && !t.training_only; });
+  return of_the_arm ? "effect" : "effect, in the training log only: it says nothing about the arm";
+}
+
+std::string Remark(const Term& t) {
+  if (!t.confirmed) return " (NOT CONFIRMED on the held-out log)";
+  return t.training_only ? " (in the training log only)" : "";
+}
+
+std::string JointName(const Term& t) {
+  if (t.joints.size() == 1 || IsUnknown(t)) return std::to_string(t.joints[0] + 1);
+  return t.joints.empty() ? t.record->place : Numbers(t.joints);
+}
+
+std::string Parameters(const Term& t) {
+  constexpr std::size_t kShown = 4;
+  std::vector<std::string> out;
+  for (std::size_t k = 0; k < t.eta.size(); ++k)
+    out.push_back(Value(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Eigen::Index>(k)], t.unknowns[k].unit));
+  for (std::size_t c = 0; c < std::min(kShown, t.columns.size()); ++c)
+    out.push_back(Value(t.columns[c].name, t.amplitude[static_cast<Eigen::Index>(c)],
+                        t.sd[static_cast<Eigen::Index>(c)], t.columns[c].unit));
+  if (t.columns.size() > kShown) out.push_back("...");
+  return fmt::format("{}", fmt::join(out, ", "));
+}
+
+std::string ScoreText(const Term& t) {
+  return fmt::format("{:.0f} (accepted above {:g})", t.score, diagnosis::kAccept);
+}
+
+std::string FoldText(const Term& t) {
+  if (t.training_only) return "not asked blocks that it was not fitted to: an event of one part is in no other";
+  return fmt::format("improves {} of {} blocks of the training log that it was not fitted to",
+                     (t.folds.array() > 0).count(), t.folds.size());
+}
+
+std::string RivalName(const Rival& rival) {
+  return rival.record->name + ", joint " + (rival.joints.empty() ? rival.record->place : Numbers(rival.joints));
+}
+
+std::string RunnerUp(const Term& t) {
+  return t.rivals.empty() ? "none" : fmt::format("{} (score {:.0f})", RivalName(t.rivals[0]), t.rivals[0].score);
+}
+
+std::string AlsoFits(const Term& t) {
+  return t.also_fits.empty() ? "nothing else in the catalogue" : fmt::format("{}", fmt::join(t.also_fits, ", "));
+}
+
+std::vector<Separation> Separations(const Term& t, const codegen::Model& model, const codegen::Catalogue& records,
+                                    const std::string& robot) {
+  std::vector<Separation> out;
+  for (const Rival& rival : t.rivals) {
+    if (Apart(t.joints, rival.joints) || (rival.record == t.record && rival.joints == t.joints)) continue;
+    Separation s{RivalName(rival), t.record->separate, ""};
+    const std::string& other = rival.record->separate;
+    if (other != s.how && !other.empty()) s.how += (s.how.empty() ? "" : "; ") + other;
+    if (s.how.empty()) s.how = "motion in which what they depend on does not go together";
+    const std::string one = Asked(*t.record, t.joints), another = Asked(*rival.record, rival.joints);
+    if (excitation::CanSeparate(model.robot(), records, {one, another}))
+      s.command = fmt::format("armcal excite --separate {},{} --robot {} --out separate.csv", one, another, robot);
+    out.push_back(s);
+  }
+  return out;
+}
+
+std::string InTheModel(const Term& t) {
+  if (!t.confirmed) return "left out: the held-out log did not bear it out";
+  return t.record->on_target ? "yes, as an estimated effect" : "no model can hold it: " + t.record->remedy;
+}
+
+}  // namespace armcal::cli

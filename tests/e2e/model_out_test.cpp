@@ -1,0 +1,114 @@
+// end-to-end tests - armcal diagnose --model-out where no model can hold what was found: said, not written as an
+// effect.
+#include <numbers>
+
+#include "host_sim/io/log.hpp"
+#include "tests/e2e/tool.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::tests {
+namespace {
+
+using calibration::Dataset;
+using Change = std::function<void(Dataset&)>;
+
+class ModelOut : public testing::Test {
+ protected:
+  // Logs of a small arm whose measurement underwent this; what diagnose said, and the new file generated from.
+  void Diagnose(const std::string& name, const Change& train, const Change& test) {
+    folder_ = FreshFolder("model_out_" + name);
+    SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 9);
+    Write(arm.Run(20, 90), train, "train.csv");
+    Write(arm.Run(20, 91), test, "test.csv");
+    said_ = Tool({"diagnose", "--robot", "two_link", "--train", Path("train.csv"), "--test", Path("test.csv"),
+                  "--model-out", Path("new.toml"), "--json", Path("verdict.json"), "--report", Path("page.html")});
+    ASSERT_EQ(said_.code, 0) << said_.err << said_.out;
+    verdict_ = ReadJson(Path("verdict.json"));
+    const Outcome generated = Tool({"generate", "--robot", Path("new.toml"), "--out", Path("generated")});
+    ASSERT_EQ(generated.code, 0) << generated.err;
+  }
+  // The first term is of this record, with its remedy wherever the verdict is read; tables are what a model can hold.
+  void ExpectARemedyFor(const std::string& record) {
+    if (HasFatalFailure()) return;
+    ASSERT_FALSE(verdict_.at("terms").empty()) << said_.out;
+    const nlohmann::json& t = verdict_.at("terms")[0];
+    EXPECT_EQ(t.at("record"), record) << said_.out;
+    EXPECT_FALSE(t.at("in_model").get<bool>());
+    const std::string remedy = t.at("remedy"), file = ReadText(Path("new.toml"));
+    EXPECT_NE(file.find(remedy), std::string::npos);
+    EXPECT_NE(said_.out.find(remedy), std::string::npos) << said_.out;
+    EXPECT_NE(ReadText(Path("page.html")).find("no model can hold it: "), std::string::npos);
+    EXPECT_NE(file.find(" +- "), std::string::npos);
+    EXPECT_NE(file.find("train.csv (sha256 "), std::string::npos);
+    int held = 0, tables = 0;
+    for (const auto& term : verdict_.at("terms")) held += term.at("in_model").get<bool>();
+    for (auto at = file.find("\n[[effect]]"); at != file.npos; at = file.find("\n[[effect]]", at + 1)) ++tables;
+    EXPECT_EQ(tables, held);
+    EXPECT_EQ(verdict_.at("model").at("by_table").get<bool>(), held == 0);
+    EXPECT_EQ(said_.out.find("as comments: no model can hold it") != std::string::npos, held == 0) << said_.out;
+  }
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+
+  fs::path folder_;
+  Outcome said_;
+  nlohmann::json verdict_;
+
+ private:
+  void Write(Dataset d, const Change& change, const std::string& name) const {
+    if (change) change(d);
+    io::Log log;
+    log.joints = d.joints();
+    log.t = d.s.t, log.q = d.s.q, log.tau = d.tau;
+    io::WriteLog(Path(name), log);
+  }
+};
+
+TEST_F(ModelOut, OfATorqueThatIsReadLate_SaysByHowMuch) {
+  const auto late = [](Dataset& d) {  // half a sample of 8 ms
+    const Eigen::MatrixXd tau = d.tau;
+    for (int k = 1; k < d.samples(); ++k) d.tau.row(k) = 0.5 * (tau.row(k) + tau.row(k - 1));
+  };
+  Diagnose("late", late, late);
+  ExpectARemedyFor("time_delay");
+  EXPECT_NEAR(verdict_["terms"][0]["parameters"]["time_delay.d"].get<double>(), 0.004, 0.0008);
+}
+
+TEST_F(ModelOut, OfATorqueThatStopsAtALimit_SaysWhere) {
+  double limit = 0;
+  const auto clamped = [&](Dataset& d) {
+    if (limit == 0) limit = 0.9 * d.tau.col(0).cwiseAbs().maxCoeff();
+    for (int k = 0; k < d.samples(); ++k)  // the reading goes on to flicker: one that stands still is refused as dead
+      d.tau(k, 0) = std::clamp(d.tau(k, 0), -limit, limit) + 0.1 * std::sin(2.7 * k);
+  };
+  Diagnose("limit", clamped, clamped);
+  ExpectARemedyFor("torque_saturation");
+}
+
+TEST_F(ModelOut, OfATorqueWithAWrongScale_SaysWhichNumberIsOff) {
+  const auto scaled = [](Dataset& d) { d.tau.col(1) *= 1.25; };
+  Diagnose("gain", scaled, scaled);
+  ExpectARemedyFor("torque_gain_error");
+}
+
+// A contact says nothing about another log: it is named, stands apart, and moves no error there.
+TEST_F(ModelOut, OfAContactInTheTrainingLog_StandsApart) {
+  Diagnose("contact",
+           [](Dataset& d) {
+             for (int k = 0; k < d.samples(); ++k)
+               for (const double from : {5.2, 13.1})
+                 if (const double u = (d.s.t[k] - from) / 0.4; u > 0 && u < 1)
+                   d.tau(k, 1) += 1.5 * std::sin(std::numbers::pi * u);
+           },
+           {});
+  ExpectARemedyFor("external_contact");
+  EXPECT_TRUE(verdict_["terms"][0]["training_only"].get<bool>());
+  EXPECT_NE(said_.out.find("in the training log only"), std::string::npos) << said_.out;
+  for (int j = 0; j < 2; ++j) {
+    const double before = verdict_["before_moving"][j], after = verdict_["after_moving"][j];
+    EXPECT_LE(after, 1.005 * before);
+    EXPECT_LE(after, 1.15 * verdict_["noise_floor"][j].get<double>());
+  }
+}
+
+}  // namespace
+}  // namespace armcal::tests

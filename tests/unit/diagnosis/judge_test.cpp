@@ -1,0 +1,109 @@
+// diagnosis tests - what a held-out log is asked: run states are followed on it, events of the training log have no
+// part.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "host_sim/diagnosis/diagnose.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::diagnosis {
+namespace {
+
+using calibration::Dataset;
+using Eigen::VectorXd;
+
+constexpr int kJoint = 1;  // whose torque changes; 0-based
+
+void Contact(Dataset& d, double from, double length_s, double size_Nm) {
+  for (int k = 0; k < d.samples(); ++k)
+    if (const double u = (d.s.t[k] - from) / length_s; u > 0 && u < 1)
+      d.tau(k, kJoint) += size_Nm * std::sin(std::numbers::pi * u);
+}
+
+void Drift(Dataset& d, double begin_Nm, double end_Nm, double constant_s) {
+  for (int k = 0; k < d.samples(); ++k)
+    d.tau(k, kJoint) += end_Nm + (begin_Nm - end_Nm) * std::exp(-d.s.t[k] / constant_s);
+}
+
+struct Judged {
+  using Change = std::function<void(Dataset&)>;
+  Judged(const Change& on_train, const Change& on_test)
+      : arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 8), train(arm.Run(20, 80)), test(arm.Run(20, 81)) {
+    if (on_train) on_train(train);
+    if (on_test) on_test(test);
+    diagnosis = std::make_unique<Diagnosis>(arm.model(), tests::Records(), std::vector<const Dataset*>{&train});
+    held_out = diagnosis->Judge(test);
+  }
+  const std::vector<Term>& terms() const { return diagnosis->finding().terms; }
+  double Error(const Eigen::MatrixXd& residual) const { return calibration::Rms(test, residual, true)[kJoint]; }
+  tests::SyntheticArm arm;
+  Dataset train, test;
+  std::unique_ptr<Diagnosis> diagnosis;
+  HeldOut held_out;
+};
+
+TEST(HeldOutLog, AContactOfTheTrainingLog_HasNoPartInIt) {
+  const Judged touched([](Dataset& d) { Contact(d, 6, 0.4, 1.5); }, {});
+  ASSERT_EQ(touched.terms().size(), 1u);
+  EXPECT_EQ(touched.terms()[0].record->name, "external_contact");
+  EXPECT_TRUE(touched.terms()[0].training_only);
+  EXPECT_TRUE(touched.held_out.tracking.empty());
+  EXPECT_EQ(touched.diagnosis->TermTorque(touched.test)[0].cwiseAbs().maxCoeff(), 0);
+  // it is explained, so the arm's parameters are those of a log without it
+  const Judged clean({}, {});
+  EXPECT_TRUE(clean.terms().empty());
+  EXPECT_NEAR(touched.Error(touched.held_out.after), clean.Error(clean.held_out.after),
+              0.002 * clean.arm.noise_Nm(kJoint));
+}
+
+// Neither for nor against: a contact in the held-out log stands in both errors alike, wherever the training log had
+// one.
+TEST(HeldOutLog, AContactOfItsOwn_RefutesNothing_AndIsNotExplained) {
+  const auto at = [](double time_s) { return [=](Dataset& d) { Contact(d, time_s, 0.4, 1.5); }; };
+  const Judged j(at(6), at(13));
+  ASSERT_EQ(j.terms().size(), 1u);
+  EXPECT_TRUE(j.terms()[0].confirmed);
+  EXPECT_GT(j.Error(j.held_out.after), 1.2 * j.arm.noise_Nm(kJoint));
+  EXPECT_NEAR(j.Error(j.held_out.after), j.Error(j.held_out.before), 0.01 * j.Error(j.held_out.before));
+}
+
+// Another run drifts from elsewhere to elsewhere: its level is followed as the samples come, and that is said.
+TEST(HeldOutLog, ADrift_IsFollowedFromWhereverItBegins) {
+  const Judged j([](Dataset& d) { Drift(d, 0, 1.2, 6); }, [](Dataset& d) { Drift(d, 0.9, -0.2, 9); });
+  ASSERT_FALSE(j.terms().empty());
+  EXPECT_EQ(j.terms()[0].record->name, "torque_drift");
+  EXPECT_TRUE(j.terms()[0].confirmed);
+  EXPECT_FALSE(j.terms()[0].training_only);
+  EXPECT_FALSE(j.held_out.tracking.empty());
+  const double noise = j.arm.noise_Nm(kJoint);
+  EXPECT_GT(j.Error(j.held_out.before), 2 * noise);
+  EXPECT_LT(j.Error(j.held_out.after), 1.1 * noise);
+}
+
+// A second term that training suggests may stand against the first: together they beat the declared model, and yet the
+// log is predicted better without it.
+TEST(HeldOutLog, RefutesATermThatTheOthersAreBetterWithout) {
+  const Judged j([](Dataset& d) { Drift(d, 0, 3, 20); }, [](Dataset& d) { Drift(d, 2.1, -0.6, 28); });
+  ASSERT_EQ(j.terms().size(), 2u);
+  EXPECT_EQ(j.terms()[0].record->name, "torque_drift");
+  EXPECT_TRUE(j.terms()[0].confirmed);
+  EXPECT_FALSE(j.terms()[1].confirmed) << j.terms()[1].record->name;
+  EXPECT_LT(j.Error(j.held_out.after), 1.1 * j.arm.noise_Nm(kJoint));
+}
+
+// Where the drift's shape fits the other run worse than nothing, it is refuted, and nothing is said to be followed.
+TEST(HeldOutLog, SaysThatItFollows_OnlyWhatItConfirms) {
+  for (const double size_Nm : {0.0, 0.3, 1.0}) {
+    const Judged j([=](Dataset& d) { Drift(d, 0, 1.2, 6); },
+                   [=](Dataset& d) {
+                     for (int k = 0; k < d.samples(); ++k) d.tau(k, kJoint) += k % 2 ? size_Nm : -size_Nm;
+                   });
+    bool follows = false;
+    for (const Term& t : j.terms()) follows = follows || (t.confirmed && t.record->kind_class == "run_state");
+    EXPECT_EQ(j.held_out.tracking.empty(), !follows) << size_Nm;
+  }
+}
+
+}  // namespace
+}  // namespace armcal::diagnosis

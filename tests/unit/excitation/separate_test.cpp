@@ -1,0 +1,73 @@
+// excitation tests - which effects a motion can be searched for that tells them apart: the catalogue, pair by pair.
+#include <gtest/gtest.h>
+
+#include "host_sim/excitation/optimise.hpp"
+#include "host_sim/excitation/target.hpp"
+#include "host_sim/io/input_error.hpp"
+#include "tests/unit/excitation/arms.hpp"
+
+namespace armcal::excitation {
+namespace {
+
+// "stribeck:1", "wrist_coupling:1-2", "base_tilt": a record on the first joints it can have.
+std::string Asked(const codegen::EffectRecord& record, int joints) {
+  const std::vector<int> first = codegen::JointSets(record, joints).at(0);
+  std::string out = record.name;
+  for (const int j : first) out += (out == record.name ? ":" : "-") + std::to_string(j + 1);
+  return out;
+}
+
+TEST(Separate, TakesEveryConfusablePairThatMotionShows_AndRefusesTheOthers) {
+  const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
+  const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");
+  int taken = 0, refused = 0;
+  for (const auto& [name, record] : records)
+    for (const std::string& like : record.confusable_with) {
+      const codegen::EffectRecord& other = records.at(like);
+      const std::vector<std::string> asked{Asked(record, robot.joints()), Asked(other, robot.joints())};
+      if (!MotionShows(record) || !MotionShows(other)) {
+        EXPECT_THROW(Target(robot, records, asked), io::InputError) << asked[0] << " " << asked[1];
+        ++refused;
+        continue;
+      }
+      const Target target(robot, records, asked);
+      EXPECT_GE(target.criterion().about.size(), record.linear.size() + other.linear.size()) << asked[0] << asked[1];
+      ++taken;
+    }
+  EXPECT_GT(taken, 20);
+  EXPECT_GT(refused, 15);
+}
+
+// What is said to be separable is what a search finds a motion for; what is not, what it finds none for.
+TEST(Separate, IsPromisedWhereASearchSucceeds) {
+  const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
+  const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");
+  OptimiseSettings settings;
+  settings.starts = 1, settings.seconds = 0.1, settings.threads = 1;
+  settings.shape.terms = 20, settings.shape.samples = 250;
+  int can = 0, cannot = 0;
+  for (const auto& [name, record] : records)
+    for (const std::string& like : record.confusable_with) {
+      const std::vector<std::string> asked{Asked(record, 2), Asked(records.at(like), 2)};
+      SCOPED_TRACE(asked[0] + ", " + asked[1]);
+      if (!MotionShows(record) || !MotionShows(records.at(like))) {
+        EXPECT_FALSE(CanSeparate(robot, records, asked));
+        continue;
+      }
+      const Target target(robot, records, asked);
+      settings.criterion = target.criterion();
+      if (CanSeparate(robot, records, asked)) {
+        ++can;
+        EXPECT_TRUE(std::isfinite(Optimise(target.observation(), settings).figure));
+      } else {
+        ++cannot;
+        EXPECT_THROW(Optimise(target.observation(), settings), io::InputError);
+      }
+    }
+  EXPECT_GT(can, 15);
+  EXPECT_GT(cannot, 2);
+  std::printf("%d pairs can be separated by motion, %d cannot\n", can, cannot);
+}
+
+}  // namespace
+}  // namespace armcal::excitation

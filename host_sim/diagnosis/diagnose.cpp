@@ -159,6 +159,9 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);
     ApplyDelay(w, select);
+    // What was found under an effect that nobody had named yet is a little off, and what is off looks like more terms.
+    for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k)
+      if (w.chosen[k].delay_s == 0) (void)select.StillEarns(w.chosen[k], Rivals(w.chosen, w.chosen[k]));
   }
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
     if (w.chosen[k].delay_s != 0) ++k;  // the logs are as it says now

@@ -81,14 +81,19 @@ TEST(HeldOutLog, ADrift_IsFollowedFromWhereverItBegins) {
   EXPECT_LT(j.Error(j.held_out.after), 1.1 * noise);
 }
 
-// A second term that training suggests may stand against the first: together they beat the declared model, and yet the
-// log is predicted better without it.
+// A second term that only the training log has: together they beat the declared model, and yet the other log is
+// predicted better without it.
 TEST(HeldOutLog, RefutesATermThatTheOthersAreBetterWithout) {
-  const Judged j([](Dataset& d) { Drift(d, 0, 3, 20); }, [](Dataset& d) { Drift(d, 2.1, -0.6, 28); });
-  ASSERT_EQ(j.terms().size(), 2u);
-  EXPECT_EQ(j.terms()[0].record->name, "torque_drift");
-  EXPECT_TRUE(j.terms()[0].confirmed);
-  EXPECT_FALSE(j.terms()[1].confirmed) << j.terms()[1].record->name;
+  const auto ripple = [](Dataset& d) {
+    for (int k = 0; k < d.samples(); ++k) d.tau(k, kJoint) += 0.3 * std::cos(12 * d.s.q(k, kJoint));
+  };
+  const auto ripple_and_offset = [&](Dataset& d) {
+    ripple(d);
+    d.tau.col(kJoint).array() += 0.06;
+  };
+  const Judged j(ripple_and_offset, ripple);
+  ASSERT_GE(j.terms().size(), 2u);
+  for (const Term& t : j.terms()) EXPECT_EQ(t.confirmed, t.record->name == "torque_ripple") << t.record->name;
   EXPECT_LT(j.Error(j.held_out.after), 1.1 * j.arm.noise_Nm(kJoint));
 }
 

@@ -1,4 +1,5 @@
-// diagnosis - how sure the terms' parameters are.
+// diagnosis - the terms' parameters, all free together: polished, and how sure they are.
+#include <algorithm>
 #include <cmath>
 
 #include "host_sim/diagnosis/work.hpp"
@@ -32,23 +33,84 @@ Columns Slope(const Chosen& term, const VectorXd& amplitude, std::size_t k, cons
   return out;
 }
 
+// Columns of the terms' own unknowns, one after the other, side by side over all joints.
+Columns Slopes(const std::vector<std::pair<const Chosen*, std::size_t>>& unknowns,
+               const std::vector<const Chosen*>& terms, const Diagnosis::Work& w) {
+  Columns all;
+  for (int j = 0; j < w.model.joints() && !unknowns.empty(); ++j) {
+    all.joints.push_back(j);
+    all.block.emplace_back(MatrixXd::Zero(w.evidence.index[j].size(), static_cast<Eigen::Index>(unknowns.size())));
+  }
+  for (std::size_t u = 0; u < unknowns.size(); ++u) {
+    const auto& [term, k] = unknowns[u];
+    const auto t = static_cast<std::size_t>(std::find(terms.begin(), terms.end(), term) - terms.begin());
+    const Columns own = Slope(*term, w.estimate.amplitude[t], k, w.evidence);
+    for (std::size_t r = 0; r < own.joints.size(); ++r)
+      all.block[static_cast<std::size_t>(own.joints[r])].col(static_cast<Eigen::Index>(u)) = own.block[r];
+  }
+  return all;
+}
+
+// How well all joints are fitted: -2 log likelihood of white noise.
+double Deviance(const Diagnosis::Work& w) {
+  double sum = 0;
+  for (int j = 0; j < w.model.joints(); ++j) sum += 2 * w.evidence.index[j].size() * std::log(w.estimate.sigma[j]);
+  return sum;
+}
+
 }  // namespace
+
+void Diagnosis::Work::Polish() {
+  constexpr int kSteps = 4;
+  constexpr double kWorthIt = 1;     // gain of a step
+  constexpr double kLongest = 0.25;  // of an unknown's size, in one step
+  const std::vector<const Chosen*> terms = Confirmed(chosen);
+  std::vector<std::pair<const Chosen*, std::size_t>> unknowns;
+  std::vector<double*> value;
+  for (Chosen& c : chosen) {
+    const std::string& how = c.candidate->record().search.how;
+    if (!c.confirmed || c.candidate->is_curve() || (how != "profile" && how != "spectral")) continue;
+    for (std::size_t k = 0; k < c.eta.size(); ++k) {
+      unknowns.emplace_back(&c, k);
+      value.push_back(c.delay_s != 0 ? &c.delay_s : &c.eta[k]);
+    }
+  }
+  // of the logs as the terms say that they are delayed
+  const auto solve = [&] {
+    if (TotalDelay_s(chosen) != delay_s) SetDelay(TotalDelay_s(chosen));
+    estimate = Solve(terms);
+  };
+  solve();
+  for (int step = 0; step < kSteps && !unknowns.empty(); ++step) {
+    Prepare(terms);
+    const Gain gain = Metric(rows, WhiteNoise()).Try(Slopes(unknowns, terms, *this));
+    if (gain.gain < kWorthIt) return;
+    const double before = Deviance(*this);
+    std::vector<double> old;
+    for (std::size_t u = 0; u < unknowns.size(); ++u) {
+      const auto& all = unknowns[u].first->candidate->unknowns();
+      const auto& limits = all[unknowns[u].second % all.size()];
+      double& x = *value[u];
+      old.push_back(x);
+      const double longest = kLongest * std::abs(x);
+      x += std::clamp(gain.amplitude[static_cast<Eigen::Index>(u)], -longest, longest);
+      x = std::clamp(x, limits.lower, limits.upper);
+    }
+    solve();
+    if (Deviance(*this) < before) continue;
+    for (std::size_t u = 0; u < unknowns.size(); ++u) *value[u] = old[u];
+    solve();
+    return;
+  }
+}
 
 std::vector<Diagnosis::Work::Deviation> Diagnosis::Work::Deviations(const std::vector<const Chosen*>& terms) {
   Prepare(terms);
   const Metric metric(rows, WhiteNoise());
-  std::vector<Columns> slopes;
-  for (std::size_t t = 0; t < terms.size(); ++t)
-    for (std::size_t k = 0; k < terms[t]->eta.size() && !terms[t]->candidate->is_curve(); ++k)
-      slopes.push_back(Slope(*terms[t], estimate.amplitude[t], k, evidence));
-  Columns all;
-  for (int j = 0; j < model.joints() && !slopes.empty(); ++j) {
-    all.joints.push_back(j);
-    all.block.emplace_back(MatrixXd::Zero(evidence.index[j].size(), static_cast<Eigen::Index>(slopes.size())));
-    for (std::size_t k = 0; k < slopes.size(); ++k)
-      for (std::size_t r = 0; r < slopes[k].joints.size(); ++r)
-        if (slopes[k].joints[r] == j) all.block.back().col(static_cast<Eigen::Index>(k)) = slopes[k].block[r];
-  }
+  std::vector<std::pair<const Chosen*, std::size_t>> unknowns;
+  for (const Chosen* t : terms)
+    for (std::size_t k = 0; k < t->eta.size() && !t->candidate->is_curve(); ++k) unknowns.emplace_back(t, k);
+  const Columns all = Slopes(unknowns, terms, *this);
   std::vector<const VectorXd*> time;
   for (const auto* log : train) time.push_back(&log->s.t);
   const MatrixXd P = metric.RobustCovariance(all, kBlock_s, time);

@@ -20,12 +20,6 @@ constexpr int kMaxTerms = 4;
 constexpr double kWorse = 1.005;          // held-out: a joint of its own that gets worse by more refutes a term
 constexpr double kWorseElsewhere = 1.02;  // any joint: the base fit moves a little with every term
 
-double TotalDelay_s(const std::vector<Chosen>& chosen) {
-  double sum = 0;
-  for (const Chosen& c : chosen) sum += c.confirmed ? c.delay_s : 0;
-  return sum;
-}
-
 // What a term must stand beside: not the curves over its joints, which may take its place but cannot tell its cause.
 std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chosen& term) {
   std::vector<const Chosen*> out = Confirmed(chosen, &term);
@@ -35,21 +29,13 @@ std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chose
   return out;
 }
 
-// Delays the logs by what the latest term says of them, and once more by what it then says: the model that it was found
-// with had been fitted to logs that were not yet aligned.
-void ApplyDelay(Diagnosis::Work& w, Selector& select) {
-  constexpr int kRounds = 2;
+// Delays the logs by what the latest term says of them.
+void ApplyDelay(Diagnosis::Work& w) {
   Chosen& c = w.chosen.back();
   if (c.candidate->delay() < 0) return;
-  double& rest_s = c.eta[static_cast<std::size_t>(c.candidate->delay())];
-  for (int round = 0; round < kRounds; ++round) {
-    c.delay_s += rest_s;
-    w.SetDelay(TotalDelay_s(w.chosen));
-    rest_s = 0;
-    Chosen again = c;
-    if (round + 1 < kRounds && select.StillEarns(again, Confirmed(w.chosen, &c)))
-      rest_s = again.eta[static_cast<std::size_t>(c.candidate->delay())];
-  }
+  double& found_s = c.eta[static_cast<std::size_t>(c.candidate->delay())];
+  c.delay_s = found_s, found_s = 0;
+  w.SetDelay(TotalDelay_s(w.chosen));
 }
 
 // A log as the confirmed terms say that it was measured.
@@ -158,10 +144,11 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   Selector select(w);
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);
-    ApplyDelay(w, select);
+    ApplyDelay(w);
     // What was found under an effect that nobody had named yet is a little off, and what is off looks like more terms.
     for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k)
       if (w.chosen[k].delay_s == 0) (void)select.StillEarns(w.chosen[k], Rivals(w.chosen, w.chosen[k]));
+    w.Polish();
   }
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
     if (w.chosen[k].delay_s != 0) ++k;  // the logs are as it says now
@@ -170,7 +157,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   }
   std::sort(w.chosen.begin(), w.chosen.end(),
             [](const Chosen& a, const Chosen& b) { return a.found.score > b.found.score; });
-  w.estimate = w.Solve(Confirmed(w.chosen));
+  w.Polish();
   finding_.declared = w.declared;
   WriteTerms(w, finding_);
   finding_.smallest.resize(model.joints());

@@ -20,6 +20,9 @@ struct Chosen {
 // Those that are, but for `without`.
 std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Chosen* without = nullptr);
 
+// By how much the confirmed terms say that the measurement is delayed.
+double TotalDelay_s(const std::vector<Chosen>& chosen);
+
 struct Diagnosis::Work {
   Work(const codegen::Model& model, const codegen::Catalogue& catalogue,
        std::vector<const calibration::Dataset*> train);
@@ -31,6 +34,9 @@ struct Diagnosis::Work {
     Eigen::VectorXd sigma, innovation;
   };
   Estimate Solve(const std::vector<const Chosen*>& terms);
+  // Moves the chosen terms' unknowns to where everything together fits best: a search sees one at a time, over a model
+  // that was fitted without it. Leaves the estimate.
+  void Polish();
   // Standard deviations of the terms' amplitudes and unknowns, all free together, at the estimate that Solve has left.
   struct Deviation {
     Eigen::VectorXd amplitude, eta;
@@ -39,9 +45,10 @@ struct Diagnosis::Work {
 
   // Refreshes model torque and base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
+  Eigen::VectorXd SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j);
   std::vector<NoiseModel> WhiteNoise() const;
   // Reads the logs' motion that much before their torque, from now on.
-  void SetDelay(double delay_s);
+  void SetDelay(double by_s);
   void IndexRows();
   void FillDeclared();
   void MakeCoordinates(int size);
@@ -51,6 +58,7 @@ struct Diagnosis::Work {
   std::vector<const calibration::Dataset*> train;
   std::vector<const calibration::Dataset*> logged;  // as given
   std::vector<calibration::Dataset> delayed;        // train points here once a delay has been applied
+  double delay_s = 0;                               // applied
   calibration::Prior prior;
   calibration::Fit declared;
   std::vector<std::unique_ptr<Candidate>> candidates;

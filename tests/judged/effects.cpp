@@ -112,7 +112,7 @@ const std::map<std::string, Maker>& Makers() {
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.factor = "dFv";
          e.signals = {"qd"};
-         OnJoint(a, r, e, [](const Motion& m, const MatrixXd&, int j) -> ArrayXd { return V(m, j).max(0); });
+         OnJoint(a, r, e, [](const Motion& m, const MatrixXd&, int j) -> ArrayXd { return V(m, j) + V(m, j).abs(); });
        }},
       {"stribeck",
        [](const Arm& a, plant::Random& r, Effect& e) {
@@ -331,7 +331,7 @@ const std::map<std::string, Maker>& Makers() {
       {"belt_elasticity",  // the link follows the motor, whose position is logged, through a spring
        [](const Arm& a, plant::Random& r, Effect& e) {
          const int j = static_cast<int>(r.Uniform(0, 2.999));  // those whose motors stand apart
-         e.accept = {"belt_elasticity", "time_delay"}, e.joint = j + 1, e.seen_on = j;
+         e.accept = {"belt_elasticity", "time_delay"}, e.joint = j + 1, e.seen_on = j, e.held_by_a_record = false;
          e.signals = {Signal("qdd", j)};
          const double damping = r.Uniform(0.02, 0.1);
          const auto softness = e.Strength(1 / std::pow(2 * kPi * 10, 2), 1 / std::pow(2 * kPi * 4.5, 2));  // 1 / w^2

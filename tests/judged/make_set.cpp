@@ -173,7 +173,6 @@ bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
     json parameters = effect.others;
     if (!effect.factor.empty()) parameters[effect.factor] = gain.back();
     if (effect.kind == "time_delay") parameters["d"] = *effect.strength;
-    if (effect.kind == "belt_elasticity") parameters["w0"] = 1 / std::sqrt(*effect.strength);
     effects.push_back({{"kind", effect.kind},
                        {"joint", effect.joint},
                        {"accept_kinds", effect.accept},

@@ -98,7 +98,7 @@ void Judge(const std::string& name, const json& truth, const json& verdict, Shar
     const bool joint = !terms.empty() && SameJoint(terms[0], e), right = joint && Names(terms[0], e);
     const std::string kind = e.at("kind");
     if (detection) {
-      shares["detection: joint"].Add(joint);
+      shares[e.at("run_state").get<bool>() ? "detection: joint, of one run" : "detection: joint, static"].Add(joint);
       shares["detection, " + kind].Add(joint);
     } else {
       shares["single: kind or class, and joint"].Add(right);

@@ -1,0 +1,52 @@
+// diagnosis tests - a torque that stops at a limit: the base model must not bend to it, and limit and parameters are
+// found together.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "host_sim/diagnosis/diagnose.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::diagnosis {
+namespace {
+
+using calibration::Dataset;
+
+constexpr int kJoint = 1;
+
+// Noise comes behind the limit.
+struct CutOff {
+  explicit CutOff(double limit) : arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 8) {
+    const auto cut = [&](const tests::State& s) {
+      if (s.joint != kJoint) return 0.0;
+      const double sign = s.qd > 0 ? 1 : s.qd < 0 ? -1 : 0;
+      const double tau = s.tau_rigid + arm.Friction("Fc", kJoint) * sign + arm.Friction("Fv", kJoint) * s.qd;
+      return std::clamp(tau, -limit, limit) - tau;
+    };
+    const Dataset train = arm.Run(20, 80, cut), test = arm.Run(20, 81, cut);
+    Diagnosis diagnosis(arm.model(), tests::Records(), {&train});
+    const HeldOut held_out = diagnosis.Judge(test);
+    terms = diagnosis.finding().terms;
+    after_Nm = calibration::Rms(test, held_out.after, true)[kJoint];
+    measured_limit_Nm = limit * (1 + arm.truth()[arm.model().columns() + kJoint]);
+  }
+  tests::SyntheticArm arm;
+  double measured_limit_Nm = 0, after_Nm = 0;
+  std::vector<Term> terms;
+};
+
+TEST(CutTorque, LimitAndParametersAreFoundTogether) {
+  for (const double limit_Nm : {2.5, 3.0, 5.0}) {
+    const CutOff c(limit_Nm);
+    ASSERT_EQ(c.terms.size(), 1u) << limit_Nm;
+    const Term& t = c.terms[0];
+    EXPECT_EQ(t.record->name, "torque_saturation");
+    EXPECT_TRUE(t.confirmed);
+    EXPECT_NEAR(t.eta[0], c.measured_limit_Nm, 0.01 * c.measured_limit_Nm);
+    EXPECT_NEAR(t.amplitude[0], 1, 0.05);
+    EXPECT_LT(c.after_Nm, 1.02 * c.arm.noise_Nm(kJoint));
+  }
+}
+
+}  // namespace
+}  // namespace armcal::diagnosis

@@ -38,7 +38,8 @@ VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::st
   return size ? out.cwiseAbs() : out;
 }
 
-Searcher::Searcher(Candidate& candidate, const Ground& ground) : c_(candidate), g_(ground), e_(ground.evidence) {
+Searcher::Searcher(Candidate& candidate, const Ground& ground, const Found* simpler)
+    : c_(candidate), simpler_(simpler), g_(ground), e_(ground.evidence) {
   best_.candidate = &candidate;
   best_.eta = candidate.Initial();
 }
@@ -145,8 +146,14 @@ void Searcher::Profile() {
   for (const int p : points) best_.tried *= p;
   std::vector<std::pair<double, std::vector<double>>> tried;
   std::vector<double> eta(count);
+  std::vector<char> known(count, 0);
+  for (std::size_t k = 0; simpler_ && k < simpler_->eta.size(); ++k)
+    for (int own = 0; own < count; ++own)
+      if (c_.unknowns()[own].key == simpler_->candidate->unknowns()[k].key)
+        eta[own] = std::clamp(simpler_->eta[k], FromUnit(own, 0), FromUnit(own, 1)), known[own] = 1;
   const std::function<void(int)> visit = [&](int k) {
     if (k == count) return void(tried.emplace_back(ConsiderThinned(eta), eta));
+    if (known[k]) return visit(k + 1);
     for (int i = 0; i < points[k]; ++i) {
       eta[k] = FromUnit(k, points[k] > 1 ? static_cast<double>(i) / (points[k] - 1) : 0.5);
       visit(k + 1);
@@ -195,6 +202,8 @@ double Score(const Found& found, double gain) {
   return gain - found.penalty - 2 * std::log(found.tried) - found.candidate->record().generic_penalty;
 }
 
-Found SearchCandidate(Candidate& candidate, const Ground& ground) { return Searcher(candidate, ground).Run(); }
+Found SearchCandidate(Candidate& candidate, const Ground& ground, const Found* simpler) {
+  return Searcher(candidate, ground, simpler).Run();
+}
 
 }  // namespace armcal::diagnosis

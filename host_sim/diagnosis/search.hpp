@@ -59,7 +59,8 @@ double Score(const Found& found, double gain);
 // parameters ln(rows), as the Bayesian information criterion has it.
 double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evidence);
 
-// Amplitudes outside the record's bounds gain nothing.
-Found SearchCandidate(Candidate& candidate, const Ground& ground);
+// Amplitudes outside the record's bounds gain nothing. simpler: what the record after which this one is tried has found
+// on the same joints; the unknowns that they share start there.
+Found SearchCandidate(Candidate& candidate, const Ground& ground, const Found* simpler = nullptr);
 
 }  // namespace armcal::diagnosis

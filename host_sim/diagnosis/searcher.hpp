@@ -9,7 +9,7 @@ namespace armcal::diagnosis {
 
 class Searcher {
  public:
-  Searcher(Candidate& candidate, const Ground& ground);
+  Searcher(Candidate& candidate, const Ground& ground, const Found* simpler);
   Found Run();
 
  private:
@@ -43,6 +43,7 @@ class Searcher {
   void Windows();   // search_time.cpp
 
   Candidate& c_;
+  const Found* simpler_;
   const Ground& g_;
   const Evidence& e_;
   Found best_;

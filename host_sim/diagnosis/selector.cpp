@@ -75,15 +75,16 @@ bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others
 
 std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds) {
   std::vector<Found> ranked;
-  std::set<std::pair<std::string, std::vector<int>>> something;
+  std::map<std::pair<std::string, std::vector<int>>, Found> something;
   for (Candidate* c : candidates) {
     const std::string& simpler = c->record().search.after;
-    if (!simpler.empty() && !something.contains({simpler, c->joints()})) continue;
-    const Found f = SearchCandidate(*c, grounds.ground());
+    const auto before = something.find({simpler, c->joints()});
+    if (!simpler.empty() && before == something.end()) continue;
+    const Found f = SearchCandidate(*c, grounds.ground(), simpler.empty() ? nullptr : &before->second);
     gain_[c] = f.gain.gain;
     if (f.score <= 0) continue;
     ranked.push_back(f);
-    something.insert({c->record().name, c->joints()});
+    something.insert({{c->record().name, c->joints()}, f});
   }
   std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
   // Many curves fit the same torque about as well: the best ones of a joint stand for the others.

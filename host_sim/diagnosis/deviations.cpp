@@ -1,4 +1,5 @@
 // diagnosis - how sure the terms' parameters are.
+#include <algorithm>
 #include <cmath>
 
 #include "host_sim/diagnosis/work.hpp"

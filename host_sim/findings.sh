@@ -29,6 +29,27 @@ splits kuka_lwr4 kuka_lwr4 kuka_lwr4 "${lwr_runs[@]}"
 sed 's/^tick_rate_Hz/prior = "none"\n&/' codegen/robots/kuka_lwr4.toml >"$out/kuka_lwr4_free.toml"
 splits kuka_lwr4_free kuka_lwr4 "$out/kuka_lwr4_free.toml" "${lwr_runs[@]}"
 
+# A torque over q7 declared in the robot file: what a model with it predicts better, and what worse.
+echo "== kuka_lwr4: RMS error of each joint, held out, without and with a torque over q7 (armcal identify)"
+curve='[[effect]]
+name = "position_torque"
+state = "estimated"
+joints = [7]
+nonlinear = { lo = -1.27, hi = 1.27 }'
+errors() {  # ROBOT HELD_OUT TRAIN...
+  "${ARMCAL:-build/host/armcal}" identify --robot "$1" --channels host_sim/io/channels/kuka_lwr4.toml \
+    --train "${@:3}" --test "${lwr}_$2.csv.gz" |
+    awk -v what="run $2, $(basename "$1" .toml):" '/^ +[1-7] /{ what = what " " $3 } END { print what }'
+}
+for model in codegen/robots/kuka_lwr4.toml "$out/kuka_lwr4_free.toml"; do
+  with="$out/$(basename "$model" .toml)_q7.toml"
+  { cat "$model"; printf '\n%s\n' "$curve"; } >"$with"
+  for robot in "$model" "$with"; do
+    for run in 1 2; do errors "$robot" $run "${lwr}_3.csv.gz"; done
+    errors "$robot" 3 "${lwr}"_{1,2}.csv.gz
+  done
+done
+
 echo "== kuka_lwr4: do the joints move apart? Correlation of positions with joint 7 and with joint 5"
 for run in 1 3; do
   gzip -dc "${lwr}_$run.csv.gz" | awk -F, -v run="$run" '

@@ -14,6 +14,33 @@
 #include "host_sim/report/table.hpp"
 
 namespace armcal::cli {
+
+namespace {
+
+void Print(const DiagnosisRun& run, const DiagnoseOptions& o) {
+  const nlohmann::ordered_json& json = run.json;
+  fmt::print("{}", DiagnosisText(run.view));
+  report::Table table{
+      {"joint", "before", "after", "before, moving", "after, moving", "noise floor", "smallest effect seen"}, {}};
+  for (int j = 0; j < run.model->joints(); ++j) {
+    std::vector<std::string> row{std::to_string(j + 1)};
+    for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor", "smallest_detectable"})
+      row.push_back(fmt::format("{:.4g}", json[key][j].get<double>()));
+    table.rows.push_back(row);
+  }
+  fmt::print("held out: {}, RMS of measured minus predicted torque\n{}", o.test, report::Text(table));
+  if (!o.model_out.empty() && !run.view.finding->terms.empty()) {
+    const bool held = std::any_of(json["terms"].begin(), json["terms"].end(),
+                                  [](const auto& t) { return t["in_model"].template get<bool>(); });
+    fmt::print("new model: {} ({})\n", o.model_out,
+               !held                                   ? "with what was found as comments: no model can hold it"
+               : json["model"]["by_table"].get<bool>() ? "a table switches it on"
+                                                       : "generate it and build the drive anew");
+  }
+}
+
+}  // namespace
+
 std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   auto run = std::make_unique<DiagnosisRun>();
   run->catalogue = LoadCatalogue();
@@ -58,24 +85,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
                      {"schema", codegen::Schema(next)},
                      {"by_table", codegen::Schema(next) == codegen::Schema(model)}};
   }
-  fmt::print("{}", DiagnosisText(run->view));
-  report::Table table{
-      {"joint", "before", "after", "before, moving", "after, moving", "noise floor", "smallest effect seen"}, {}};
-  for (int j = 0; j < model.joints(); ++j) {
-    std::vector<std::string> row{std::to_string(j + 1)};
-    for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor", "smallest_detectable"})
-      row.push_back(fmt::format("{:.4g}", json[key][j].get<double>()));
-    table.rows.push_back(row);
-  }
-  fmt::print("held out: {}, RMS of measured minus predicted torque\n{}", o.test, report::Text(table));
-  if (!o.model_out.empty() && !finding.terms.empty()) {
-    const bool held = std::any_of(json["terms"].begin(), json["terms"].end(),
-                                  [](const auto& t) { return t["in_model"].template get<bool>(); });
-    fmt::print("new model: {} ({})\n", o.model_out,
-               !held                                   ? "with what was found as comments: no model can hold it"
-               : json["model"]["by_table"].get<bool>() ? "a table switches it on"
-                                                       : "generate it and build the drive anew");
-  }
+  Print(*run, o);
   WriteJson(o.json, json);
   return run;
 }

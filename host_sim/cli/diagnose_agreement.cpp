@@ -18,11 +18,6 @@ namespace {
 constexpr double kFalls = 0.995;   // as much as a term may worsen a joint without being refuted
 constexpr double kSameForm = 0.5;  // of the larger one's spread: two fits of one effect differ by less
 
-std::string JointText(const ordered_json& term) {
-  const ordered_json& joint = term["joint"];
-  return joint.is_string() ? joint.get<std::string>() : joint.dump();
-}
-
 // Kinds that the split cannot tell from one another; empty for a curve, which names none.
 Strings Kinds(const ordered_json& term) {
   if (term["kind"] == "unknown") return {};
@@ -52,7 +47,7 @@ std::optional<Occurrence> Helps(const std::string& held_out, const ordered_json&
 
 // What both allow; none if they cannot be the same.
 std::optional<Strings> Common(const Agreement& a, const ordered_json& term) {
-  if (a.joint != JointText(term)) return {};
+  if (a.joint != JointText(term["joint"])) return {};
   const Strings kinds = Kinds(term);
   Strings both;
   for (const std::string& k : a.kinds)
@@ -122,7 +117,7 @@ Agreed Agree(const Verdicts& splits) {
   Agreed out;
   std::set<std::string> used;  // terms of an agreement
   const auto key = [](const std::string& held_out, const ordered_json& term) {
-    return held_out + term["record"].get<std::string>() + JointText(term) + term["signals"].dump();
+    return held_out + term["record"].get<std::string>() + JointText(term["joint"]) + term["signals"].dump();
   };
   for (const auto& [held_out, verdict] : splits)
     for (const ordered_json& term : verdict.value("terms", ordered_json::array())) {
@@ -130,11 +125,11 @@ Agreed Agree(const Verdicts& splits) {
       const auto here = Helps(held_out, verdict, term);
       if (!here) {
         const bool refuted = !term["confirmed"].get<bool>();
-        out.does_not.push_back({held_out, term["kind"], JointText(term),
+        out.does_not.push_back({held_out, term["kind"], JointText(term["joint"]),
                                 refuted ? "refuted by the held-out run" : "does not lower the held-out error"});
         continue;
       }
-      Agreement a{Kinds(term), JointText(term), term["signals"].get<Strings>(), {*here}};
+      Agreement a{Kinds(term), JointText(term["joint"]), term["signals"].get<Strings>(), {*here}};
       Strings missing;
       bool other_form = false;
       for (const auto& [name, other] : splits)

@@ -22,8 +22,6 @@ bool IsVerdict(const ordered_json& j) {
          j.contains("before_moving") && j.contains("after_moving");
 }
 
-std::string JointText(const ordered_json& joint) { return joint.is_string() ? joint.get<std::string>() : joint.dump(); }
-
 // Confirmed terms as "kind joint".
 std::string Terms(const ordered_json& verdict) {
   std::string text;
@@ -68,6 +66,8 @@ std::string Headline(const ordered_json& s) {
 }
 
 }  // namespace
+
+std::string JointText(const ordered_json& joint) { return joint.is_string() ? joint.get<std::string>() : joint.dump(); }
 
 ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed"}, {"error", why}}; }
 

@@ -16,6 +16,9 @@ using Verdicts = std::map<std::string, nlohmann::ordered_json>;
 // {"verdict": "failed", "error": why}, what a log without a verdict leaves behind.
 nlohmann::ordered_json FailedVerdict(const std::string& why);
 
+// A term's joint as a verdict has it: a number, or words as "5-6".
+std::string JointText(const nlohmann::ordered_json& joint);
+
 // A file that holds no verdict is a failed one that says so.
 nlohmann::ordered_json ReadVerdict(const std::filesystem::path& path);
 

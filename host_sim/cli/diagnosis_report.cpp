@@ -1,10 +1,9 @@
-// cli - a diagnosis as JSON and as lines for the terminal.
+// cli - a diagnosis as lines for the terminal.
 #include "host_sim/cli/diagnosis_report.hpp"
 
 #include <fmt/core.h>
 
 #include "host_sim/cli/diagnosis_words.hpp"
-#include "host_sim/cli/logs.hpp"
 
 namespace armcal::cli {
 

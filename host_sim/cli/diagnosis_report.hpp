@@ -1,4 +1,4 @@
-// cli - a diagnosis as JSON, as a page, and as a new robot file; knows no search.
+// cli - one diagnosis, and what shows it: text, JSON, page; knows no search.
 #pragma once
 
 #include <memory>
@@ -58,7 +58,7 @@ struct Dependence {
 };
 Dependence DependenceOf(const DiagnosisView& v, std::size_t term);
 
-// The JSON of design.md section 7.
+// The verdict, its terms with their evidence, and the errors. (diagnosis_json.cpp)
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);
 
 // Verdict, table before / after, and for each term the residual over time and over the signal that gave it away.

@@ -42,6 +42,8 @@ class Candidate {
   const std::vector<int>& rows() const { return rows_; }  // joints whose torque it touches
   bool reads(const std::string& input) const;
   bool is_curve() const { return record().generic_penalty > 0; }  // fits a form, names no cause
+  // At a time of the training log: what one part of a log shows of it says nothing about another part, or another log.
+  bool is_event() const { return record().search.how == "window"; }
   // Columns at one sample hang on others: they cannot be had from a thinned log.
   bool has_memory() const { return !graph_->states().empty() || reads("tau_delayed"); }
   std::string name() const;  // "stribeck, joint 3"

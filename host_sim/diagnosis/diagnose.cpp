@@ -17,8 +17,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kMaxTerms = 4;
-constexpr double kWorse = 1.005;          // held-out: a joint of its own that gets worse by more refutes a term
-constexpr double kWorseElsewhere = 1.02;  // any joint: the base fit moves a little with every term
+constexpr double kWorse = 1.005;  // held-out: what gets worse by more refutes a term
+constexpr double kTried = 10;     // members of a usual grid, for what would just have been seen
 
 // What a term must stand beside: not the curves over its joints, which may take its place but cannot tell its cause.
 std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chosen& term) {
@@ -44,9 +44,6 @@ calibration::Dataset AsTermsSay(const std::vector<Chosen>& chosen, const calibra
   return delay_s != 0 ? calibration::Delayed(log, delay_s) : log;
 }
 
-// An event at a time of the training log: it says nothing about another log.
-bool OfTrainingOnly(const Candidate& c) { return c.record().search.how == "window"; }
-
 // What the declared model with these terms leaves of another log, [N x n]; w keeps their estimate. tracking: how run
 // states among them were followed.
 MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
@@ -61,7 +58,7 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
     for (std::size_t k = 0; k < terms.size(); ++k) {
       const Chosen& c = *terms[k];
       const bool is_run_state = c.candidate->record().kind_class == "run_state";
-      if (OfTrainingOnly(*c.candidate) || is_run_state != run_states) continue;
+      if (c.candidate->is_event() || is_run_state != run_states) continue;
       if (!is_run_state) {
         left -= CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[k]);
         continue;
@@ -74,16 +71,16 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
   return left;
 }
 
-// The weakest term that makes a joint worse: than the declared model is, or than the other terms are without it. A
-// delay is judged with all others, which were found on logs that it had aligned.
+// The weakest term that makes a joint of its own worse, or all joints together: than the declared model is, or than the
+// other terms are without it. A delay is judged with all others, which were found on logs that it had aligned.
 Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after) {
   for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
-    if (!c->confirmed || OfTrainingOnly(*c->candidate)) continue;
+    if (!c->confirmed || c->candidate->is_event()) continue;
     const auto is_worse_than = [&](const VectorXd& error) {
-      const VectorXd ratio = after.cwiseQuotient(error.cwiseMax(1e-300));
       const auto& rows = c->candidate->rows();
-      return ratio.maxCoeff() > kWorseElsewhere ||
-             std::any_of(rows.begin(), rows.end(), [&](int j) { return ratio[j] > kWorse; });
+      const bool own = std::any_of(rows.begin(), rows.end(), [&](int j) { return after[j] > kWorse * error[j]; });
+      // All joints: the base fit moves with every term, and where more is missing one joint's gain is another's loss.
+      return own || (after.array().max(1e-12) / error.array().max(1e-12)).log().sum() > std::log(kWorse);
     };
     if (is_worse_than(before)) return &*c;
     const std::vector<const Chosen*> others = Confirmed(w.chosen, &*c);
@@ -114,10 +111,10 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
     Repeat(c.candidate->unknowns(), c.eta.size(), t.unknowns);
     t.eta = c.eta;
     if (c.delay_s != 0) t.eta[static_cast<std::size_t>(c.candidate->delay())] += c.delay_s;
-    t.score = c.found.score, t.gain = c.found.gain.gain;
+    t.score = c.found.score;
     t.folds = c.folds, t.also_fits = c.also_fits;
     t.rivals = c.rivals;
-    t.training_only = OfTrainingOnly(*c.candidate), t.confirmed = c.confirmed;
+    t.training_only = c.candidate->is_event(), t.confirmed = c.confirmed;
     t.amplitude = VectorXd::Zero(c.candidate->columns(c.eta)), t.sd = t.amplitude;
     t.eta_sd = VectorXd::Zero(static_cast<Eigen::Index>(c.eta.size()));
     if (c.confirmed) {
@@ -163,7 +160,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   finding_.smallest.resize(model.joints());
   for (int j = 0; j < model.joints(); ++j) {
     const double rows = std::max(2, w.evidence.index[j].size());
-    finding_.smallest[j] = finding_.sigma[j] * std::sqrt((kAccept + 2 * std::log(rows) + 2 * std::log(10.0)) / rows);
+    finding_.smallest[j] = finding_.sigma[j] * std::sqrt((kAccept + 2 * std::log(rows) + 2 * std::log(kTried)) / rows);
   }
 }
 
@@ -197,9 +194,8 @@ std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) co
     out.push_back(MatrixXd::Zero(data.samples(), data.joints()));
     if (!c.confirmed) continue;
     const VectorXd& amplitude = w.estimate.amplitude[k++];
-    if (!OfTrainingOnly(*c.candidate)) out.back() = CandidateTorque(*c.candidate, q, c.eta, amplitude);
-    if (c.confirmed && c.delay_s != 0)
-      out.back() += q.tau_model - calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
+    if (!c.candidate->is_event()) out.back() = CandidateTorque(*c.candidate, q, c.eta, amplitude);
+    if (c.delay_s != 0) out.back() += q.tau_model - calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
   }
   return out;
 }

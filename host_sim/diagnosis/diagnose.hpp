@@ -28,7 +28,7 @@ struct Term {
   Eigen::VectorXd amplitude, sd;  // of the columns
   std::vector<double> eta;
   Eigen::VectorXd eta_sd;
-  double score = 0, gain = 0;
+  double score = 0;
   Eigen::VectorXd folds;               // improvement of chi^2 out of fold
   std::vector<std::string> also_fits;  // kinds that this log cannot tell from it
   std::vector<Rival> rivals;           // the runner-up, then those of also_fits that are not it
@@ -42,7 +42,6 @@ struct Finding {
   Eigen::VectorXd x;                  // filter coordinates and gains with the terms in
   Eigen::VectorXd sigma, innovation;  // [n] residual and innovation standard deviation with the terms in
   Eigen::VectorXd smallest;           // [n] RMS of the smallest effect that would have been seen
-  std::vector<std::string> notes;
 };
 
 struct HeldOut {
@@ -63,9 +62,9 @@ class Diagnosis {
 
   const Finding& finding() const { return finding_; }
 
-  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint by more than 0.5 %,
-  // against the declared model or against the other terms, as not confirmed and leaves them out of `after`; kinds and
-  // parameters do not change.
+  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint of their own by more than
+  // 0.5 % or another one by more than 2 %, against the declared model or against the other terms, as not confirmed and
+  // leaves them out of `after`; kinds and nonlinear parameters do not change.
   HeldOut Judge(const calibration::Dataset& test);
 
   // One N x n torque a term on a log (run-state terms: as windows of that log's own time would give).

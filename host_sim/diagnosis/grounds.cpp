@@ -1,6 +1,9 @@
 // diagnosis - base rows and metrics of a pass.
 #include "host_sim/diagnosis/grounds.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace armcal::diagnosis {
 
 namespace {

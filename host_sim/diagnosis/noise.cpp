@@ -1,6 +1,7 @@
 // diagnosis - Yule-Walker estimation and whitening across broken stretches of a log.
 #include "host_sim/diagnosis/noise.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace armcal::diagnosis {

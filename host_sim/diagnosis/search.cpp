@@ -13,6 +13,12 @@ using Eigen::VectorXd;
 namespace {
 constexpr int kSweeps = 4;           // of a pattern search at one step size
 constexpr double kWorthAStep = 0.3;  // of chi^2: less is below what noise moves it by
+constexpr int kFewRows = 200;        // of a joint: too few for terms beside the base
+constexpr double kSlow = 0.1;        // of the fastest that was seen is low speed, of the joint's limit is high speed
+constexpr int kFewSlowRows = 30;
+constexpr double kAboveStiction = 5;  // times v_min: a log that only creeps has no low speed to compare
+constexpr double kTempSpan_K = 2;
+constexpr double kLoadSpan = 2;  // times the torque's noise
 }  // namespace
 
 VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::string name) {
@@ -173,20 +179,21 @@ bool IsExcited(const Candidate& candidate, const Evidence& evidence) {
   const int j = candidate.joints().empty() ? candidate.rows().back() : candidate.joints()[0];
   const auto& joint = evidence.model->robot().joint[j];
   const int rows = evidence.index[j].size();
-  if (rows < 200) return false;
+  if (rows < kFewRows) return false;
   for (const std::string& need : candidate.record().needs) {
     if (need == "low_speed" || need == "high_speed") {
       const VectorXd v = OwnSignal(candidate, evidence, "qd").cwiseAbs();
       const double fastest = v.maxCoeff();
-      if (need == "high_speed" && fastest < 0.1 * joint.speed_limit_radps) return false;
-      if (need == "low_speed" && ((v.array() < 0.1 * fastest).count() < 30 || fastest < 5 * joint.v_min_radps))
+      if (need == "high_speed" && fastest < kSlow * joint.speed_limit_radps) return false;
+      if (need == "low_speed" &&
+          ((v.array() < kSlow * fastest).count() < kFewSlowRows || fastest < kAboveStiction * joint.v_min_radps))
         return false;
     } else if (need == "temp_span") {
       const VectorXd temp = OwnSignal(candidate, evidence, "temp");
-      if (temp.maxCoeff() - temp.minCoeff() < 2) return false;
+      if (temp.maxCoeff() - temp.minCoeff() < kTempSpan_K) return false;
     } else if (need == "load_span") {
       const VectorXd load = OwnSignal(candidate, evidence, "tau_rigid").cwiseAbs();
-      if (load.maxCoeff() - load.minCoeff() < 2 * joint.torque_noise_Nm) return false;
+      if (load.maxCoeff() - load.minCoeff() < kLoadSpan * joint.torque_noise_Nm) return false;
     }
   }
   return true;

@@ -9,12 +9,14 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kRescored = 14;  // candidates whose likelihood is computed with their own noise model
-constexpr int kCurvesOfAJoint = 3;
-constexpr double kKeepsOutOfFold = 0.35;
+constexpr int kRescored = 14;             // candidates whose likelihood is computed with their own noise model
+constexpr int kCurvesOfAJoint = 3;        // among these
+constexpr double kKeepsOutOfFold = 0.35;  // of its gain
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kOnce = 0.8;              // of a trace in one fold: the others cannot tell of it
-constexpr double kIndistinguishable = 25;  // chi^2 left when one kind imitates another
+constexpr double kIndistinguishable = 25;  // chi^2 left at most when one kind imitates another
+constexpr double kImitated = 0.1;          // and of the trace's own
+constexpr double kAsGood = 0.95;           // of a term's score: the logs do not tell which it is
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr int kSharpenings = 3;
 constexpr double kNothing = 10;         // a gain that no score above zero can come from
@@ -26,9 +28,6 @@ bool SharesJoint(const Candidate& a, const Candidate& b) {
                      [&](int j) { return std::find(b.rows().begin(), b.rows().end(), j) != b.rows().end(); });
 }
 
-// Isolated events: what one part of a log shows of them says nothing about another part.
-bool IsIsolated(const Candidate& c) { return c.record().search.how == "window"; }
-
 }  // namespace
 
 bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
@@ -36,7 +35,7 @@ bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
   std::vector<Candidate*> causes, events;
   for (const auto& c : w_.candidates)
     if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence))
-      (IsIsolated(*c) ? events : causes).push_back(c.get());
+      (c->is_event() ? events : causes).push_back(c.get());
   bursts_.clear();
   if (Best(causes, terms, grounds, out)) return true;
   // Whatever comes and goes with the motion looks like events, too: they are asked for last. A cause that showed once
@@ -157,7 +156,7 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   const VectorXd folds =
       metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds, f.precision);
   const bool holds = folds.sum() > kKeepsOutOfFold * gain.gain && (folds.array() > 0).count() >= kFoldsThatImprove;
-  if (!holds && !IsIsolated(*f.candidate) && !bursts_.contains(f.candidate)) {
+  if (!holds && !f.candidate->is_event() && !bursts_.contains(f.candidate)) {
     if (!f.candidate->is_curve() && metric.LargestFold(c, gain.amplitude, kBlocks, kFolds) > kOnce)
       bursts_.insert(f.candidate);
     return false;
@@ -180,8 +179,8 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
       continue;
     const auto [taken, own] = metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].eta), c, gain.amplitude);
     const double left = own - taken;
-    const bool same = left < kIndistinguishable && left < 0.1 * own;
-    const bool near = ranked[other].score > 0.95 * f.score;
+    const bool same = left < kIndistinguishable && left < kImitated * own;
+    const bool near = ranked[other].score > kAsGood * f.score;
     if ((!same && !near) || out.also_fits.size() >= kOtherNames) continue;
     out.also_fits.push_back(kind);
     if (!runner_up) out.rivals.push_back(rival);

@@ -1,4 +1,4 @@
-// diagnosis - the state of one diagnosis: logs, current terms, rows of the base model; used by diagnose.cpp only.
+// diagnosis - the state of one diagnosis: logs, current terms, rows of the base model; the room's own.
 #pragma once
 
 #include "host_sim/diagnosis/diagnose.hpp"

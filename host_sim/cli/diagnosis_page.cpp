@@ -79,10 +79,10 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
     const Dependence d = DependenceOf(v, k);
     const int j = d.joint;
     report::Plot dependence{
-        {fmt::format("what gave it away: residual of joint {}, mean over bins", j + 1), d.signal, "torque / N m"},
+        {fmt::format("what gave it away: residual of joint {}, mean over bins", j + 1), d.signal, d.torque},
         {d.without, d.term, d.remains}};
     page.Add(dependence, "Held-out log, moving samples.");
-    report::Plot time{{fmt::format("residual of joint {} over time", j + 1), "time / s", "torque / N m"},
+    report::Plot time{{fmt::format("residual of joint {} over time", j + 1), "time / s", d.torque},
                       {{"before", Values(test.s.t), Moving(test, v.held_out->before, j), report::Style::kLine},
                        {"after", Values(test.s.t), Moving(test, v.held_out->after, j), report::Style::kLine}}};
     page.Add(time,

@@ -72,7 +72,8 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
 }
 
 // The weakest term that makes a joint of its own worse, or all joints together: than the declared model is, or than the
-// other terms are without it. A delay is judged with all others, which were found on logs that it had aligned.
+// other terms that could tell its cause are without it. A delay is judged with all others, which were found on logs
+// that it had aligned.
 Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after) {
   for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
     if (!c->confirmed || c->candidate->is_event()) continue;
@@ -83,7 +84,7 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const Vecto
       return own || (after.array().max(1e-12) / error.array().max(1e-12)).log().sum() > std::log(kWorse);
     };
     if (is_worse_than(before)) return &*c;
-    const std::vector<const Chosen*> others = Confirmed(w.chosen, &*c);
+    const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
     if (others.empty() || c->delay_s != 0) continue;
     if (is_worse_than(calibration::Rms(log, Leaves(w, others, log), true))) return &*c;
   }

@@ -2,6 +2,7 @@
 #include "host_sim/diagnosis/selector.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace armcal::diagnosis {
 
@@ -16,7 +17,7 @@ constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kOnce = 0.8;              // of a trace in one fold: the others cannot tell of it
 constexpr double kIndistinguishable = 25;  // chi^2 left at most when one kind imitates another
 constexpr double kImitated = 0.1;          // and of the trace's own
-constexpr double kAsGood = 0.95;           // of a term's score: the logs do not tell which it is
+constexpr double kNear = 0.05;             // of a score: the logs do not tell which of two it is
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr int kSharpenings = 3;
 constexpr double kNothing = 10;         // a gain that no score above zero can come from
@@ -180,7 +181,7 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     const auto [taken, own] = metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].eta), c, gain.amplitude);
     const double left = own - taken;
     const bool same = left < kIndistinguishable && left < kImitated * own;
-    const bool near = ranked[other].score > kAsGood * f.score;
+    const bool near = std::abs(ranked[other].score - f.score) < kNear * f.score;
     if ((!same && !near) || out.also_fits.size() >= kOtherNames) continue;
     out.also_fits.push_back(kind);
     if (!runner_up) out.rivals.push_back(rival);

@@ -61,16 +61,18 @@ VectorXd Diagnosis::Work::SlopeOverModelTorque(const std::vector<const Chosen*>&
     const Candidate& c = *terms[t]->candidate;
     const auto row = std::find(c.rows().begin(), c.rows().end(), j) - c.rows().begin();
     if (row == static_cast<long>(c.rows().size()) || c.has_memory() || !c.reads("tau_model")) continue;
-    VectorXd side[2];
-    for (const int sign : {1, -1}) {
-      std::vector<Quantities> moved = evidence.logs;
-      for (Quantities& log : moved) log.tau_model.col(j).array() += sign * step;
-      moved.swap(evidence.logs);
-      side[sign > 0] =
+    const auto torque = [&](double shift) {  // with the model torque so much larger
+      std::vector<VectorXd> kept;
+      for (Quantities& log : evidence.logs) {
+        kept.push_back(log.tau_model.col(j));
+        log.tau_model.col(j).array() += shift;
+      }
+      const VectorXd out =
           GatherColumns(c, evidence, terms[t]->eta).block[static_cast<std::size_t>(row)] * estimate.amplitude[t];
-      moved.swap(evidence.logs);
-    }
-    const VectorXd slope = (side[1] - side[0]) / (2 * step);
+      for (std::size_t l = 0; l < kept.size(); ++l) evidence.logs[l].tau_model.col(j) = kept[l];
+      return out;
+    };
+    const VectorXd slope = (torque(step) - torque(-step)) / (2 * step);
     sum = sum.size() ? VectorXd(sum + slope) : slope;
   }
   return sum;

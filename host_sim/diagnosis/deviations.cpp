@@ -75,10 +75,9 @@ void Diagnosis::Work::Polish() {
       value.push_back(c.delay_s != 0 ? &c.delay_s : &c.eta[k]);
     }
   }
-  // of the logs as the terms say that they are delayed
   const auto solve = [&] {
-    if (TotalDelay_s(chosen) != delay_s) SetDelay(TotalDelay_s(chosen));
-    estimate = Solve(terms);
+    AlignLogs();
+    Solve(terms);
   };
   solve();
   for (int step = 0; step < kSteps && !unknowns.empty(); ++step) {

@@ -35,21 +35,20 @@ void ApplyDelay(Diagnosis::Work& w) {
   if (c.candidate->delay() < 0) return;
   double& found_s = c.eta[static_cast<std::size_t>(c.candidate->delay())];
   c.delay_s = found_s, found_s = 0;
-  w.SetDelay(TotalDelay_s(w.chosen));
+  w.AlignLogs();
 }
 
 // A log as the confirmed terms say that it was measured.
-calibration::Dataset AsTermsSay(const std::vector<Chosen>& chosen, const calibration::Dataset& log) {
-  const double delay_s = TotalDelay_s(chosen);
-  return delay_s != 0 ? calibration::Delayed(log, delay_s) : log;
+calibration::Dataset AsTermsSay(const Diagnosis::Work& w, const calibration::Dataset& log) {
+  return w.delay_s != 0 ? calibration::Delayed(log, w.delay_s) : log;
 }
 
 // What the declared model with these terms leaves of another log, [N x n]; w keeps their estimate. tracking: how run
 // states among them were followed.
 MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
                 std::string* tracking = nullptr) {
-  w.estimate = w.Solve(terms);
-  const calibration::Dataset seen = AsTermsSay(w.chosen, log);
+  w.Solve(terms);
+  const calibration::Dataset seen = AsTermsSay(w, log);
   const Quantities q = MakeQuantities(w.model, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
   MatrixXd left = log.tau - calibration::Predict(w.model, seen, w.estimate.x, w.declared.eta);
   if (tracking) tracking->clear();
@@ -179,7 +178,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
     w.estimate = std::move(with_all);
     if (!refuted) break;
     refuted->confirmed = false;
-    if (refuted->delay_s != 0) w.SetDelay(TotalDelay_s(w.chosen));
+    w.AlignLogs();
   }
   WriteTerms(w, finding_);
   return out;
@@ -187,7 +186,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
 
 std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
   const Work& w = *work_;
-  const calibration::Dataset seen = AsTermsSay(w.chosen, data);
+  const calibration::Dataset seen = AsTermsSay(w, data);
   const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
   std::vector<MatrixXd> out;
   std::size_t k = 0;

@@ -12,7 +12,7 @@ constexpr double kClearly = 0.9;    // of a joint's noise: below this a found ef
 }  // namespace
 
 Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms) : work_(work) {
-  work_.estimate = work_.Solve(terms);
+  work_.Solve(terms);
   work_.Prepare(terms);
   thinned_ = std::make_unique<Thinned>(work_.evidence, kThinnedRows);
   thin_rows_ = thinned_->Pick(work_.rows);

@@ -157,9 +157,10 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   const VectorXd folds =
       metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds, f.precision);
   const bool holds = folds.sum() > kKeepsOutOfFold * gain.gain && (folds.array() > 0).count() >= kFoldsThatImprove;
-  if (!holds && !f.candidate->is_event() && !bursts_.contains(f.candidate)) {
+  const bool once = std::find(bursts_.begin(), bursts_.end(), f.candidate) != bursts_.end();
+  if (!holds && !f.candidate->is_event() && !once) {
     if (!f.candidate->is_curve() && metric.LargestFold(c, gain.amplitude, kBlocks, kFolds) > kOnce)
-      bursts_.insert(f.candidate);
+      bursts_.push_back(f.candidate);
     return false;
   }
   if (!StaysAtLowerBandwidth(f, terms, gain.gain, noise)) return false;

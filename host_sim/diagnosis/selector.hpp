@@ -3,7 +3,7 @@
 #pragma once
 
 #include <map>
-#include <set>
+#include <vector>
 
 #include "host_sim/diagnosis/grounds.hpp"
 #include "host_sim/diagnosis/work.hpp"
@@ -37,7 +37,7 @@ class Selector {
 
   Diagnosis::Work& w_;
   std::map<const Candidate*, double> gain_;  // as last searched
-  std::set<Candidate*> bursts_;              // causes that this pass could not judge fold by fold
+  std::vector<Candidate*> bursts_;           // causes that this pass could not judge fold by fold
 };
 
 }  // namespace armcal::diagnosis

@@ -25,12 +25,6 @@ std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Ch
   return out;
 }
 
-double TotalDelay_s(const std::vector<Chosen>& chosen) {
-  double sum = 0;
-  for (const Chosen& c : chosen) sum += c.confirmed ? c.delay_s : 0;
-  return sum;
-}
-
 Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque& arm, const calibration::Dataset& data,
                           const VectorXd& x, const std::vector<double>& eta, bool flange) {
   Quantities out;
@@ -90,6 +84,12 @@ void Diagnosis::Work::IndexRows() {
     }
 }
 
+void Diagnosis::Work::AlignLogs() {
+  double by_s = 0;
+  for (const Chosen& c : chosen) by_s += c.confirmed ? c.delay_s : 0;
+  if (by_s != delay_s) SetDelay(by_s);
+}
+
 void Diagnosis::Work::SetDelay(double by_s) {
   delay_s = by_s;
   delayed.clear();
@@ -106,7 +106,7 @@ std::vector<NoiseModel> Diagnosis::Work::WhiteNoise() const {
   return noise;
 }
 
-Diagnosis::Work::Estimate Diagnosis::Work::Solve(const std::vector<const Chosen*>& terms) {
+void Diagnosis::Work::Solve(const std::vector<const Chosen*>& terms) {
   const int n = model.joints(), active = static_cast<int>(declared.active.size());
   estimate = Estimate{};
   estimate.x = declared.x;
@@ -136,7 +136,6 @@ Diagnosis::Work::Estimate Diagnosis::Work::Solve(const std::vector<const Chosen*
     estimate = out;
     if (settled) break;
   }
-  return out;
 }
 
 }  // namespace armcal::diagnosis

@@ -20,9 +20,6 @@ struct Chosen {
 // Those that are, but for `without`.
 std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Chosen* without = nullptr);
 
-// By how much the confirmed terms say that the measurement is delayed.
-double TotalDelay_s(const std::vector<Chosen>& chosen);
-
 struct Diagnosis::Work {
   Work(const codegen::Model& model, const codegen::Catalogue& catalogue,
        std::vector<const calibration::Dataset*> train);
@@ -33,7 +30,8 @@ struct Diagnosis::Work {
     std::vector<Eigen::VectorXd> amplitude;  // per term
     Eigen::VectorXd sigma, innovation;
   };
-  Estimate Solve(const std::vector<const Chosen*>& terms);
+  // Leaves the estimate.
+  void Solve(const std::vector<const Chosen*>& terms);
   // Moves the chosen terms' unknowns to where everything together fits best: a search sees one at a time, over a model
   // that was fitted without it. Leaves the estimate.
   void Polish();
@@ -47,7 +45,8 @@ struct Diagnosis::Work {
   void Prepare(const std::vector<const Chosen*>& terms);
   Eigen::VectorXd SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j);
   std::vector<NoiseModel> WhiteNoise() const;
-  // Reads the logs' motion that much before their torque, from now on.
+  // Reads the logs' motion as much before their torque as the confirmed terms say, from now on.
+  void AlignLogs();
   void SetDelay(double by_s);
   void IndexRows();
   void FillDeclared();

@@ -1,28 +1,10 @@
-// robot - reads [payload] and adds two bodies by Steiner's rule; knows no other table.
+// robot - reads [payload] and makes a link carry it; knows no other table.
 #include "codegen/src/robot/payload.hpp"
 
-#include "codegen/src/robot/frames.hpp"
+#include "codegen/src/robot/body.hpp"
 #include "codegen/src/robot/toml_reader.hpp"
 
 namespace armcal::codegen {
-namespace {
-
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
-Matrix3d Symmetric(const std::array<double, 6>& i) {
-  Matrix3d I;
-  I << i[0], i[1], i[2], i[1], i[3], i[4], i[2], i[4], i[5];
-  return I;
-}
-
-// What a mass adds to the moments about a point that is `d` away from it.
-Matrix3d Steiner(double mass, const Vector3d& d) {
-  return mass * (d.squaredNorm() * Matrix3d::Identity() - d * d.transpose());
-}
-
-}  // namespace
-
 Payload ReadPayload(const TomlReader& in) {
   in.AllowOnly({"mass_kg", "center_m", "inertia_kgm2"});
   Payload p;
@@ -47,13 +29,10 @@ Payload ReadPayload(const std::filesystem::path& path) {
 }
 
 Link Carrying(const Link& link, const Eigen::Isometry3d& flange, const Payload& payload) {
-  const Matrix3d R = flange.linear();
-  const Vector3d a(link.center_m.data()), b = flange * Vector3d(payload.center_m->data());
-  const double mass = link.mass_kg + payload.mass_kg;
-  const Vector3d centre = (link.mass_kg * a + payload.mass_kg * b) / mass;
-  const Matrix3d I = Symmetric(link.inertia_kgm2) + Steiner(link.mass_kg, a - centre) +
-                     R * Symmetric(*payload.inertia_kgm2) * R.transpose() + Steiner(payload.mass_kg, b - centre);
-  return {mass, Components(centre), {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)}};
+  Body both{link.mass_kg, Eigen::Vector3d(link.center_m.data()), Symmetric(link.inertia_kgm2)};
+  Merge(both,
+        Moved(flange, {payload.mass_kg, Eigen::Vector3d(payload.center_m->data()), Symmetric(*payload.inertia_kgm2)}));
+  return ToLink(both);
 }
 
 }  // namespace armcal::codegen

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <utility>
 
+#include "codegen/src/robot/body.hpp"
 #include "codegen/src/robot/frames.hpp"
 #include "host_sim/io/input_error.hpp"
 
@@ -21,30 +22,13 @@ using Eigen::Vector3d;
 constexpr double kSameAngle = 1e-5;   // rad
 constexpr double kSameLength = 1e-5;  // m; no arm is built more exactly
 
-// Everything at joint positions zero, seen from the root link.
-struct Body {
-  double mass = 0;
-  Vector3d center = Vector3d::Zero();
-  Matrix3d inertia = Matrix3d::Zero();  // about the centre
-};
+// At joint positions zero, seen from the root link.
 struct Axis {
   urdf::JointConstSharedPtr joint;
   Vector3d point, direction;
   Body body;        // of the link that it moves
   Isometry3d link;  // that link's own frame
 };
-
-Matrix3d Steiner(double mass, const Vector3d& r) {
-  return mass * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
-}
-
-void Merge(Body& into, const Body& other) {
-  const double mass = into.mass + other.mass;
-  if (mass <= 0) return;
-  const Vector3d center = (into.mass * into.center + other.mass * other.center) / mass;
-  into.inertia += other.inertia + Steiner(into.mass, into.center - center) + Steiner(other.mass, other.center - center);
-  into.mass = mass, into.center = center;
-}
 
 Matrix3d Rotation(const urdf::Rotation& r) {
   double x, y, z;
@@ -84,11 +68,10 @@ class Walk {
   // The body of a link and of all that is fixed to it; the movable joint that follows goes to next_, its pose to at_.
   void Collect(const urdf::Link& link, const Isometry3d& pose, Body& body) {
     if (const auto& inertial = link.inertial) {
-      const Isometry3d T = pose * Pose(inertial->origin);
-      Matrix3d I;
-      I << inertial->ixx, inertial->ixy, inertial->ixz, inertial->ixy, inertial->iyy, inertial->iyz, inertial->ixz,
-          inertial->iyz, inertial->izz;
-      Merge(body, {inertial->mass, T.translation(), T.linear() * I * T.linear().transpose()});
+      const Body own{
+          inertial->mass, Vector3d::Zero(),
+          Symmetric(inertial->ixx, inertial->ixy, inertial->ixz, inertial->iyy, inertial->iyz, inertial->izz)};
+      Merge(body, Moved(pose * Pose(inertial->origin), own));
     }
     for (const auto& joint : link.child_joints) {
       const Isometry3d child = pose * Pose(joint->parent_to_joint_origin_transform);
@@ -221,9 +204,7 @@ UrdfChain ReadUrdf(const std::filesystem::path& path) {
     if (limits) joint.speed_limit_radps = limits->velocity, joint.torque_limit_Nm = limits->effort;
     if (const auto& d = axis.joint->dynamics) joint.nominal = {{"Fc", d->friction}, {"Fv", d->damping}};
     const Isometry3d frame = frames[i].Pose();
-    const Vector3d center = frame.inverse() * axis.body.center;
-    const Matrix3d I = frame.linear().transpose() * axis.body.inertia * frame.linear();
-    joint.link = {axis.body.mass, Components(center), {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)}};
+    joint.link = ToLink(Moved(frame.inverse(), axis.body));
     chain.joint.push_back(joint);
     chain.limited.push_back(limited);
   }

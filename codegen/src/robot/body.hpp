@@ -1,0 +1,47 @@
+// robot - a rigid body in any frame, and two of them as one; knows no file.
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "codegen/src/robot/frames.hpp"
+
+namespace armcal::codegen {
+
+struct Body {
+  double mass = 0;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about the centre
+};
+
+inline Eigen::Matrix3d Symmetric(double xx, double xy, double xz, double yy, double yz, double zz) {
+  Eigen::Matrix3d I;
+  I << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return I;
+}
+inline Eigen::Matrix3d Symmetric(const std::array<double, 6>& i) {
+  return Symmetric(i[0], i[1], i[2], i[3], i[4], i[5]);
+}
+
+// As seen from the frame in which the body's own one has this pose.
+inline Body Moved(const Eigen::Isometry3d& pose, const Body& body) {
+  return {body.mass, pose * body.center, pose.linear() * body.inertia * pose.linear().transpose()};
+}
+
+inline void Merge(Body& into, const Body& other) {
+  const double mass = into.mass + other.mass;
+  if (mass <= 0) return;
+  const Eigen::Vector3d center = (into.mass * into.center + other.mass * other.center) / mass;
+  const auto steiner = [&](const Body& b) -> Eigen::Matrix3d {
+    const Eigen::Vector3d r = b.center - center;
+    return b.mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+  };
+  into.inertia += other.inertia + steiner(into) + steiner(other);
+  into.mass = mass, into.center = center;
+}
+
+inline Link ToLink(const Body& body) {
+  const Eigen::Matrix3d& I = body.inertia;
+  return {body.mass, Components(body.center), {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)}};
+}
+
+}  // namespace armcal::codegen

@@ -117,13 +117,11 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
       if (fit.information.rows[j] > 0)
         fit.sigma[j] = std::max(1e-12, std::sqrt(fit.information.Residual(j, fit.x) / fit.information.rows[j]));
   }
-  for (int j = 0; j < n; ++j) {
-    double sum = 0;
-    for (const Dataset* d : data) {
-      const MatrixXd tau = Predict(model, *d, fit.x, fit.eta);
-      sum += VarianceInflation(d->tau.col(j) - tau.col(j), d->used.col(j)) / static_cast<double>(data.size());
-    }
-    fit.inflation[j] = sum;
+  fit.inflation.setZero();
+  for (const Dataset* d : data) {
+    const MatrixXd left = d->tau - Predict(model, *d, fit.x, fit.eta);
+    for (int j = 0; j < n; ++j)
+      fit.inflation[j] += VarianceInflation(left.col(j), d->used.col(j)) / static_cast<double>(data.size());
   }
   const VectorXd weight = (fit.sigma.cwiseAbs2().cwiseProduct(fit.inflation)).cwiseInverse();
   SolveWithPrior(fit.information, weight, prior, fit.active,

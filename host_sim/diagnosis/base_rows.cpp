@@ -10,46 +10,71 @@ namespace armcal::diagnosis {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// The declared model's rows over the used samples, coordinates declared.active.
-void Diagnosis::Work::FillDeclared() {
-  const int n = model.joints(), columns = model.columns(), active = static_cast<int>(declared.active.size());
-  const VectorXd mean = prior.mean.head(columns), x = estimate.x.head(columns);
-  if (model.depends_on_estimate() || regressor.empty()) {
-    regressor.resize(train.size());
-    for (std::size_t log = 0; log < train.size(); ++log)
-      model.Regressor(train[log]->s, {x.data(), static_cast<std::size_t>(columns)}, declared.eta, regressor[log]);
+// Candidates read the model's torque as the estimate has it.
+void Diagnosis::Work::FollowEstimate() {
+  if (evidence.logs.empty()) {
+    for (const auto* d : train) evidence.logs.push_back(MakeQuantities(model, *d, needs_flange));
+  } else if (followed == estimate.x) {
+    return;
   }
-  rows.mean.resize(active);
-  for (int a = 0; a < active; ++a) rows.mean[a] = prior.mean[declared.active[a]];
-  for (int j = 0; j < n; ++j) {
-    const RowIndex& index = rows.index[j];
-    std::vector<int> own;
+  for (Quantities& log : evidence.logs) Follow(model, arm, estimate.x, declared.eta, log);
+  followed = estimate.x;
+}
+
+// What of the declared model's rows no estimate changes; coordinates declared.active.
+void Diagnosis::Work::StartRows() {
+  const int n = model.joints(), columns = model.columns(), active = static_cast<int>(declared.active.size());
+  rows = BaseRows{};
+  rows.index = evidence.index;
+  rows.informative = prior.informative;
+  rows.columns.resize(n), rows.design.resize(n), rows.target.resize(n);
+  bent.assign(n, 1);
+  const VectorXd x = estimate.x.head(columns);
+  regressor.resize(train.size());
+  for (std::size_t log = 0; log < train.size(); ++log)
+    model.Regressor(train[log]->s, {x.data(), static_cast<std::size_t>(columns)}, declared.eta, regressor[log]);
+  for (int j = 0; j < n; ++j)
     for (int a = 0; a < active; ++a) {
       const int c = declared.active[a];
-      if (c == columns + j || (c < columns && !model.rows()[j][c].IsZero())) own.push_back(a);
-    }
-    MatrixXd design(index.size(), static_cast<Eigen::Index>(own.size()));
-    VectorXd target(index.size());
-    std::vector<VectorXd> at_estimate, at_mean;
-    for (const auto& row : regressor) at_estimate.push_back(row[j] * x), at_mean.push_back(row[j] * mean);
-    for (std::size_t i = 0; i < own.size(); ++i) {
-      const int c = declared.active[own[i]];
-      for (int k = 0; k < index.size(); ++k)
-        design(k, static_cast<Eigen::Index>(i)) = c < columns ? regressor[index.dataset[k]][j](index.sample[k], c)
-                                                              : at_estimate[index.dataset[k]][index.sample[k]];
-    }
-    for (int k = 0; k < index.size(); ++k)
-      target[k] = train[index.dataset[k]]->tau(index.sample[k], j) - at_mean[index.dataset[k]][index.sample[k]];
-    for (const int a : own) {
-      const int c = declared.active[a];
+      if (c != columns + j && (c >= columns || model.rows()[j][c].IsZero())) continue;
+      rows.columns[j].push_back(a);
       if (c >= columns || model.is_rigid(c) || model.column_joint(c) != j) continue;
       const auto& p = model.table()[model.table_index(c)];
       if (std::isfinite(p.lower) || std::isfinite(p.upper)) rows.bounded.push_back({j, a, p.lower, p.upper});
     }
-    rows.columns.push_back(std::move(own));
-    rows.design.push_back(std::move(design));
-    rows.target.push_back(std::move(target));
+}
+
+// The declared model's rows of one joint over the used samples.
+void Diagnosis::Work::FillDeclared(int j) {
+  const int columns = model.columns();
+  const RowIndex& index = rows.index[j];
+  const VectorXd mean = prior.mean.head(columns);
+  std::vector<VectorXd> at_mean;
+  for (const auto& row : regressor) at_mean.push_back(row[j] * mean);
+  rows.design[j].resize(index.size(), static_cast<Eigen::Index>(rows.columns[j].size()));
+  for (std::size_t i = 0; i < rows.columns[j].size(); ++i)
+    if (const int c = declared.active[rows.columns[j][i]]; c < columns)
+      for (int k = 0; k < index.size(); ++k)
+        rows.design[j](k, static_cast<Eigen::Index>(i)) = regressor[index.dataset[k]][j](index.sample[k], c);
+  rows.target[j].resize(index.size());
+  for (int k = 0; k < index.size(); ++k)
+    rows.target[j][k] = train[index.dataset[k]]->tau(index.sample[k], j) - at_mean[index.dataset[k]][index.sample[k]];
+}
+
+// The column of the joint's torque gain, its last one: the model's torque at the estimate. False if there is none.
+bool Diagnosis::Work::FillGain(int j) {
+  const auto& own = rows.columns[j];
+  const Eigen::Index last = static_cast<Eigen::Index>(own.size()) - 1;
+  if (last < 0 || declared.active[own.back()] < model.columns()) return false;
+  VectorXd off(last);  // from the prior mean
+  for (Eigen::Index i = 0; i < last; ++i) {
+    const int c = declared.active[own[static_cast<std::size_t>(i)]];
+    off[i] = estimate.x[c] - prior.mean[c];
   }
+  VectorXd torque = rows.design[j].leftCols(last) * off - rows.target[j];
+  for (int k = 0; k < torque.size(); ++k) torque[k] += train[rows.index[j].dataset[k]]->tau(rows.index[j].sample[k], j);
+  rows.design[j].col(last) = torque;
+  return true;
 }
 
 // What the terms' torque on joint j changes by per unit of the model torque that their columns read there, at the last
@@ -80,44 +105,56 @@ VectorXd Diagnosis::Work::SlopeOverModelTorque(const std::vector<const Chosen*>&
 
 void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   const int active = static_cast<int>(declared.active.size());
-  evidence.logs.clear();
-  for (const auto* d : train)
-    evidence.logs.push_back(MakeQuantities(model, arm, *d, estimate.x, declared.eta, needs_flange));
-  rows = BaseRows{};
-  rows.index = evidence.index;
-  rows.informative = prior.informative;
-  FillDeclared();
-  // A term that reads the model's torque changes with the parameters, too: where it cuts torque off they change
-  // nothing.
+  const auto follows = [](const Chosen* t) { return t->candidate->follows_estimate(); };
+  if (evidence.logs.empty() || std::any_of(terms.begin(), terms.end(), follows)) FollowEstimate();
+  if (model.depends_on_estimate() || regressor.empty()) StartRows();
+  rows.mean.resize(active);
+  for (int a = 0; a < active; ++a) rows.mean[a] = prior.mean[declared.active[a]];
+  std::vector<Columns> added;
+  for (const Chosen* t : terms) added.push_back(GatherColumns(*t->candidate, evidence, t->eta));
   for (int j = 0; j < model.joints(); ++j) {
-    const VectorXd slope = SlopeOverModelTorque(terms, j);
-    for (int k = 0; k < slope.size(); ++k) {
-      const int log = rows.index[j].dataset[k], sample = rows.index[j].sample[k];
-      const double at_mean = train[log]->tau(sample, j) - rows.target[j][k];
-      rows.target[j][k] += slope[k] * (evidence.logs[log].tau_model(sample, j) - at_mean);
-      rows.design[j].row(k) *= 1 + slope[k];
+    std::erase_if(rows.columns[j], [&](int c) { return c >= active; });
+    const auto declared_columns = static_cast<Eigen::Index>(rows.columns[j].size());
+    if (bent[j]) FillDeclared(j);
+    else rows.design[j].conservativeResize(Eigen::NoChange, declared_columns);
+    Eigen::Index same = bent[j] ? 0 : declared_columns;
+    if (FillGain(j)) same = std::min(same, declared_columns - 1);
+    bent[j] = 0;
+    if (const VectorXd slope = SlopeOverModelTorque(terms, j); slope.size()) Bend(j, slope), same = 0;
+    int at = active;
+    for (const Columns& c : added) {
+      if (const auto r = std::find(c.joints.begin(), c.joints.end(), j); r != c.joints.end()) {
+        rows.design[j].conservativeResize(Eigen::NoChange, rows.design[j].cols() + c.count());
+        rows.design[j].rightCols(c.count()) = c.block[static_cast<std::size_t>(r - c.joints.begin())];
+        for (int i = 0; i < c.count(); ++i) rows.columns[j].push_back(at + i);
+      }
+      at += c.count();
     }
+    rows.Multiply(j, same);
   }
   int size = active;
   std::vector<std::pair<int, const MatrixXd*>> curves;
-  for (const Chosen* t : terms) {
-    const Columns c = GatherColumns(*t->candidate, evidence, t->eta);
-    for (std::size_t r = 0; r < c.joints.size(); ++r) {
-      const int j = c.joints[r];
-      const Eigen::Index before = rows.design[j].cols();
-      rows.design[j].conservativeResize(Eigen::NoChange, before + c.count());
-      rows.design[j].rightCols(c.count()) = c.block[r];
-      for (int i = 0; i < c.count(); ++i) rows.columns[j].push_back(size + i);
-    }
-    if (t->found.precision.size()) curves.emplace_back(size, &t->found.precision);
-    size += c.count();
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (terms[t]->found.precision.size()) curves.emplace_back(size, &terms[t]->found.precision);
+    size += added[t].count();
   }
-  if (!curves.empty()) rows.precision = MatrixXd::Zero(size, size);
+  rows.precision = curves.empty() ? MatrixXd() : MatrixXd::Zero(size, size);
   for (const auto& [at, precision] : curves)
     rows.precision.block(at, at, precision->rows(), precision->cols()) = *precision;
   rows.mean.conservativeResize(size);
   rows.mean.tail(size - active).setZero();
   MakeCoordinates(size);
+}
+
+// A term that reads the model's torque changes with the parameters, too: where it cuts torque off they change nothing.
+void Diagnosis::Work::Bend(int j, const VectorXd& slope) {
+  for (int k = 0; k < slope.size(); ++k) {
+    const int log = rows.index[j].dataset[k], sample = rows.index[j].sample[k];
+    const double at_mean = train[log]->tau(sample, j) - rows.target[j][k];
+    rows.target[j][k] += slope[k] * (evidence.logs[log].tau_model(sample, j) - at_mean);
+  }
+  rows.design[j].array().colwise() *= 1 + slope.array();
+  bent[j] = 1;
 }
 
 // Coordinates z in which the prior is unit and directions that nobody sees are left out.
@@ -127,15 +164,7 @@ void Diagnosis::Work::MakeCoordinates(int size) {
   for (int j = 0; j < model.joints(); ++j) {
     const auto& columns = rows.columns[j];
     const double weight = 1 / (estimate.sigma[j] * estimate.sigma[j]);
-    if (prior.informative) {
-      for (std::size_t i = 0; i < columns.size(); ++i)
-        H(columns[i], columns[i]) += weight * rows.design[j].col(static_cast<Eigen::Index>(i)).squaredNorm();
-      continue;
-    }
-    const MatrixXd gram = weight * rows.design[j].transpose() * rows.design[j];
-    for (std::size_t i = 0; i < columns.size(); ++i)
-      for (std::size_t k = 0; k < columns.size(); ++k)
-        H(columns[i], columns[k]) += gram(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+    H(columns, columns) += weight * rows.gram[j];
   }
   VectorXd scale(size);
   for (int i = 0; i < size; ++i) scale[i] = H(i, i) > 0 ? 1 / std::sqrt(H(i, i)) : 0;

@@ -32,6 +32,12 @@ bool Candidate::reads(const std::string& input) const {
   return std::find(inputs.begin(), inputs.end(), input) != inputs.end();
 }
 
+bool Candidate::follows_estimate() const {
+  for (const char* of_model : {"tau_model", "tau_delayed", "tau_rigid", "tau_gravity", "M[:,j]", "dY/dgravity"})
+    if (reads(of_model)) return true;
+  return false;
+}
+
 std::string Candidate::name() const {
   std::string s = record().name;
   for (std::size_t k = 0; k < joints().size(); ++k) s += (k ? "-" : ", joint ") + std::to_string(joints()[k] + 1);
@@ -71,7 +77,6 @@ Eigen::MatrixXd Earlier(const VectorXd& t, const Eigen::MatrixXd& y, double dela
 const double* ColumnOf(const Quantities& quantities, const Eigen::MatrixXd& delayed, const std::string& name) {
   const codegen::Signals& s = quantities.data->s;
   if (name == "t") return s.t.data();
-  if (name == "dt") return quantities.dt.data();
   const auto digits = name.find_first_of("0123456789");
   if (digits == std::string::npos) return nullptr;
   const std::string quantity = name.substr(0, digits);
@@ -114,6 +119,7 @@ void Candidate::EvaluateUse(const Quantities& quantities, const double* eta, std
     const auto unknown = std::find_if(unknowns().begin(), unknowns().end(), is_it);
     if (unknown != unknowns().end()) bindings[i].value = eta[static_cast<std::size_t>(unknown - unknowns().begin())];
     else if (input == "t" && time_s) bindings[i].value = *time_s;
+    else if (input == "dt") bindings[i] = codegen::BindSteps(quantities.dt);
     else if (std::none_of(states.begin(), states.end(), is_it))
       bindings[i].column = ColumnOf(quantities, delayed, input);
   }

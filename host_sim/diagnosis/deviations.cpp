@@ -61,7 +61,7 @@ double Deviance(const Diagnosis::Work& w) {
 }  // namespace
 
 void Diagnosis::Work::Polish() {
-  constexpr int kSteps = 4;
+  constexpr int kSteps = 8;
   constexpr double kWorthIt = 1;     // gain of a step
   constexpr double kLongest = 0.25;  // of an unknown's size, in one step
   const std::vector<const Chosen*> terms = Confirmed(chosen);

@@ -49,7 +49,8 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
                 std::string* tracking = nullptr) {
   w.Solve(terms);
   const calibration::Dataset seen = AsTermsSay(w, log);
-  const Quantities q = MakeQuantities(w.model, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
+  Quantities q = MakeQuantities(w.model, seen, w.needs_flange);
+  Follow(w.model, w.arm, w.estimate.x, w.declared.eta, q);
   MatrixXd left = log.tau - calibration::Predict(w.model, seen, w.estimate.x, w.declared.eta);
   if (tracking) tracking->clear();
   // Run states are followed in what is left once everything else has been taken off.
@@ -187,7 +188,8 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
 std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
   const Work& w = *work_;
   const calibration::Dataset seen = AsTermsSay(w, data);
-  const Quantities q = MakeQuantities(model_, w.arm, seen, w.estimate.x, w.declared.eta, w.needs_flange);
+  Quantities q = MakeQuantities(model_, seen, w.needs_flange);
+  Follow(model_, w.arm, w.estimate.x, w.declared.eta, q);
   std::vector<MatrixXd> out;
   std::size_t k = 0;
   for (const Chosen& c : w.chosen) {

@@ -10,6 +10,14 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr double kSmooth_s = 0.02;  // over which columns are taken to be smooth
+
+// The samples about row k are all used and in one piece.
+bool IsWhole(const RowIndex& rows, int k, int reach) {
+  return k >= reach && k + reach < rows.size() && rows.dataset[k - reach] == rows.dataset[k + reach] &&
+         rows.sample[k + reach] - rows.sample[k - reach] == 2 * reach;
+}
+
 Columns Gather(const Candidate& candidate, const std::vector<Quantities>& logs, const std::vector<RowIndex>& rows,
                const std::vector<double>& eta) {
   Columns out;
@@ -61,37 +69,49 @@ Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, cons
 
 Thinned::Thinned(const Evidence& evidence, int rows) : all(evidence) {
   for (const Quantities& log : evidence.logs) every = std::max(every, log.data->samples() / rows);
+  every |= 1;  // odd: a sample in the middle
+  reach = std::min(every / 2, static_cast<int>(0.5 * kSmooth_s / evidence.logs[0].dt[0]));
   for (const Quantities& log : evidence.logs) {
     data.push_back(std::make_unique<calibration::Dataset>());
     logs.push_back(PickSamples(log, every, *data.back()));
   }
   for (const RowIndex& from : evidence.index) {
-    kept.emplace_back(), index.emplace_back(), in_all.emplace_back();
+    kept.emplace_back(), index.emplace_back();
     for (int k = 0; k < from.size(); ++k) {
-      if (from.sample[k] % every) continue;
+      if (from.sample[k] % every || !IsWhole(from, k, reach)) continue;
       kept.back().push_back(k);
-      for (RowIndex* to : {&index.back(), &in_all.back()}) {
-        to->dataset.push_back(from.dataset[k]);
-        to->segment_begin.push_back(1);
-        to->sample.push_back(to == &index.back() ? from.sample[k] / every : from.sample[k]);
-      }
+      index.back().dataset.push_back(from.dataset[k]);
+      index.back().segment_begin.push_back(1);
+      index.back().sample.push_back(from.sample[k] / every);
     }
   }
 }
 
 Columns Thinned::Gather(const Candidate& candidate, const std::vector<double>& eta) const {
-  return candidate.has_memory() ? diagnosis::Gather(candidate, all.logs, in_all, eta)
-                                : diagnosis::Gather(candidate, logs, index, eta);
+  if (!candidate.has_memory()) return diagnosis::Gather(candidate, logs, index, eta);
+  Columns out = GatherColumns(candidate, all, eta);
+  for (std::size_t r = 0; r < out.joints.size(); ++r) out.block[r] = AverageRows(out.block[r], out.joints[r]);
+  return out;
 }
 
-BaseRows Thinned::Pick(const BaseRows& from) const {
+MatrixXd Thinned::AverageRows(const MatrixXd& m, int j) const {
+  const auto size = static_cast<Eigen::Index>(kept[j].size());
+  MatrixXd out = MatrixXd::Zero(size, m.cols());
+  for (Eigen::Index c = 0; c < m.cols(); ++c)
+    for (Eigen::Index k = 0; k < size; ++k)
+      out(k, c) = m.col(c).segment(kept[j][static_cast<std::size_t>(k)] - reach, 2 * reach + 1).mean();
+  return out;
+}
+
+BaseRows Thinned::Average(const BaseRows& from) const {
   BaseRows out;
   out.columns = from.columns, out.informative = from.informative, out.L = from.L, out.mean = from.mean;
   out.precision = from.precision;
   out.index = index;
   for (int j = 0; j < from.joints(); ++j) {
-    out.design.push_back(from.design[j](kept[j], Eigen::all));
-    out.target.push_back(from.target[j](kept[j]));
+    out.design.push_back(AverageRows(from.design[j], j));
+    out.target.push_back(AverageRows(from.target[j], j));
+    out.Multiply(j);
   }
   return out;
 }

@@ -13,15 +13,18 @@ constexpr double kClearly = 0.9;    // of a joint's noise: below this a found ef
 
 Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms) : work_(work) {
   work_.Solve(terms);
+  work_.FollowEstimate();
   work_.Prepare(terms);
   thinned_ = std::make_unique<Thinned>(work_.evidence, kThinnedRows);
-  thin_rows_ = thinned_->Pick(work_.rows);
+  thin_rows_ = thinned_->Average(work_.rows);
   MakeMetrics(work_.WhiteNoise());
 }
 
 void Grounds::MakeMetrics(const std::vector<NoiseModel>& noise) {
   metric_ = std::make_unique<Metric>(work_.rows, noise);
-  thin_metric_ = std::make_unique<Metric>(thin_rows_, noise);
+  std::vector<NoiseModel> averaged = noise;
+  for (NoiseModel& joint : averaged) joint.innovation *= thinned_->noise();
+  thin_metric_ = std::make_unique<Metric>(thin_rows_, averaged);
   without_.clear();
 }
 

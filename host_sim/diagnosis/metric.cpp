@@ -12,12 +12,28 @@ namespace armcal::diagnosis {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+void BaseRows::Multiply(int j, Eigen::Index from) {
+  gram.resize(design.size()), right.resize(design.size());
+  const Eigen::Index size = design[j].cols(), added = size - from;
+  const auto fresh = design[j].rightCols(added);
+  gram[j].conservativeResize(size, size), right[j].conservativeResize(size);
+  gram[j].bottomLeftCorner(added, from).noalias() = fresh.transpose() * design[j].leftCols(from);
+  gram[j].topRightCorner(from, added) = gram[j].bottomLeftCorner(added, from).transpose();
+  gram[j].bottomRightCorner(added, added) = SelfProduct(fresh);
+  right[j].tail(added).noalias() = fresh.transpose() * target[j];
+}
+
 void Metric::WhitenJoint(int j) {
   const auto& columns = rows_.columns[j];
   map_[j].resize(static_cast<Eigen::Index>(columns.size()), rows_.L.cols());
   for (std::size_t i = 0; i < columns.size(); ++i) map_[j].row(i) = rows_.L.row(columns[i]);
   q_[j] = WhitenAll(noise_[j], rows_.index[j], rows_.design[j]);
   y_[j] = Whiten(noise_[j], rows_.index[j], rows_.target[j]);
+  if (IsWhite(noise_[j])) {
+    const double weight = 1 / (noise_[j].innovation * noise_[j].innovation);
+    gram_[j] = weight * rows_.gram[j], right_[j] = weight * rows_.right[j];
+    return;
+  }
   gram_[j] = SelfProduct(q_[j]);
   right_[j] = q_[j].transpose() * y_[j];
 }

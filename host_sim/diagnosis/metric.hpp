@@ -40,6 +40,8 @@ struct BaseRows {
   std::vector<std::vector<int>> columns;  // [n] the coordinates x that act on joint j
   std::vector<Eigen::MatrixXd> design;    // [n] rows x columns[j]
   std::vector<Eigen::VectorXd> target;    // [n] tau minus the prior mean's torque
+  std::vector<Eigen::MatrixXd> gram;      // [n] design' design
+  std::vector<Eigen::VectorXd> right;     // [n] design' target
   std::vector<Bounded> bounded;
   bool informative = true;  // z has unit prior
   Eigen::MatrixXd L;        // x - mean = L z
@@ -47,6 +49,8 @@ struct BaseRows {
   Eigen::MatrixXd precision;  // what is known of x beside the prior of z: of curves, how smooth and large; may be empty
   int joints() const { return static_cast<int>(index.size()); }
   int coordinates() const { return static_cast<int>(L.cols()); }
+  // Brings gram and right of joint j up to its design, whose columns before `from` are as they were.
+  void Multiply(int j, Eigen::Index from = 0);
 };
 
 // Columns against the base: their own products, B = Q'C, g = C'r. Those of columns that are nowhere at the same time

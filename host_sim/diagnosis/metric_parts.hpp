@@ -9,6 +9,6 @@ namespace armcal::diagnosis {
 Gain SolveGain(const Eigen::LLT<Eigen::MatrixXd>& base, const Projection& p);
 
 Eigen::MatrixXd WhitenAll(const NoiseModel& noise, const RowIndex& rows, const Eigen::MatrixXd& m);
-Eigen::MatrixXd SelfProduct(const Eigen::MatrixXd& m);  // m' m
+Eigen::MatrixXd SelfProduct(const Eigen::Ref<const Eigen::MatrixXd>& m);  // m' m
 
 }  // namespace armcal::diagnosis

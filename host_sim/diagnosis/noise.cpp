@@ -17,9 +17,9 @@ std::vector<int> PlaceInSegment(const RowIndex& rows) {
   return place;
 }
 
-bool IsWhite(const NoiseModel& noise) { return noise.a.squaredNorm() == 0; }
-
 }  // namespace
+
+bool IsWhite(const NoiseModel& noise) { return noise.a.squaredNorm() == 0; }
 
 NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
   NoiseModel noise;

@@ -21,6 +21,8 @@ struct NoiseModel {
   double innovation = 1;                                // its standard deviation
 };
 
+bool IsWhite(const NoiseModel& noise);
+
 // Yule-Walker over segments; white if the rows are too few or too broken up.
 NoiseModel FitNoise(const RowIndex& rows, const Eigen::VectorXd& residual);
 

@@ -8,13 +8,17 @@
 
 namespace armcal::diagnosis {
 
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-constexpr int kSweeps = 4;           // of a pattern search at one step size
-constexpr double kWorthAStep = 0.3;  // of chi^2: less is below what noise moves it by
-constexpr int kFewRows = 200;        // of a joint: too few for terms beside the base
-constexpr double kSlow = 0.1;        // of the fastest that was seen is low speed, of the joint's limit is high speed
+constexpr int kSweeps = 4;                           // of a pattern search at one step size
+constexpr double kWorthAStep = 0.3;                  // of chi^2: less is below what noise moves it by
+constexpr double kOnsetStep = 1 / 768.0;             // of the log's time
+constexpr int kClimbs = 12;                          // along a valley, at most
+constexpr double kLongest = 0.2, kSlopeStep = 1e-3;  // of an unknown's range
+constexpr int kFewRows = 200;                        // of a joint: too few for terms beside the base
+constexpr double kSlow = 0.1;  // of the fastest that was seen is low speed, of the joint's limit is high speed
 constexpr int kFewSlowRows = 30;
 constexpr double kAboveStiction = 5;  // times v_min: a log that only creeps has no low speed to compare
 constexpr double kTempSpan_K = 2;
@@ -52,6 +56,7 @@ Searcher::Searcher(Candidate& candidate, const Ground& ground, const Found* simp
 
 Found Searcher::Run() {
   const std::string& how = c_.record().search.how;
+  best_.rough = how != "spectral" && how != "window";  // these look for what is over within an averaged row
   if (how == "spectral") Spectral();
   else if (how == "spline") Spline();
   else if (how == "onset") Onset();
@@ -61,30 +66,38 @@ Found Searcher::Run() {
   return Scored();
 }
 
+Found Searcher::Finish(const Found& rough) {
+  if (!rough.rough) return rough;
+  best_ = rough;
+  best_.rough = false, best_.gain = Gain{};
+  Consider(rough.eta);
+  const std::string& how = c_.record().search.how;
+  if (how == "onset") RefineBest(kOnsetStep, 2);
+  else if (how == "profile" && !c_.unknowns().empty() && Promising()) RefineBest(GridStep() / 16, 1);
+  return Scored();
+}
+
 Found Searcher::Scored() const {
   Found f = best_;
-  f.penalty = PenaltyOf(f.gain.rank + searched_, c_, e_);
+  f.penalty = PenaltyOf(f.gain.rank + f.searched, c_, e_);
   if (f.gain.gain > 0 && c_.is_curve() && c_.record().search.how == "spline")
-    f.penalty = f.gain.gain - g_.metric.CurveEvidence(g_.metric.Project(GatherColumns(c_, e_, f.eta)), &f.precision);
+    f.penalty = f.gain.gain - metric().CurveEvidence(metric().Project(Gather(f.eta)), &f.precision);
   f.score = Score(f, f.gain.gain);
   return f;
 }
 
 double Searcher::Consider(const std::vector<double>& eta) {
-  const Gain g = Value(g_.metric, g_.metric.Project(GatherColumns(c_, e_, eta)));
+  const Gain g = Try(eta);
   if (g.gain > best_.gain.gain) best_.gain = g, best_.eta = eta;
   return g.gain;
 }
 
-double Searcher::ConsiderThinned(const std::vector<double>& eta) const {
-  return Value(g_.thin_metric, g_.thin_metric.Project(g_.thinned.Gather(c_, eta))).gain;
-}
-
-Gain Searcher::Value(const Metric& metric, const Projection& projection) const {
-  Gain g = metric.Try(projection);
+Gain Searcher::Value(const Projection& projection) const {
+  Gain g = metric().Try(projection);
   if (g.amplitude.size() == 1 && c_.column(0).fixed_amplitude) HoldAmplitude(g);
   const bool rival = !c_.record().replaces.empty();
-  if (!AmplitudesInBounds(g) || (rival && !metric.InBounds(g, c_.rows()))) g.gain = 0;
+  if (!AmplitudesInBounds(g) || (rival && !metric().InBounds(g, c_.rows()))) g.gain = 0;
+  if (best_.rough) g.gain /= g_.thinned.share();
   return g;
 }
 
@@ -99,7 +112,7 @@ bool Searcher::AmplitudesInBounds(const Gain& gain) const {
 
 double Searcher::Needed(int rank) const {
   Found f = best_;
-  f.penalty = PenaltyOf(rank + searched_, c_, e_);
+  f.penalty = PenaltyOf(rank + best_.searched, c_, e_);
   return -Score(f, 0);
 }
 
@@ -142,12 +155,43 @@ void Searcher::RefineBest(double step, int rounds) {
   Refine(best_.eta, step, rounds, [this](const auto& eta) { return Consider(eta); });
 }
 
-// A coarse grid on the thinned rows; its best points, one of them refined there, are tried on all rows.
+std::vector<double> Searcher::Climb(std::vector<double> eta) const {
+  const int count = static_cast<int>(eta.size());
+  const auto moved = [&](int k, double by) {
+    std::vector<double> next = eta;
+    next[k] = FromUnit(k, std::clamp(ToUnit(k, eta[k]) + std::clamp(by, -kLongest, kLongest), 0.0, 1.0));
+    return next;
+  };
+  Gain here = Try(eta);
+  for (int climb = 0, better = 1; better && here.amplitude.size() && climb < kClimbs; ++climb) {
+    Columns all = Gather(eta);
+    const int own = all.count();
+    for (MatrixXd& block : all.block) block.conservativeResize(Eigen::NoChange, own + count);
+    for (int k = 0; k < count; ++k) {
+      const std::vector<double> up = moved(k, kSlopeStep), down = moved(k, -kSlopeStep);
+      const Columns above = Gather(up), below = Gather(down);
+      const double apart = ToUnit(k, up[k]) - ToUnit(k, down[k]);
+      for (std::size_t r = 0; r < all.block.size(); ++r)
+        all.block[r].col(own + k) = (above.block[r] - below.block[r]) * here.amplitude / apart;
+    }
+    const VectorXd to = metric().Try(all).amplitude.tail(count);
+    better = 0;
+    for (double share = 1; share > 0.01 && !better; share /= 4) {
+      std::vector<double> next = eta;
+      for (int k = 0; k < count; ++k) next[k] = moved(k, share * to[k])[k];
+      const Gain there = Try(next);
+      if (there.gain > here.gain + kWorthAStep) eta = next, here = there, better = 1;
+    }
+  }
+  return eta;
+}
+
+// A coarse grid; its best two points climb.
 void Searcher::Profile() {
   const int count = static_cast<int>(c_.unknowns().size());
   std::vector<int> points(count, 4);
   points[0] = c_.record().search.grid;
-  searched_ = count;
+  best_.searched = count;
   best_.tried = 1;
   for (const int p : points) best_.tried *= p;
   std::vector<std::pair<double, std::vector<double>>> tried;
@@ -158,7 +202,7 @@ void Searcher::Profile() {
       if (c_.unknowns()[own].key == simpler_->candidate->unknowns()[k].key)
         eta[own] = std::clamp(simpler_->eta[k], FromUnit(own, 0), FromUnit(own, 1)), known[own] = 1;
   const std::function<void(int)> visit = [&](int k) {
-    if (k == count) return void(tried.emplace_back(ConsiderThinned(eta), eta));
+    if (k == count) return void(tried.emplace_back(Try(eta).gain, eta));
     if (known[k]) return visit(k + 1);
     for (int i = 0; i < points[k]; ++i) {
       eta[k] = FromUnit(k, points[k] > 1 ? static_cast<double>(i) / (points[k] - 1) : 0.5);
@@ -167,12 +211,12 @@ void Searcher::Profile() {
   };
   visit(0);
   std::sort(tried.rbegin(), tried.rend());
-  const double step = 0.5 / (points[0] - 1);
+  const auto gain = [this](const auto& e) { return Try(e).gain; };
   // A delay gains nothing a little off the right place, far below a step of the grid: it must be looked for closer.
-  const int rounds = c_.delay() >= 0 ? 7 : 2;
-  Consider(Refine(tried[0].second, step, rounds, [this](const auto& e) { return ConsiderThinned(e); }));
-  for (std::size_t k = 0; k < 2 && k < tried.size(); ++k) Consider(tried[k].second);
-  if (Promising()) RefineBest(step, 5);
+  Consider(Refine(tried[0].second, GridStep(), c_.delay() >= 0 ? 7 : 2, gain));
+  if (!Promising()) return;
+  Consider(Climb(best_.eta));
+  if (tried.size() > 1) Consider(Climb(tried[1].second));
 }
 
 bool IsExcited(const Candidate& candidate, const Evidence& evidence) {
@@ -211,6 +255,10 @@ double Score(const Found& found, double gain) {
 
 Found SearchCandidate(Candidate& candidate, const Ground& ground, const Found* simpler) {
   return Searcher(candidate, ground, simpler).Run();
+}
+
+Found Finish(const Found& rough, const Ground& ground) {
+  return Searcher(*rough.candidate, ground, nullptr).Finish(rough);
 }
 
 }  // namespace armcal::diagnosis

@@ -43,7 +43,7 @@ std::pair<int, int> WidestGain(const VectorXd& product, const VectorXd& square) 
 void Searcher::Spectral() {
   const VectorXd signal = OwnSignal(c_, e_, c_.record().search.signal);
   const double lo = signal.minCoeff(), range = signal.maxCoeff() - lo;
-  searched_ = 1;
+  best_.searched = 1;
   if (range <= 0) return;
   const auto& k = c_.unknowns()[0];
   const Columns at_zero = GatherColumns(c_, e_, {1e-9});
@@ -95,24 +95,31 @@ void Searcher::Spline() {
   if (signal.size() == 0 || signal.maxCoeff() - signal.minCoeff() <= 0) return;
   if (name == "t" && e_.logs.size() != 1) return;  // each run has a time of its own
   const double lo = signal.minCoeff(), range = signal.maxCoeff() - lo;
-  if (c_.is_curve() && ConsiderThinned({lo, lo + range}) < kKnots + 1) return;  // as chance gives
-  Consider({lo, lo + range});
-  if (name == "t") return;  // a run state wanders all the time
-  const Found whole = Scored();
+  const std::vector<double> over_all{lo, lo + range};
+  const double chance = kKnots * (1 + 1 / g_.thinned.share());  // and a little more
+  if (name == "t") {                                            // a run state wanders all the time
+    if (Try(over_all).gain > chance) Consider(over_all);
+    return;
+  }
   // What the splines sum up to is what multiplies them.
-  const Columns at_whole = GatherColumns(c_, e_, {lo, lo + range});
-  const VectorXd weight = at_whole.block[0].rowwise().sum(), residual = g_.metric.RawResidual(at_whole.joints[0]);
+  const Columns at_all = Gather(over_all);
+  const int row = at_all.joints[0];
+  const VectorXd weight = at_all.block[0].rowwise().sum(), residual = metric().RawResidual(row);
   VectorXd product = VectorXd::Zero(kCells), square = product;
-  for (int i = 0; i < signal.size(); ++i) {
-    const int cell = std::min(kCells - 1, static_cast<int>((signal[i] - lo) / range * kCells));
+  for (int i = 0; i < weight.size(); ++i) {
+    const double at = signal[g_.thinned.kept[row][i]];
+    const int cell = std::min(kCells - 1, static_cast<int>((at - lo) / range * kCells));
     product[cell] += weight[i] * residual[i], square[cell] += weight[i] * weight[i];
   }
   const auto [first, last] = WidestGain(product, square);
+  if (Consider(over_all) < chance && last - first == kCells) return void(best_.gain = Gain{});
+  const Found all = Scored();
   if (last - first == kCells) return;
-  searched_ = 2;
+  best_.searched = 2;
   best_.tried = 4 * kCells / kNarrowest;
+  best_.gain = Gain{};
   Consider({lo + range * first / kCells, lo + range * last / kCells});
-  if (Scored().score < whole.score) best_ = whole, searched_ = 0;
+  if (Scored().score < all.score) best_ = all;
 }
 
 }  // namespace armcal::diagnosis

@@ -49,14 +49,14 @@ void Searcher::Onset() {
   if (e_.logs.size() != 1 || end - begin < 2 * minimum) return;  // times of several logs have no common origin
   for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
   constexpr int kGrid = 12;
-  searched_ = 2;
+  best_.searched = 2;
   best_.tried = kGrid * kGrid / 2;
   // Each cell of time once; a window is the sum of its cells.
   std::vector<double> edge{begin - 1};
   for (int k = 1; k < kGrid; ++k) edge.push_back(begin + (end - begin) * k / kGrid);
   edge.push_back(end + 1);
   std::vector<Projection> cell;
-  for (int k = 0; k < kGrid; ++k) cell.push_back(g_.thin_metric.Project(g_.thinned.Gather(c_, {edge[k], edge[k + 1]})));
+  for (int k = 0; k < kGrid; ++k) cell.push_back(metric().Project(Gather({edge[k], edge[k + 1]})));
   double most = 0;
   std::vector<double> window;
   for (int i = 0; i < kGrid; ++i) {
@@ -64,15 +64,12 @@ void Searcher::Onset() {
     for (int k = i; k < kGrid; ++k) {
       if (k > i) sum += cell[k];
       if (edge[k + 1] - edge[i] < minimum || k - i + 1 == kGrid) continue;  // on all the time is no step
-      const double value = Value(g_.thin_metric, sum).gain;
+      const double value = Value(sum).gain;
       if (value > most) most = value, window = {edge[i], edge[k + 1]};
     }
   }
   if (most > 0) Consider(window);
-  if (Promising()) {
-    Consider(Refine(window, 0.5 / kGrid, 5, [this](const auto& eta) { return ConsiderThinned(eta); }));
-    RefineBest(0.5 / kGrid / 32, 2);
-  }
+  if (Promising()) RefineBest(0.5 / kGrid, 5);
   if (best_.eta[1] - best_.eta[0] < minimum) best_.gain = Gain{};
 }
 
@@ -105,7 +102,7 @@ void Searcher::Windows() {
     Found one = best_;
     one.penalty = PenaltyOf(3, c_, e_), one.tried = tried;
     if (best.gain < -Score(one, 0) * noise * noise) break;
-    searched_ = 2 * windows;
+    best_.searched = 2 * windows;
     best_.tried = std::pow(tried, windows);
     const auto with = [&](const std::vector<double>& last) {
       if (last[1] - last[0] < c_.record().search.minimum_s) return 0.0;

@@ -11,14 +11,21 @@ class Searcher {
  public:
   Searcher(Candidate& candidate, const Ground& ground, const Found* simpler);
   Found Run();
+  Found Finish(const Found& rough);
 
  private:
+  // On the thinned rows while the search is rough.
+  const Metric& metric() const { return best_.rough ? g_.thin_metric : g_.metric; }
+  Columns Gather(const std::vector<double>& eta) const {
+    return best_.rough ? g_.thinned.Gather(c_, eta) : GatherColumns(c_, e_, eta);
+  }
+  // Of all rows, also where the search is rough.
+  Gain Try(const std::vector<double>& eta) const { return Value(metric().Project(Gather(eta))); }
   // Keeps the point if it is the best so far; its gain.
   double Consider(const std::vector<double>& eta);
-  double ConsiderThinned(const std::vector<double>& eta) const;
   // Amplitudes held, or out of bounds, are counted. A law that could take the declared one's place may stand beside it,
   // as two frictions in one joint do, but not against it.
-  Gain Value(const Metric& metric, const Projection& projection) const;
+  Gain Value(const Projection& projection) const;
   // What the column gains at its record's own amplitude: the parabola about the best one.
   void HoldAmplitude(Gain& g) const;
   bool AmplitudesInBounds(const Gain& gain) const;
@@ -26,8 +33,8 @@ class Searcher {
   Found Scored() const;
   // The gain that a score of zero takes.
   double Needed(int rank) const;
-  // Half of that: what a refinement may still bring.
-  bool Promising() const { return best_.gain.gain > 0.5 * Needed(best_.gain.rank); }
+  // A refinement may still bring what is missing of that.
+  bool Promising() const { return best_.gain.gain > (best_.rough ? 0.3 : 0.5) * Needed(best_.gain.rank); }
 
   double FromUnit(int k, double u) const;
   double ToUnit(int k, double v) const;
@@ -35,6 +42,9 @@ class Searcher {
   // Pattern search in unit coordinates from eta: steps while that helps, then halves them. Returns where it ends.
   std::vector<double> Refine(std::vector<double> eta, double step, int rounds, const Evaluator& evaluate) const;
   void RefineBest(double step, int rounds);
+  // Gauss-Newton, unknowns in unit coordinates: a pattern search would creep along a valley.
+  std::vector<double> Climb(std::vector<double> eta) const;
+  double GridStep() const { return 0.5 / (c_.record().search.grid - 1); }
 
   void Profile();   // search.cpp
   void Spectral();  // search_signal.cpp
@@ -47,7 +57,6 @@ class Searcher {
   const Ground& g_;
   const Evidence& e_;
   Found best_;
-  int searched_ = 0;
 };
 
 // A signal of the candidate's joint j ("q", "abs(qd)") or of its other one ("q[k]") in the rows of joint j.

@@ -65,7 +65,7 @@ bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chose
 
 bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
   const Grounds grounds(w_, others);
-  Found f = SearchCandidate(*term.candidate, grounds.ground());
+  Found f = Finish(SearchCandidate(*term.candidate, grounds.ground()), grounds.ground());
   if (f.gain.gain <= 0) return false;
   Rescore(grounds, f);
   term.eta = f.eta;
@@ -93,6 +93,8 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
     return f.candidate->is_curve() && ++curves[f.candidate->rows()] > kCurvesOfAJoint;
   });
   if (ranked.size() > kRescored) ranked.resize(kRescored);
+  for (Found& f : ranked) f = Finish(f, grounds.ground());
+  std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
   return ranked;
 }
 
@@ -142,6 +144,7 @@ bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Cho
   if (!w_.narrow) return true;
   Diagnosis::Work& narrow = *w_.narrow;
   narrow.estimate = w_.estimate;
+  narrow.FollowEstimate();
   narrow.Prepare(terms);
   return Metric(narrow.rows, noise).Try(GatherColumns(*f.candidate, narrow.evidence, f.eta)).gain > kStays * gain;
 }

@@ -25,16 +25,19 @@ std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Ch
   return out;
 }
 
-Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque& arm, const calibration::Dataset& data,
-                          const VectorXd& x, const std::vector<double>& eta, bool flange) {
+Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, bool flange) {
   Quantities out;
   out.data = &data;
-  const int n = model.joints(), samples = data.samples();
-  out.parts = arm.Evaluate(data.s, {x.data() + model.front(), static_cast<std::size_t>(model.rigid())});
-  out.tau_model = calibration::Predict(model, data, x, eta);
-  out.dt = codegen::SampleSteps(data.s.t, samples, 0, out.restart);
-  if (flange) model.BodyColumns(data.s, n - 1, out.flange);
+  out.dt = codegen::SampleSteps(data.s.t, data.samples(), 0, out.restart);
+  if (flange) model.BodyColumns(data.s, model.joints() - 1, out.flange);
   return out;
+}
+
+void Follow(const codegen::Model& model, const codegen::ArmTorque& arm, const VectorXd& x,
+            const std::vector<double>& eta, Quantities& quantities) {
+  const calibration::Dataset& data = *quantities.data;
+  quantities.parts = arm.Evaluate(data.s, {x.data() + model.front(), static_cast<std::size_t>(model.rigid())});
+  quantities.tau_model = calibration::Predict(model, data, x, eta);
 }
 
 MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities, const std::vector<double>& eta,
@@ -96,6 +99,7 @@ void Diagnosis::Work::SetDelay(double by_s) {
   for (const auto* d : logged) delayed.push_back(calibration::Delayed(*d, by_s));
   for (std::size_t k = 0; k < train.size(); ++k) train[k] = &delayed[k];
   regressor.clear();
+  evidence.logs.clear();
   IndexRows();
   if (narrow) narrow->SetDelay(by_s);
 }

@@ -41,7 +41,7 @@ struct Diagnosis::Work {
   };
   std::vector<Deviation> Deviations(const std::vector<const Chosen*>& terms);
 
-  // Refreshes model torque and base rows at the estimate, the given terms' columns included.
+  // Refreshes base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
   Eigen::VectorXd SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j);
   std::vector<NoiseModel> WhiteNoise() const;
@@ -49,7 +49,11 @@ struct Diagnosis::Work {
   void AlignLogs();
   void SetDelay(double by_s);
   void IndexRows();
-  void FillDeclared();
+  void FollowEstimate();
+  void StartRows();
+  void FillDeclared(int j);
+  bool FillGain(int j);
+  void Bend(int j, const Eigen::VectorXd& slope);
   void MakeCoordinates(int size);
 
   const codegen::Model& model;
@@ -66,14 +70,18 @@ struct Diagnosis::Work {
   Estimate estimate;
   std::vector<Chosen> chosen;
   std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept where it does not hang on the estimate
+  std::vector<char> bent;                               // [joint] 1: its declared rows must be filled anew
+  Eigen::VectorXd followed;                             // the estimate that the evidence is at
   std::vector<std::string> standby;                     // records compiled in, not yet estimated
   bool needs_flange = false;
   std::unique_ptr<Work> narrow;  // the same logs at a lower bandwidth, without candidates of its own
 };
 
-// Model torque, its parts and body columns of one dataset at x.
-Quantities MakeQuantities(const codegen::Model& model, const codegen::ArmTorque& arm, const calibration::Dataset& data,
-                          const Eigen::VectorXd& x, const std::vector<double>& eta, bool flange);
+// What no estimate changes: steps, and the last body's columns if they are asked for.
+Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, bool flange);
+// Model torque and its parts at x.
+void Follow(const codegen::Model& model, const codegen::ArmTorque& arm, const Eigen::VectorXd& x,
+            const std::vector<double>& eta, Quantities& quantities);
 
 // Torque of a candidate with given parameters on a dataset, N x n.
 Eigen::MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities,

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <utility>
 
 #include "tests/judged/effects.hpp"
 #include "tests/judged/noise.hpp"
@@ -35,26 +36,39 @@ struct Case {
   std::vector<double> size;  // visible RMS over the torque noise, of each effect on its joint
 };
 
-// RMS of what the declared model leaves of a torque, per joint, over the noise.
-VectorXd Visible(const Arm& arm, const Motion& train, const MatrixXd& torque, const VectorXd& sigma, Random& random) {
-  const Motion thin = Every(train, kThin);
-  const auto rows = DeclaredRows(arm, thin, random);
-  const int n = arm.joints(), samples = thin.samples();
-  MatrixXd A(samples * n, rows[0].cols());
-  VectorXd b(samples * n);
-  for (int j = 0; j < n; ++j) {
-    A.middleRows(j * samples, samples) = rows[static_cast<std::size_t>(j)] / sigma[j];
-    for (int k = 0; k < samples; ++k) b[j * samples + k] = torque(kThin * k, j) / sigma[j];
+// What the declared model leaves of a torque, as every tenth sample shows it.
+class Declared {
+ public:
+  Declared(const Arm& arm, const Motion& train, const VectorXd& sigma, Random& random) : sigma_(sigma) {
+    const Motion thin = Every(train, kThin);
+    const auto rows = DeclaredRows(arm, thin, random);
+    samples_ = thin.samples();
+    MatrixXd A(samples_ * arm.joints(), rows[0].cols());
+    for (int j = 0; j < arm.joints(); ++j)
+      A.middleRows(j * samples_, samples_) = rows[static_cast<std::size_t>(j)] / sigma[j];
+    const VectorXd scale = A.colwise().norm().cwiseMax(1e-12);
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(A * scale.cwiseInverse().asDiagonal());
+    const auto rank = (qr.matrixR().diagonal().cwiseAbs().array() > 1e-9 * qr.maxPivot()).count();
+    basis_ = qr.householderQ() * MatrixXd::Identity(A.rows(), rank);
   }
-  const VectorXd scale = A.colwise().norm().cwiseMax(1e-12);
-  A = A * scale.cwiseInverse().asDiagonal();
-  Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
-  qr.setThreshold(1e-9);
-  const VectorXd rest = b - A * qr.solve(b);
-  VectorXd out(n);
-  for (int j = 0; j < n; ++j) out[j] = std::sqrt(rest.segment(j * samples, samples).squaredNorm() / samples);
-  return out;
-}
+
+  // Its RMS per joint, over the noise.
+  VectorXd Visible(const MatrixXd& torque) const {
+    VectorXd rest(basis_.rows());
+    for (Eigen::Index j = 0; j < sigma_.size(); ++j)
+      for (int k = 0; k < samples_; ++k) rest[j * samples_ + k] = torque(kThin * k, j) / sigma_[j];
+    rest -= basis_ * (basis_.transpose() * rest).eval();
+    VectorXd out(sigma_.size());
+    for (Eigen::Index j = 0; j < sigma_.size(); ++j)
+      out[j] = std::sqrt(rest.segment(j * samples_, samples_).squaredNorm() / samples_);
+    return out;
+  }
+
+ private:
+  VectorXd sigma_;
+  int samples_;
+  MatrixXd basis_;
+};
 
 MatrixXd DeclaredTorque(const Arm& arm, const Motion& m, const MatrixXd& links) {
   MatrixXd tau = links;
@@ -144,9 +158,9 @@ Motion DrawTest(const Arm& arm, const Motion& train, Random& random) {
 // False, and nothing is written, if an effect stays below the smallest size at its largest strength.
 bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& random) {
   const Motion train = DrawMotion(arm, kTrain_s, kRate_Hz, random);
-  const Motion motion[] = {train, DrawTest(arm, train, random)};
   const VectorXd sigma = arm.sigma_Nm * (c.noise_class == "quiet" ? 0.1 : 1.0);
-  const MatrixXd links[] = {LinkTorque(arm, motion[0]), LinkTorque(arm, motion[1])};
+  const MatrixXd train_links = LinkTorque(arm, train);
+  const Declared declared(arm, train, sigma, random);
   json effects = json::array();
   bool temperature = random.Uniform(0, 1) < 0.3;
   std::vector<double> gain;
@@ -156,9 +170,14 @@ bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
     const bool one_joint = !effect.joint.is_string();
     VectorXd seen;
     const auto size = [&] {
-      seen = Visible(arm, motion[0], effect.torque(motion[0], links[0]), sigma, random);
+      seen = declared.Visible(effect.torque(train, train_links));
       return one_joint ? seen[effect.seen_on] : seen.maxCoeff();
     };
+    if (effect.strength) {
+      const double first = std::exchange(*effect.strength, effect.most);
+      if (size() < 0.95 * kSmallest) return false;
+      *effect.strength = first;
+    }
     double found = size(), low = 0, high = effect.most;
     for (int k = 0; effect.strength && k < kStrengths && std::abs(found / c.size[e] - 1) > kSizeError; ++k) {
       double& strength = *effect.strength;
@@ -183,6 +202,8 @@ bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
                        {"size", gain.back() * found},
                        {"visible_ratio", std::vector<double>(ratio.begin(), ratio.end())}});
   }
+  const Motion motion[] = {train, DrawTest(arm, train, random)};
+  const MatrixXd links[] = {train_links, LinkTorque(arm, motion[1])};
   const fs::path home = folder / c.name;
   fs::create_directories(home);
   fs::create_directories(folder / "robots");

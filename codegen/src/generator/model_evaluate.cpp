@@ -31,7 +31,7 @@ Model::Bound Model::Bind(const Signals& s, std::span<const double> committed, st
   std::vector<char> restart;
   if (states > 0) {
     bound.dt = SampleSteps(s.t, s.samples(), robot_.sample_ticks / robot_.tick_rate_Hz, restart);
-    value["dt"].column = bound.dt.data();
+    value["dt"] = BindSteps(bound.dt);
   }
   const auto in_order = [&] {
     bound.input.clear();

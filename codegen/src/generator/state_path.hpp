@@ -14,8 +14,12 @@ namespace armcal::codegen {
 std::vector<Expr> InitialValues(const Graph& graph, std::size_t count);
 
 // Time since the sample before; where it is no ordinary step (over 1.5 times the median), a new stretch begins and the
-// median stands in. usual: the step of a log without times. restart: one a sample.
+// median stands in, as it does for steps that differ from it by rounding. usual: the step of a log without times.
+// restart: one a sample.
 Eigen::VectorXd SampleSteps(const Eigen::VectorXd& t, int samples, double usual, std::vector<char>& restart);
+
+// The steps as an input: one value if all are equal.
+Binding BindSteps(const Eigen::VectorXd& dt);
 
 // The first `count` states over a log: [samples x count], the value that each sample starts from (what the graph's
 // state inputs stand for). bindings: one per graph input; those of the states are not read. restart[k] != 0: sample k

@@ -16,27 +16,39 @@ namespace {
 
 constexpr int kBlock = Tape::kBlock;
 
-// z = a op b over one block. Lanes differ.
-WIDEST_VECTORS void Apply(Op op, const double* __restrict a, const double* __restrict b, double* __restrict z) {
+template <Op op>
+inline __attribute__((always_inline)) void ApplyTo(const double* __restrict a, const double* __restrict b,
+                                                   double* __restrict z) {
+  for (int i = 0; i < kBlock; ++i) z[i] = ApplyOp<double>(op, a[i], b[i]);
+}
+
+// z = a op b over one block. Lanes differ. One loop an operation: the compiler vectorises those that it can.
+WIDEST_VECTORS void Apply(Op op, const double* a, const double* b, double* z) {
   switch (op) {
     case Op::kNegate:
-      for (int i = 0; i < kBlock; ++i) z[i] = -a[i];
-      break;
+      return ApplyTo<Op::kNegate>(a, b, z);
     case Op::kAdd:
-      for (int i = 0; i < kBlock; ++i) z[i] = a[i] + b[i];
-      break;
+      return ApplyTo<Op::kAdd>(a, b, z);
     case Op::kSubtract:
-      for (int i = 0; i < kBlock; ++i) z[i] = a[i] - b[i];
-      break;
+      return ApplyTo<Op::kSubtract>(a, b, z);
     case Op::kMultiply:
-      for (int i = 0; i < kBlock; ++i) z[i] = a[i] * b[i];
-      break;
+      return ApplyTo<Op::kMultiply>(a, b, z);
+    case Op::kDivide:
+      return ApplyTo<Op::kDivide>(a, b, z);
+    case Op::kSqrt:
+      return ApplyTo<Op::kSqrt>(a, b, z);
+    case Op::kAbs:
+      return ApplyTo<Op::kAbs>(a, b, z);
+    case Op::kSign:
+      return ApplyTo<Op::kSign>(a, b, z);
+    case Op::kMin:
+      return ApplyTo<Op::kMin>(a, b, z);
+    case Op::kMax:
+      return ApplyTo<Op::kMax>(a, b, z);
     default:
       for (int i = 0; i < kBlock; ++i) z[i] = ApplyOp<double>(op, a[i], b[i]);
   }
 }
-
-bool IsGiven(const Node& n) { return n.op == Op::kConstant || n.op == Op::kInput; }
 
 }  // namespace
 
@@ -59,52 +71,62 @@ Tape::Tape(const Graph& graph, std::vector<Expr> roots) {
     step_.push_back(s);
   }
   for (const Expr& r : roots) root_.push_back(position[r.id()]);
-  AssignLanes();
 }
 
-void Tape::AssignLanes() {
+Tape::Plan Tape::MakePlan(std::span<const Binding> bindings) const {
   const int steps = static_cast<int>(step_.size());
-  lane_.assign(steps, -1);
+  Plan plan{std::vector<char>(steps), std::vector<int>(steps), 0};
   std::vector<int> last(steps, -1);  // the step that reads it last
   for (int k = 0; k < steps; ++k) {
     const Node& s = step_[k];
-    if (IsGiven(s)) {
-      lane_[k] = lanes_++;  // filled before the first step: its lane is its own
-      last[k] = steps;
-      continue;
+    if (s.op == Op::kConstant || s.op == Op::kInput) {
+      plan.fixed[k] = s.op == Op::kConstant || !bindings[s.a].column;
+    } else {
+      plan.fixed[k] = plan.fixed[s.a] && (s.b < 0 || plan.fixed[s.b]);
+      last[s.a] = k;
+      if (s.b >= 0) last[s.b] = k;
     }
-    last[s.a] = std::max(last[s.a], k);
-    if (s.b >= 0) last[s.b] = std::max(last[s.b], k);
+    if (!HasOwnLane(plan, k)) continue;
+    plan.lane[k] = plan.lanes++;
+    last[k] = steps;
   }
   for (const int r : root_) last[r] = steps;
   std::vector<int> free;
+  const auto release = [&](int operand, int k) {
+    if (last[operand] == k && !HasOwnLane(plan, operand)) free.push_back(plan.lane[operand]);
+  };
   for (int k = 0; k < steps; ++k) {
+    if (HasOwnLane(plan, k)) continue;
     const Node& s = step_[k];
-    if (IsGiven(s)) continue;
-    if (free.empty()) free.push_back(lanes_++);
-    lane_[k] = free.back();
+    if (free.empty()) free.push_back(plan.lanes++);
+    plan.lane[k] = free.back();
     free.pop_back();
-    if (last[s.a] == k) free.push_back(lane_[s.a]);
-    if (s.b >= 0 && s.b != s.a && last[s.b] == k) free.push_back(lane_[s.b]);
+    release(s.a, k);
+    if (s.b >= 0 && s.b != s.a) release(s.b, k);
   }
+  return plan;
 }
 
 void Tape::ForEachBlock(std::span<const Binding> bindings, int samples, const Visit& visit) const {
-  std::vector<double> value(static_cast<std::size_t>(lanes_) * kBlock);
-  const auto lane = [&](int step) { return value.data() + static_cast<std::size_t>(lane_[step]) * kBlock; };
-  for (std::size_t k = 0; k < step_.size(); ++k)  // what does not change from block to block
-    if (step_[k].op == Op::kConstant) std::fill_n(lane(k), kBlock, step_[k].value);
-    else if (step_[k].op == Op::kInput && !bindings[step_[k].a].column)
-      std::fill_n(lane(k), kBlock, bindings[step_[k].a].value);
+  const Plan plan = MakePlan(bindings);
+  std::vector<double> value(static_cast<std::size_t>(plan.lanes) * kBlock);
+  const auto lane = [&](int step) { return value.data() + static_cast<std::size_t>(plan.lane[step]) * kBlock; };
+  std::vector<int> varying;
+  for (std::size_t k = 0; k < step_.size(); ++k) {
+    const Node& s = step_[k];
+    if (!plan.fixed[k]) varying.push_back(static_cast<int>(k));
+    else if (s.op == Op::kConstant) std::fill_n(lane(k), kBlock, s.value);
+    else if (s.op == Op::kInput) std::fill_n(lane(k), kBlock, bindings[s.a].value);
+    else std::fill_n(lane(k), kBlock, ApplyOp<double>(s.op, *lane(s.a), s.b < 0 ? 0 : *lane(s.b)));
+  }
   std::vector<const double*> root;
   for (const int r : root_) root.push_back(lane(r));
   for (int begin = 0; begin < samples; begin += kBlock) {
     const int count = std::min(kBlock, samples - begin);
-    for (std::size_t k = 0; k < step_.size(); ++k) {
+    for (const int k : varying) {
       const Node& s = step_[k];
-      if (s.op == Op::kConstant) continue;
-      if (s.op != Op::kInput) Apply(s.op, lane(s.a), s.b < 0 ? lane(s.a) : lane(s.b), lane(k));
-      else if (const double* column = bindings[s.a].column) std::copy_n(column + begin, count, lane(k));
+      if (s.op == Op::kInput) std::copy_n(bindings[s.a].column + begin, count, lane(k));
+      else Apply(s.op, lane(s.a), s.b < 0 ? lane(s.a) : lane(s.b), lane(k));
     }
     visit(begin, count, root);
   }

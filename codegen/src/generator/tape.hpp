@@ -49,12 +49,19 @@ class Tape {
   }
 
  private:
-  void AssignLanes();
+  // How one evaluation goes about it. A block of each step's values lies in a lane; lanes of values that nobody needs
+  // any more are used again, so that a six-axis model's block stays in the nearest caches.
+  struct Plan {
+    std::vector<char> fixed;  // the same for all samples: computed once
+    std::vector<int> lane;
+    int lanes = 0;
+  };
+  Plan MakePlan(std::span<const Binding> bindings) const;
+  // Filled before the first step, or from a log.
+  bool HasOwnLane(const Plan& plan, int step) const { return plan.fixed[step] || step_[step].op == Op::kInput; }
 
   std::vector<Node> step_;  // operands renumbered to steps
   std::vector<int> root_;
-  std::vector<int> lane_;  // where each step's block lies: lanes of values that nobody needs any more are used again,
-  int lanes_ = 0;          // so that a six-axis model's block stays in the nearest caches
 };
 
 }  // namespace armcal::codegen

@@ -99,14 +99,16 @@ TEST(Expression, Sign_IsThePlainOne_AndSgnTheCallers) {
 }
 
 // A graph run over a log: values of one expression.
-std::vector<double> RunOver(const std::string& text, const std::vector<double>& x, double p, double dt) {
+std::vector<double> RunOver(const std::string& text, const std::vector<double>& x, double p, double dt,
+                            int restart_at = 0) {
   Graph g;
   g.Input("x"), g.Input("p"), g.Input("dt");
   const Expr e = Parse(g, text);
   const int samples = static_cast<int>(x.size());
   std::vector<Binding> bindings(g.inputs().size());
   bindings[0].column = x.data(), bindings[1].value = p, bindings[2].value = dt;
-  const std::vector<char> restart(x.size(), 0);
+  std::vector<char> restart(x.size(), 0);
+  restart[static_cast<std::size_t>(restart_at)] = 1;
   const auto path = codegen::StatePath(g, g.states().size(), bindings, samples, restart);
   for (std::size_t s = 0; s < g.states().size(); ++s)
     bindings[g.nodes()[g.states()[s].value.id()].a].column = path.col(static_cast<Eigen::Index>(s)).data();
@@ -124,6 +126,31 @@ TEST(Memory, Previous_IsTheSampleBefore_AtTheFirstItself) {
   for (std::size_t k = 1; k < y.size(); ++k) EXPECT_EQ(y[k], kSignal[k - 1]);
   const auto twice = RunOver("previous(previous(x)*p)", kSignal, 2, 0.01);
   for (std::size_t k = 2; k < y.size(); ++k) EXPECT_EQ(twice[k], 2 * kSignal[k - 2]);
+}
+
+TEST(Memory, LongRun_IsTheRecursionByHand_AndStartsAnewWhereItIsBroken) {
+  std::vector<double> x(203);
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = std::sin(0.3 * static_cast<double>(k));
+  const auto y = RunOver("lowpass(x, p) + x*previous(x)", x, 0.02, 0.01, 150);
+  double slow = x[0];
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const bool starts = k == 0 || k == 150;
+    slow = starts ? x[k] : slow;
+    slow = x[k] + (slow - x[k]) * std::exp2(-0.01 / 0.02);
+    EXPECT_NEAR(y[k], slow + x[k] * x[starts ? k : k - 1], 1e-12) << k;
+  }
+}
+
+TEST(Memory, StepsThatOnlyRoundingTellsApart_AreOneStep) {
+  Eigen::VectorXd t(300);
+  for (int k = 0; k < 300; ++k) t[k] = std::round(k / 0.0003) * 1e-6 + (k < 200 ? 0 : 0.5);  // 300 Hz in microseconds
+  std::vector<char> restart;
+  const Eigen::VectorXd dt = codegen::SampleSteps(t, 300, 0, restart);
+  EXPECT_NEAR(codegen::BindSteps(dt).value, 1 / 300.0, 1e-6);
+  EXPECT_EQ(codegen::BindSteps(dt).column, nullptr);
+  for (int k = 0; k < 300; ++k) EXPECT_EQ(restart[k], k == 200) << k;
+  t[100] += 1e-4;
+  EXPECT_EQ(codegen::BindSteps(codegen::SampleSteps(t, 300, 0, restart)).column != nullptr, true);
 }
 
 // RC circuit: y = x + (y0 - x) 2^(-dt / half-life).

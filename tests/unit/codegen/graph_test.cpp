@@ -83,16 +83,17 @@ TEST(Tape, BlockEvaluation_EqualsPointEvaluation) {
   Graph g;
   const Expr a = g.Input("a"), b = g.Input("b");
   const Expr e = g.Unary(Op::kExp, a * b) + g.Unary(Op::kAbs, a - b) * (0.5 * b);
-  const codegen::Tape tape(g, {e, a});
+  const codegen::Tape tape(g, {e, a, g.Unary(Op::kExp, b) * b});
   const int samples = 203;  // no multiple of the block
-  std::vector<double> x(samples), out(samples), copy(samples);
+  std::vector<double> x(samples), out(samples), copy(samples), same(samples);
   for (int i = 0; i < samples; ++i) x[i] = 0.01 * i - 1;
   const std::vector<codegen::Binding> bindings{{x.data(), 0}, {nullptr, 0.75}};
-  std::vector<double*> targets{out.data(), copy.data()};
+  std::vector<double*> targets{out.data(), copy.data(), same.data()};
   tape.Evaluate(bindings, samples, targets);
   for (int i = 0; i < samples; ++i) {
     EXPECT_DOUBLE_EQ(out[i], std::exp(x[i] * 0.75) + std::abs(x[i] - 0.75) * 0.5 * 0.75);
     EXPECT_EQ(copy[i], x[i]);
+    EXPECT_DOUBLE_EQ(same[i], std::exp(0.75) * 0.75);  // hangs on no sample
   }
 }
 

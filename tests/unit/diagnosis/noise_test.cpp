@@ -131,6 +131,7 @@ TEST(Metric, GainOfColumns_IsTheDropOfChiSquareInARefit) {
   c.block = {MatrixXd::Random(400, 2), MatrixXd::Random(400, 2)};
   rows.target[1] += c.block[0] * Eigen::Vector2d(0.3, -0.1);
   rows.target[2] += c.block[1] * Eigen::Vector2d(0.3, -0.1);
+  for (int j = 0; j < 3; ++j) rows.Multiply(j);
   const Metric metric(rows, noise);
   const Gain gain = metric.Try(c);
   Columns none;
@@ -154,6 +155,7 @@ TEST(Metric, AColumnOfTheBase_HasNoDirectionOfItsOwn) {
   rows.columns = {{0, 1, 2}};
   rows.design = {MatrixXd::Random(400, 3)};
   rows.target = {VectorXd::Random(400)};
+  rows.Multiply(0);
   Columns c;
   c.joints = {0};
   c.block = {rows.design[0].col(1) - 2 * rows.design[0].col(2)};

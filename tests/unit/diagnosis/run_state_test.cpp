@@ -23,7 +23,9 @@ struct ShortRun {
       : arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 3),
         torque(arm.model()),
         data(arm.Run(seconds, 30)),
-        q(MakeQuantities(arm.model(), torque, data, arm.truth(), {}, true)) {}
+        q(MakeQuantities(arm.model(), data, true)) {
+    Follow(arm.model(), torque, arm.truth(), {}, q);
+  }
   MatrixXd Zero() const { return MatrixXd::Zero(data.samples(), kJoints); }
 
   SyntheticArm arm;

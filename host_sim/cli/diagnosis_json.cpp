@@ -20,6 +20,16 @@ std::vector<std::string> Signals(const Term& t) {
   return out;
 }
 
+nlohmann::ordered_json RefutedJson(const diagnosis::Refutation& why) {
+  nlohmann::ordered_json out;
+  if (why.joint < 0) out["joint"] = "all";
+  else out["joint"] = why.joint + 1;
+  out["without_it"] = why.beside_others ? "the other terms" : "the declared model";
+  out["factor"] = why.factor;
+  out["rms_with"] = ToList(why.with), out["rms_without"] = ToList(why.without);
+  return out;
+}
+
 }  // namespace
 
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
@@ -46,6 +56,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["parameter_sd"] = deviations;
     term["also_fits"] = t.also_fits;
     term["confirmed"] = t.confirmed;
+    if (t.refuted) term["refuted"] = RefutedJson(*t.refuted);
     if (t.confirmed && !t.training_only) {
       const Dependence d = DependenceOf(v, n);
       term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true));

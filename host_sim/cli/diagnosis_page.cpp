@@ -66,7 +66,7 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
     page.Section(fmt::format("{}, joint {}", t.record->kind, JointName(t)));
     page.Text(t.record->title + ". " + t.record->source + ".");
     page.Facts({{"parameters", Parameters(t)},
-                {"in the new model", InTheModel(t)},
+                {"in the new model", InTheModel(t, v.model->robot())},
                 {"score", ScoreText(t)},
                 {"folds", FoldText(t)},
                 {"runner-up", RunnerUp(t)},

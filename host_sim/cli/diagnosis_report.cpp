@@ -15,6 +15,7 @@ std::string DiagnosisText(const DiagnosisView& v) {
     const Term& t = v.finding->terms[k];
     out += fmt::format("  {}, joint {}{}: {}\n", t.record->kind, JointName(t), Remark(t), t.record->title);
     if (t.confirmed) out += fmt::format("    {}\n", Parameters(t));
+    else out += fmt::format("    refuted on the held-out log: {}\n", WhyRefuted(t, v.model->robot()));
     out += fmt::format("    score {}; {}\n", ScoreText(t), FoldText(t));
     out += fmt::format("    runner-up: {}; fits equally: {}\n", RunnerUp(t), AlsoFits(t));
     for (const Separation& s : v.separation[k]) {

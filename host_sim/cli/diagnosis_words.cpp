@@ -111,8 +111,21 @@ std::vector<Separation> Separations(const Term& t, const codegen::Model& model, 
   return out;
 }
 
-std::string InTheModel(const Term& t) {
-  if (!t.confirmed) return "left out: the held-out log did not bear it out";
+std::string WhyRefuted(const Term& t, const codegen::Robot& robot) {
+  const diagnosis::Refutation& why = *t.refuted;
+  const char* without = why.beside_others ? "with the other terms alone" : "by the declared model";
+  if (why.joint < 0)
+    return fmt::format(
+        "all joints together are predicted worse with it than {}: the product of their errors is {:.4g} "
+        "times as large",
+        without, why.factor);
+  const bool slides = robot.joint[why.joint].kinematics.type == codegen::JointType::kPrismatic;
+  return fmt::format("joint {} is predicted worse with it than {}: {:.4g} instead of {:.4g} {}", why.joint + 1, without,
+                     why.with[why.joint], why.without[why.joint], slides ? "N" : "N m");
+}
+
+std::string InTheModel(const Term& t, const codegen::Robot& robot) {
+  if (!t.confirmed) return "left out; refuted on the held-out log: " + WhyRefuted(t, robot);
   return t.record->on_target ? "yes, as an estimated effect" : "no model can hold it: " + t.record->remedy;
 }
 

@@ -1,5 +1,6 @@
 // end-to-end tests - armcal diagnose --model-out where no model can hold what was found: said, not written as an
 // effect.
+#include <iomanip>
 #include <numbers>
 
 #include "host_sim/io/log.hpp"
@@ -88,6 +89,25 @@ TEST_F(ModelOut, OfATorqueWithAWrongScale_SaysWhichNumberIsOff) {
   const auto scaled = [](Dataset& d) { d.tau.col(1) *= 1.25; };
   Diagnose("gain", scaled, scaled);
   ExpectARemedyFor("torque_gain_error");
+}
+
+// What the held-out log refutes is in no model, and text, JSON and page say who got worse, and by how much.
+TEST_F(ModelOut, OfATermThatTheHeldOutLogRefutes_SaysWhichJointRefutesIt) {
+  Diagnose("refuted", [](Dataset& d) { d.tau.col(1).array() += 0.1; }, {});
+  ASSERT_EQ(verdict_.at("terms").size(), 1u) << said_.out;
+  const nlohmann::json why = verdict_["terms"][0].at("refuted");
+  EXPECT_EQ(why.at("joint"), 2);
+  EXPECT_EQ(why.at("without_it"), "the declared model");
+  EXPECT_GT(why.at("factor").get<double>(), 1.005);
+  EXPECT_NEAR(why["rms_without"][1].get<double>(), verdict_["before_moving"][1].get<double>(), 1e-12);
+  EXPECT_EQ(verdict_["after_moving"], verdict_["before_moving"]);
+  std::ostringstream figures;
+  figures << std::setprecision(4) << why["rms_with"][1].get<double>() << " instead of "
+          << why["rms_without"][1].get<double>() << " N m";
+  const std::string words = "joint 2 is predicted worse with it than by the declared model: " + figures.str();
+  EXPECT_NE(said_.out.find("refuted on the held-out log: " + words), std::string::npos) << said_.out;
+  EXPECT_NE(ReadText(Path("page.html")).find(words), std::string::npos);
+  EXPECT_EQ(ReadText(Path("new.toml")).find("[[effect]]"), std::string::npos);
 }
 
 // A contact says nothing about another log: it is named, stands apart, and moves no error there.

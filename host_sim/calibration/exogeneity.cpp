@@ -185,10 +185,9 @@ std::vector<Dataset> SimulatedInstruments(const Problem& problem, const VectorXd
   return loop.logs();
 }
 
-std::vector<Dataset> ReferenceInstruments(const std::vector<const Dataset*>& data,
-                                          const std::vector<MatrixXd>& reference) {
+std::vector<Dataset> ReferenceInstruments(const std::vector<const Dataset*>& data) {
   std::vector<Dataset> out;
-  for (std::size_t l = 0; l < data.size(); ++l) out.push_back(AlongSpline(*data[l], reference[l]));
+  for (const Dataset* d : data) out.push_back(AlongSpline(*d, d->reference));
   return out;
 }
 

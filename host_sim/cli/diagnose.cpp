@@ -46,7 +46,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   run->catalogue = LoadCatalogue();
   run->model = std::make_unique<codegen::Model>(codegen::ReadRobot(RobotPath(o.robot)), run->catalogue);
   const codegen::Model& model = *run->model;
-  const LogReader read(model, o.channels);
+  const LogReader read(model, o.channels, o.cutoff_Hz);
   run->train = read.All(o.train);
   const std::vector<calibration::Dataset> narrow = read.Narrow(o.train);
   const auto start = std::chrono::steady_clock::now();
@@ -77,6 +77,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   nlohmann::ordered_json& json = run->json;
   json = DiagnosisJson(run->view);
   json["provenance"] = provenance;
+  for (const calibration::Dataset& log : run->train) json["cutoff_Hz"].push_back(ToList(log.cutoff_Hz));
   if (!o.model_out.empty()) {
     // The same schema: a table can switch the terms on. Another one: the model must be generated and the drive built.
     const codegen::Model next(codegen::ReadRobot(o.model_out), run->catalogue);
@@ -126,6 +127,7 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--train", o->train, "log(s) on which everything is decided");
   verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  AddCutoff(*verb, o->cutoff_Hz);
   verb->add_option("--json", o->json, "write the verdict here");
   verb->add_option("--report", o->report, "write a self-contained page here");
   verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");

@@ -31,6 +31,7 @@ struct DiagnosisView {
 struct DiagnoseOptions {
   std::string robot, channels, test, json, report, model_out;
   std::vector<std::string> train;
+  double cutoff_Hz = 0;
 };
 
 // One diagnosis from files to files, with everything its view refers to.

@@ -17,13 +17,11 @@ namespace {
 
 // Empty where the arm that the robot file describes does not follow its reference in simulation.
 std::vector<Dataset> Simulated(const codegen::Model& model, const std::vector<Dataset>& data,
-                               const std::vector<MatrixXd>& reference, const VectorXd& z) {
+                               const std::map<std::string, MatrixXd>& reference, const VectorXd& z) {
   if (model.robot().control.structure.empty() || model.states() > 0) return {};
-  std::map<std::string, MatrixXd> by_log;
-  for (std::size_t k = 0; k < data.size(); ++k) by_log.emplace(data[k].source, reference[k]);
   calibration::Problem problem = calibration::MakeProblem(model, Pointers(data));
   try {
-    problem.closed_loop = calibration::MakeClosedLoop(model, by_log);
+    problem.closed_loop = calibration::MakeClosedLoop(model, reference);
     return calibration::SimulatedInstruments(problem, z);
   } catch (const io::InputError&) {
     return {};  // the reference itself serves, too
@@ -32,21 +30,16 @@ std::vector<Dataset> Simulated(const codegen::Model& model, const std::vector<Da
 
 }  // namespace
 
-Exogeneity CheckExogeneity(const codegen::Model& model, const LogReader& read, const std::vector<std::string>& paths,
-                           const std::vector<Dataset>& data, const VectorXd& z) {
-  std::vector<MatrixXd> reference;
-  for (const std::string& path : paths) {
-    const io::Log log = read.Raw(path);
-    if (log.qref.size() > 0) reference.push_back(log.qref);
-  }
+Exogeneity CheckExogeneity(const codegen::Model& model, const std::vector<Dataset>& data, const VectorXd& z) {
+  const std::map<std::string, MatrixXd> reference = References(data);
   const char* kind = "smoothed positions";
   std::vector<Dataset> instruments;
-  if (reference.size() == data.size()) {
+  if (!reference.empty()) {
     kind = kSimulatedLoop;
     instruments = Simulated(model, data, reference, z);
     if (instruments.empty()) {
       kind = "commanded motion";
-      instruments = calibration::ReferenceInstruments(Pointers(data), reference);
+      instruments = calibration::ReferenceInstruments(Pointers(data));
     }
   } else {
     instruments = calibration::SmoothedInstruments(Pointers(data));

@@ -12,9 +12,8 @@ inline constexpr const char* kSimulatedLoop = "simulated loop";
 
 // Instruments from the simulated loop where the robot file has a control law and every log a reference, else from the
 // reference, else from smoothed positions. z: [columns, eta].
-calibration::Exogeneity CheckExogeneity(const codegen::Model& model, const LogReader& read,
-                                        const std::vector<std::string>& paths,
-                                        const std::vector<calibration::Dataset>& data, const Eigen::VectorXd& z);
+calibration::Exogeneity CheckExogeneity(const codegen::Model& model, const std::vector<calibration::Dataset>& data,
+                                        const Eigen::VectorXd& z);
 
 std::string ExogeneityText(const calibration::Exogeneity& e);
 nlohmann::ordered_json ToJson(const calibration::Exogeneity& e);

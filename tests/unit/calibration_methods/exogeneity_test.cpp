@@ -40,7 +40,7 @@ struct Bench {
 TEST(Exogeneity, NoiseOfTheTorqueAlone_FailsAsOftenAsTheLevelSays) {
   constexpr int kDraws = 200;
   const Bench bench;
-  const auto reference = ReferenceInstruments({&bench.clean}, {bench.reference.s.q});
+  const auto reference = ReferenceInstruments({&bench.clean});
   Problem problem = tests::ProblemOf(bench.arm, {&bench.clean});
   problem.closed_loop = MakeClosedLoop(bench.arm.model(), {{"loop", bench.reference.s.q}});
   const auto simulated = SimulatedInstruments(problem, bench.start);  // an arm 30 % off
@@ -70,7 +70,7 @@ TEST(Exogeneity, NoiseOfTheDerivedAccelerations_FailsWithEveryKindOfInstrument) 
     const Dataset d = tests::Measured(bench.arm, bench.reference, 3e-4, 1, 50 + draw);  // 7 rad/s^2 of noise in qdd
     Problem problem = tests::ProblemOf(bench.arm, {&d});
     problem.closed_loop = MakeClosedLoop(bench.arm.model(), {{"loop", bench.reference.s.q}});
-    const Exogeneity e = bench.Test(d, ReferenceInstruments({&d}, {bench.reference.s.q}));
+    const Exogeneity e = bench.Test(d, ReferenceInstruments({&d}));
     by_reference += !e.passed();
     by_simulation += !bench.Test(d, SimulatedInstruments(problem, bench.start)).passed();
     by_smoothing += !bench.Test(d, SmoothedInstruments({&d})).passed();
@@ -87,7 +87,7 @@ TEST(Exogeneity, NoiseOfAnEncoderThatIsFineEnough_DoesNotFail) {
   int failed = 0;
   for (int draw = 0; draw < 20; ++draw) {
     const Dataset d = tests::Measured(bench.arm, bench.reference, 3e-7, 1, 50 + draw);
-    failed += !bench.Test(d, ReferenceInstruments({&d}, {bench.reference.s.q})).passed();
+    failed += !bench.Test(d, ReferenceInstruments({&d})).passed();
   }
   EXPECT_LE(failed, 5);  // one expected; six or more of 20 at 5 % come once in 3000 runs
 }
@@ -96,7 +96,7 @@ TEST(Exogeneity, WithoutNoiseOrWithInstrumentsThatAreTheColumns_SaysThatNothingW
   const Bench bench;
   const Dataset d = bench.WithTorqueNoise(0, 1);
   for (const Exogeneity& e :
-       {bench.Test(d, {d}), bench.Test(bench.clean, ReferenceInstruments({&bench.clean}, {bench.reference.s.q}))})
+       {bench.Test(d, {d}), bench.Test(bench.clean, ReferenceInstruments({&bench.clean}))})
     for (const JointExogeneity& j : e.joint) {
       EXPECT_EQ(j.restrictions, 0);
       EXPECT_TRUE(j.exogenous);

@@ -6,6 +6,7 @@
 #include "codegen/src/generator/emit.hpp"
 #include "host_sim/cli/diagnose_batch.hpp"
 #include "host_sim/cli/diagnosis_words.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/diagnosis/model_file.hpp"
@@ -55,6 +56,11 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const diagnosis::Finding& finding = run->diagnosis->finding();
 
+  Eigen::VectorXd z(model.columns() + model.nonlinear());
+  z << finding.x.head(model.columns()), Eigen::VectorXd::Map(finding.declared.eta.data(), model.nonlinear());
+  const calibration::Exogeneity exogeneity =
+      CheckExogeneity(model, run->diagnosis->WithoutTerms(), z, Instruments::kCommanded);
+
   // The model is written, and its hash taken, before the held-out log is opened.
   std::string provenance = "Train:", model_hash;
   for (const std::string& p : o.train)
@@ -71,7 +77,8 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   if (!o.model_out.empty() && after_test != before_test)
     io::AtomicWrite(o.model_out, after_test);  // what was not confirmed is taken out
 
-  run->view = {&model, &finding, &run->test, &run->held_out, run->diagnosis->TermTorque(run->test), seconds, {}};
+  run->view = {&model,  &finding,   &run->test, &run->held_out, run->diagnosis->TermTorque(run->test),
+               seconds, exogeneity, {}};
   for (const diagnosis::Term& t : finding.terms)
     run->view.separation.push_back(Separations(t, model, run->catalogue, o.robot));
   nlohmann::ordered_json& json = run->json;

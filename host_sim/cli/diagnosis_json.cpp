@@ -1,5 +1,6 @@
 // cli - a diagnosis as JSON.
 #include "host_sim/cli/diagnosis_words.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 #include "host_sim/cli/logs.hpp"
 
 namespace armcal::cli {
@@ -88,6 +89,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["noise_innovation"] = ToList(f.innovation);
   j["smallest_detectable"] = ToList(f.smallest);
   if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
+  j["exogeneity"] = ToJson(v.exogeneity);
   j["seconds"] = v.seconds;
   return j;
 }

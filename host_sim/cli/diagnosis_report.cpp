@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include "host_sim/cli/diagnosis_words.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 
 namespace armcal::cli {
 
@@ -24,7 +25,7 @@ std::string DiagnosisText(const DiagnosisView& v) {
     }
     if (t.confirmed && !t.record->on_target) out += fmt::format("    {}\n", t.record->remedy);
   }
-  return out;
+  return out + ExogeneityText(v.exogeneity, kLacksMore);
 }
 
 }  // namespace armcal::cli

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_sim/calibration/exogeneity.hpp"
 #include "host_sim/diagnosis/diagnose.hpp"
 #include "host_sim/report/page.hpp"
 
@@ -25,6 +26,7 @@ struct DiagnosisView {
   const diagnosis::HeldOut* held_out = nullptr;
   std::vector<Eigen::MatrixXd> term_torque;  // on the test log
   double seconds = 0;
+  calibration::Exogeneity exogeneity;               // of the training logs, with the terms in
   std::vector<std::vector<Separation>> separation;  // per term
 };
 

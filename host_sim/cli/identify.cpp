@@ -76,8 +76,9 @@ int Run(const Options& o) {
     json["sigma_Nm"].push_back(all.sigma[j]);
     json["torque_gain"].push_back(1 + all.x[model.columns() + j]);
   }
-  const calibration::Exogeneity exogeneity = CheckExogeneity(model, train, Unknowns(model, all));
-  fmt::print("{}", ExogeneityText(exogeneity));
+  const calibration::Exogeneity exogeneity =
+      CheckExogeneity(model, train, Unknowns(model, all), Instruments::kSimulated);
+  fmt::print("{}", ExogeneityText(exogeneity, "the model lacks a term: armcal diagnose"));
   json["exogeneity"] = ToJson(exogeneity);
   if (o.method == "auto" && !exogeneity.passed() && exogeneity.instruments == kSimulatedLoop) {
     method.method = "instrumental_variable", method.exogeneity = json["exogeneity"];

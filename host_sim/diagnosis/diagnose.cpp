@@ -158,8 +158,8 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
     w.Polish();
   }
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
-    if (w.chosen[k].delay_s != 0) ++k;  // the logs are as it says now
-    else if (select.StillEarns(w.chosen[k], Rivals(w.chosen, w.chosen[k]))) ++k;
+    // A delay stays: the logs are as it says now.
+    if (w.chosen[k].delay_s != 0 || select.StillEarns(w.chosen[k], Rivals(w.chosen, w.chosen[k]))) ++k;
     else w.chosen.erase(w.chosen.begin() + static_cast<long>(k));
   }
   std::sort(w.chosen.begin(), w.chosen.end(),
@@ -211,6 +211,20 @@ std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) co
     const VectorXd& amplitude = w.estimate.amplitude[k++];
     if (!c.candidate->is_event()) out.back() = CandidateTorque(*c.candidate, q, c.eta, amplitude);
     if (c.delay_s != 0) out.back() += q.tau_model - calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
+  }
+  return out;
+}
+
+std::vector<calibration::Dataset> Diagnosis::WithoutTerms() const {
+  const Work& w = *work_;
+  const std::vector<const Chosen*> terms = Confirmed(w.chosen);
+  std::vector<calibration::Dataset> out;
+  for (const calibration::Dataset* log : w.train) {
+    out.push_back(*log);
+    if (terms.empty()) continue;
+    const Quantities q = MakeQuantities(model_, w.arm, *log, w.estimate.x, w.declared.eta, w.needs_flange);
+    for (std::size_t k = 0; k < terms.size(); ++k)
+      out.back().tau -= CandidateTorque(*terms[k]->candidate, q, terms[k]->eta, w.estimate.amplitude[k]);
   }
   return out;
 }

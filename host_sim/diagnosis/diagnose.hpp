@@ -80,6 +80,9 @@ class Diagnosis {
   // One N x n torque a term on a log (run-state terms: as windows of that log's own time would give).
   std::vector<Eigen::MatrixXd> TermTorque(const calibration::Dataset& data) const;
 
+  // The training logs as the declared model alone should explain them: aligned, the torque of the terms taken off.
+  std::vector<calibration::Dataset> WithoutTerms() const;
+
  private:
   const codegen::Model& model_;
   Finding finding_;

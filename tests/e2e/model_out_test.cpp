@@ -2,6 +2,7 @@
 // effect.
 #include <iomanip>
 #include <numbers>
+#include <random>
 
 #include "host_sim/io/log.hpp"
 #include "tests/e2e/tool.hpp"
@@ -16,13 +17,18 @@ using Change = std::function<void(Dataset&)>;
 class ModelOut : public testing::Test {
  protected:
   // Logs of a small arm whose measurement underwent this; what diagnose said, and the new file generated from.
-  void Diagnose(const std::string& name, const Change& train, const Change& test) {
+  void Diagnose(const std::string& name, const Change& train, const Change& test,
+                const std::vector<std::string>& options = {}) {
     folder_ = FreshFolder("model_out_" + name);
     SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 9);
     Write(arm.Run(20, 90), train, "train.csv");
     Write(arm.Run(20, 91), test, "test.csv");
-    said_ = Tool({"diagnose", "--robot", "two_link", "--train", Path("train.csv"), "--test", Path("test.csv"),
-                  "--model-out", Path("new.toml"), "--json", Path("verdict.json"), "--report", Path("page.html")});
+    std::vector<std::string> words{"diagnose",        "--robot", "two_link",           "--train",
+                                   Path("train.csv"), "--test",  Path("test.csv"),     "--model-out",
+                                   Path("new.toml"),  "--json",  Path("verdict.json"), "--report",
+                                   Path("page.html")};
+    words.insert(words.end(), options.begin(), options.end());
+    said_ = Tool(words);
     ASSERT_EQ(said_.code, 0) << said_.err << said_.out;
     verdict_ = ReadJson(Path("verdict.json"));
     const Outcome generated = Tool({"generate", "--robot", Path("new.toml"), "--out", Path("generated")});
@@ -108,6 +114,31 @@ TEST_F(ModelOut, OfATermThatTheHeldOutLogRefutes_SaysWhichJointRefutesIt) {
   EXPECT_NE(said_.out.find("refuted on the held-out log: " + words), std::string::npos) << said_.out;
   EXPECT_NE(ReadText(Path("page.html")).find(words), std::string::npos);
   EXPECT_EQ(ReadText(Path("new.toml")).find("[[effect]]"), std::string::npos);
+}
+
+// Noise of the positions is in the derived accelerations and their columns, unless the derivation ends below it.
+TEST_F(ModelOut, OfANoisyPosition_SaysThatLeastSquaresIsBiased_UntilTheCutoffIsLower) {
+  const auto noisy = [](Dataset& d) {
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> noise(0, 2e-5);
+    for (double& q : d.s.q.reshaped()) q += noise(random);
+  };
+  for (const double cutoff_Hz : {49.0, 5.0}) {  // motion ends at 0.5 Hz; its turns, where friction jumps, do not
+    Diagnose("noisy", noisy, noisy, {"--cutoff", std::to_string(cutoff_Hz)});
+    if (HasFatalFailure()) return;
+    EXPECT_EQ(verdict_.at("cutoff_Hz"), nlohmann::json({{cutoff_Hz, cutoff_Hz}}));
+    const nlohmann::json e = verdict_.at("exogeneity");
+    const bool biased = cutoff_Hz > 20;
+    EXPECT_EQ(e.at("instruments"), "smoothed positions");
+    EXPECT_EQ(e.at("passed").get<bool>(), !biased) << said_.out;
+    ASSERT_EQ(e.at("joints").size(), 2u);
+    for (const auto& j : e["joints"]) EXPECT_TRUE(j.at("told").get<bool>());
+    const std::string page = ReadText(Path("page.html"));
+    for (const std::string& text : {said_.out, page}) {
+      EXPECT_EQ(text.find("FAILS on joint") != text.npos, biased) << text;
+      EXPECT_EQ(text.find("armcal identify --method instrumental_variable") != text.npos, biased) << text;
+    }
+  }
 }
 
 // A contact says nothing about another log: it is named, stands apart, and moves no error there.

@@ -109,6 +109,21 @@ TEST(HeldOutLog, RefutesATermThatTheOthersAreBetterWithout) {
   EXPECT_LT(j.Error(j.held_out.after), 1.1 * j.arm.noise_Nm(kJoint));
 }
 
+// What was put into the log is what is taken off: effects of the arm and events of this log alike.
+TEST(TrainingLog, WithoutItsTerms_IsThatOfTheDeclaredArm) {
+  const Judged clean({}, {});
+  for (const Judged::Change& change :
+       {Judged::Change([](Dataset& d) { Contact(d, 6, 0.4, 1.5); }), Judged::Change([](Dataset& d) {
+          for (int k = 0; k < d.samples(); ++k) d.tau(k, kJoint) += 0.3 * std::cos(12 * d.s.q(k, kJoint));
+        })}) {
+    const Judged changed(change, change);
+    ASSERT_FALSE(changed.terms().empty());
+    const Eigen::MatrixXd put_in = changed.train.tau - clean.train.tau;
+    const Eigen::MatrixXd left = changed.diagnosis->WithoutTerms().at(0).tau - clean.train.tau;
+    EXPECT_LT(left.norm(), 0.1 * put_in.norm());  // 0.1: what 2500 rows of this noise leave of the amplitude, and more
+  }
+}
+
 // An offset of the training log alone: beside no other term it is held against the declared model.
 TEST(HeldOutLog, SaysThatTheDeclaredModelIsBetter) {
   const Judged j([](Dataset& d) { d.tau.col(kJoint).array() += 0.1; }, {});

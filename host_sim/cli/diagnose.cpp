@@ -80,7 +80,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   run->view = {&model,  &finding,   &run->test, &run->held_out, run->diagnosis->TermTorque(run->test),
                seconds, exogeneity, {}};
   for (const diagnosis::Term& t : finding.terms)
-    run->view.separation.push_back(Separations(t, model, run->catalogue, o.robot));
+    run->view.separation.push_back(Separations(t, finding, model, run->catalogue, o.robot, o.json));
   nlohmann::ordered_json& json = run->json;
   json = DiagnosisJson(run->view);
   json["provenance"] = provenance;

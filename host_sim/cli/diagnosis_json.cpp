@@ -44,6 +44,10 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     nlohmann::ordered_json term{{"kind", t.record->kind}, {"record", t.record->name}, {"class", t.record->kind_class}};
     if (t.joints.size() == 1 || IsUnknown(t)) term["joint"] = t.joints[0] + 1;
     else term["joint"] = JointName(t);
+    const codegen::EffectUse use = Found(t);
+    term["joints"] = nlohmann::ordered_json::array();
+    for (const int joint : use.joints) term["joints"].push_back(joint + 1);
+    term["unknowns"] = use.nonlinear;
     term["signals"] = Signals(t);
     nlohmann::ordered_json parameters, deviations;
     for (std::size_t k = 0; k < t.eta.size(); ++k) {

@@ -3,6 +3,7 @@
 #include <iomanip>
 #include <numbers>
 #include <random>
+#include <regex>
 
 #include "host_sim/io/log.hpp"
 #include "tests/e2e/tool.hpp"
@@ -139,6 +140,43 @@ TEST_F(ModelOut, OfANoisyPosition_SaysThatLeastSquaresIsBiased_UntilTheCutoffIsL
       EXPECT_EQ(text.find("armcal identify --method instrumental_variable") != text.npos, biased) << text;
     }
   }
+}
+
+// The command that tells a ripple from its runner-up can be run as it stands, and searches for the ripple that was
+// found.
+TEST_F(ModelOut, OfARipple_TheCommandThatSeparatesIt_TakesWhatWasFound) {
+  const auto ripple = [](Dataset& d) {
+    for (int k = 0; k < d.samples(); ++k) d.tau(k, 1) += 0.3 * std::cos(12 * d.s.q(k, 1));
+  };
+  Diagnose("ripple", ripple, ripple);
+  if (HasFatalFailure()) return;
+  ASSERT_FALSE(verdict_.at("terms").empty()) << said_.out;
+  const nlohmann::json& t = verdict_["terms"][0];
+  EXPECT_EQ(t.at("record"), "torque_ripple");
+  EXPECT_EQ(t.at("joints"), nlohmann::json({2}));
+  EXPECT_NEAR(t.at("unknowns").at("k").get<double>(), 12, 0.1);
+  std::string command;
+  for (const auto& s : t.at("separate")) command = s.at("command").get<std::string>();
+  ASSERT_NE(command.find(" --from " + Path("verdict.json")), std::string::npos) << said_.out;
+  std::vector<nlohmann::json> accuracy;
+  for (const std::string& shell : {command, std::regex_replace(command, std::regex(" --from [^ ]*"), "")}) {
+    std::string words = std::regex_replace(shell, std::regex("^armcal"), ARMCAL_TOOL);
+    words = std::regex_replace(words, std::regex("separate.csv"), Path("separate.csv"));
+    const Outcome o = RunProgram(
+        {"sh", "-c", words + " --no-slow --starts 1 --harmonics 10 --seconds 60 --json " + Path("excite.json")});
+    ASSERT_EQ(o.code, 0) << o.err;
+    accuracy.push_back(ReadJson(Path("excite.json")).at("accuracy"));
+  }
+  EXPECT_NE(accuracy[0], accuracy[1]);  // one search, one seed: only the ripple's k differs
+  const std::string never = Path("never.csv");
+  const auto refused = [&](const std::string& effects, const std::string& verdict, const std::string& named) {
+    ExpectOneLine(Tool({"excite", "--robot", "two_link", "--separate", effects, "--from", verdict, "--out", never}), 2,
+                  named);
+    EXPECT_FALSE(fs::exists(never));
+  };
+  refused("stribeck:1,viscous_cuberoot:1", Path("verdict.json"), "among stribeck:1, viscous_cuberoot:1");
+  refused("torque_ripple:2", Path("train.csv"), "train.csv: expected a verdict");
+  refused("torque_ripple:2", Path("absent.json"), "absent.json");
 }
 
 // A contact says nothing about another log: it is named, stands apart, and moves no error there.

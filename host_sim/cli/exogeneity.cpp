@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr const char* kCommandedMotion = "commanded motion";
+constexpr const char *kCommandedMotion = "commanded motion", *kSmoothedPositions = "smoothed positions";
 
 // Empty where the arm that the robot file describes does not follow its reference in simulation.
 std::vector<Dataset> Simulated(const codegen::Model& model, const std::vector<Dataset>& data,
@@ -51,7 +51,7 @@ Exogeneity CheckExogeneity(const codegen::Model& model, const std::vector<Datase
   std::vector<Dataset> instruments;
   if (best == Instruments::kSimulated && !reference.empty()) instruments = Simulated(model, data, reference, z);
   if (instruments.empty()) {
-    kind = reference.empty() ? "smoothed positions" : kCommandedMotion;
+    kind = reference.empty() ? kSmoothedPositions : kCommandedMotion;
     instruments = reference.empty() ? calibration::SmoothedInstruments(Pointers(data))
                                     : calibration::ReferenceInstruments(Pointers(data));
   }
@@ -69,7 +69,9 @@ std::string ExogeneityText(const Exogeneity& e, const std::string& otherwise) {
     list +=
         fmt::format(" (p {:.1g}, bias {:.2g} of {:.2g} left)", e.joint[j].p, e.joint[j].bias_Nm, e.joint[j].left_Nm);
   }
-  std::string text = fmt::format("regressors free of the torque's error (instruments: {}):", e.instruments);
+  // What the motion itself took up of the torque's error is in its smoothed positions, too.
+  const char* shown = e.instruments == kSmoothedPositions ? ", which show noise of the derivation alone" : "";
+  std::string text = fmt::format("regressors free of the torque's error (instruments: {}{}):", e.instruments, shown);
   const char* separator = " ";
   for (const auto& [result, list] : joints)
     text += fmt::format("{}{} on joint {}", separator, result, list), separator = "; ";

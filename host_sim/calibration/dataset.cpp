@@ -5,7 +5,6 @@
 
 #include "host_sim/calibration/weighted_fit.hpp"
 #include "host_sim/io/input_error.hpp"
-#include "host_sim/io/signals.hpp"
 
 namespace armcal::calibration {
 namespace {
@@ -16,19 +15,21 @@ constexpr int kFlagSaturated = 2, kFlagStale = 4;
 constexpr int kTurn = 2;
 constexpr int kPoses = 8;  // at a single one an entry of the mass matrix may vanish
 // Signals and masks for given inertias.
-Dataset Derive(const codegen::Model& model, const io::Log& log, const Eigen::MatrixXd& inertia, double cutoff_scale) {
+Dataset Derive(const codegen::Model& model, const io::Log& log, const Eigen::MatrixXd& inertia,
+               const io::Bandwidth& bandwidth) {
   const int n = model.joints(), samples = static_cast<int>(log.samples());
   Eigen::VectorXd sign_width(n);
   for (int j = 0; j < n; ++j)
     sign_width[j] =
         model.robot().sign_law == "tanh" ? model.robot().sign_width_radps : model.robot().joint[j].v_min_radps;
-  const io::Derivatives derived = io::DeriveSignals(log, {inertia, sign_width}, cutoff_scale);
+  const io::Derivatives derived = io::DeriveSignals(log, {inertia, sign_width}, bandwidth);
   Dataset d;
   d.source = log.source;
   d.s.t = log.t;
   d.s.q = derived.q, d.s.qd = derived.qd, d.s.qdd = derived.qdd;
   d.s.temp = log.temp;
   d.cutoff_Hz = derived.cutoff_Hz;
+  d.reference = log.qref;
   d.tau = log.tau;
   if (log.ext.cols() == n) d.tau += log.ext;  // an external force along +q does part of the motor's work
   d.moving.setZero(samples, n), d.used.setZero(samples, n), d.scored.setZero(samples);
@@ -81,7 +82,7 @@ Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& 
   return square.cwiseSqrt();
 }
 
-Dataset Prepare(const codegen::Model& model, const io::Log& log, double cutoff_scale) {
+Dataset Prepare(const codegen::Model& model, const io::Log& log, const io::Bandwidth& bandwidth) {
   const int n = model.joints();
   if (log.joints != n)
     throw io::InputError(log.source + ": " + std::to_string(log.joints) + " joints, expected " + std::to_string(n) +
@@ -95,13 +96,13 @@ Dataset Prepare(const codegen::Model& model, const io::Log& log, double cutoff_s
     // A joint's torque limit over its acceleration limit is a heavy guess: a low cut-off, good enough for a first fit.
     for (int j = 0; j < n; ++j)
       inertia(j, j) = model.robot().joint[j].torque_limit_Nm / model.robot().joint[j].acceleration_limit_radps2;
-    const Dataset rough = Derive(model, log, inertia, 1);
+    const Dataset rough = Derive(model, log, inertia, {});
     const Fit fit = WeightedFit(model, {&rough});
     const Eigen::VectorXd guess = inertia.diagonal();
     inertia = TypicalMass(model, fit.x.segment(model.front(), model.rigid()));
     for (int j = 0; j < n; ++j) inertia(j, j) = std::min(inertia(j, j), guess[j]);
   }
-  return Derive(model, log, inertia, cutoff_scale);
+  return Derive(model, log, inertia, bandwidth);
 }
 
 Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only) {

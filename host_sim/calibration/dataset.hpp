@@ -5,6 +5,7 @@
 
 #include "codegen/src/generator/model.hpp"
 #include "host_sim/io/log.hpp"
+#include "host_sim/io/signals.hpp"
 
 namespace armcal::calibration {
 
@@ -16,15 +17,15 @@ struct Dataset {
   Eigen::MatrixXi used;       // [N x n] 1: row may be fitted (moving, signals settled, drive did not flag it)
   Eigen::VectorXi scored;     // [N] 1: not within 0.5 s of an end of the log
   Eigen::VectorXd cutoff_Hz;  // [n]
+  Eigen::MatrixXd reference;  // [N x n] commanded position; empty where the log has none
   std::string source;
 
   int samples() const { return s.samples(); }
   int joints() const { return static_cast<int>(tau.cols()); }
 };
 
-// cutoff_scale: multiplies the chosen cut-off frequencies (a second bandwidth shows what depends on the derivation).
-// The cut-off depends on the arm's inertia: from the prior, or, without one, from a first fit of this very log.
-Dataset Prepare(const codegen::Model& model, const io::Log& log, double cutoff_scale = 1);
+// A chosen cut-off depends on the arm's inertia: from the prior, or, without one, from a first fit of this very log.
+Dataset Prepare(const codegen::Model& model, const io::Log& log, const io::Bandwidth& bandwidth = {});
 
 // RMS over some poses of each entry of the mass matrix [n x n], for given base parameters.
 Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& base);

@@ -1,13 +1,10 @@
-// calibration - the augmented regression of one joint after the other; knows no file.
+// calibration - one joint after the other along its instruments, all of them judged together; knows no file.
 #include "host_sim/calibration/exogeneity.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
-#include <numeric>
 
+#include "host_sim/calibration/augmented_regression.hpp"
 #include "host_sim/calibration/methods/simulated_logs.hpp"
 #include "host_sim/io/butterworth.hpp"
 #include "host_sim/io/quintic_spline.hpp"
@@ -20,107 +17,15 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kLevel = 0.05;
-constexpr int kOrder = 10;            // of the residual's autoregressive model
-constexpr int kRounds = 2;            // of fitting it anew
-constexpr double kSameColumn = 1e-5;  // share of a column's norm below which a direction of the columns repeats others
-constexpr double kNegligible = 1e-3;  // ... of what instruments leave: noise so small biases by its square
-constexpr double kTold = 0.1;         // share of such a direction that must lie outside the columns: below, instruments
-                                      // explain so little of it that nothing can be said
-constexpr double kMatters = 0.05;     // bias over residual; with rows enough any test finds less than any use would
-constexpr double kSingular = 1e-8;    // of whitened columns, relative: the whitening may take a slow one away
-constexpr double kRowsPerColumn = 3;
-constexpr double kSmoothed = 0.2;  // of the bandwidth
-
-// One joint's rows over all logs: regressors, instruments, torque, and how many used rows run up to each without a gap.
-struct JointRows {
-  MatrixXd X, Z;
-  VectorXd tau;
-  std::vector<int> run;
-};
+constexpr double kMatters = 0.05;   // bias over residual; with rows enough any test finds less than any use would
+constexpr double kSmoothed = 0.2;   // of the bandwidth
+constexpr double kEnough_Hz = 100;  // of rows: motion and its noise lie below 60 Hz, and rows cost
 
 std::vector<int> Present(const codegen::Model& model, int joint) {
   std::vector<int> present;
   for (const int c : MakePrior(model).active)
     if (c < model.columns() && !model.rows()[joint][c].IsZero()) present.push_back(c);
   return present;
-}
-
-// The directions of M (columns of unit norm) that are longer than `floor`.
-MatrixXd Directions(const MatrixXd& M, double floor) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(M.transpose() * M));
-  const auto keep = (eigen.eigenvalues().array() > floor * floor).count();
-  return M * eigen.eigenvectors().rightCols(keep);
-}
-
-// What the columns of A do not explain of Y.
-MatrixXd Outside(const MatrixXd& A, const MatrixXd& Y) { return Y - A * A.completeOrthogonalDecomposition().solve(Y); }
-
-// Coefficients a of e_k = sum a_i e_(k-i) + white, from the rows of unbroken runs (Yule and Walker).
-VectorXd Autoregression(const VectorXd& e, const std::vector<int>& run) {
-  VectorXd r = VectorXd::Zero(kOrder + 1);
-  for (int lag = 0; lag <= kOrder; ++lag)
-    for (std::size_t k = 0; k < run.size(); ++k)
-      if (run[k] >= lag) r[lag] += e[static_cast<Eigen::Index>(k)] * e[static_cast<Eigen::Index>(k) - lag];
-  MatrixXd R(kOrder, kOrder);
-  for (int i = 0; i < kOrder; ++i)
-    for (int k = 0; k < kOrder; ++k) R(i, k) = r[std::abs(i - k)];
-  R.diagonal().array() += 1e-9 * r[0];
-  return R.ldlt().solve(r.tail(kOrder));
-}
-
-// Rows minus what the model predicts of them; those with a whole past.
-MatrixXd Whiten(const MatrixXd& M, const VectorXd& a, const std::vector<int>& run) {
-  MatrixXd out(std::count_if(run.begin(), run.end(), [](int r) { return r >= kOrder; }), M.cols());
-  Eigen::Index next = 0;
-  for (std::size_t k = 0; k < run.size(); ++k) {
-    if (run[k] < kOrder) continue;
-    const auto row = static_cast<Eigen::Index>(k);
-    out.row(next) = M.row(row);
-    for (int i = 0; i < kOrder; ++i) out.row(next) -= a[i] * M.row(row - 1 - i);
-    ++next;
-  }
-  return out;
-}
-
-JointExogeneity TestJoint(const JointRows& rows) {
-  JointExogeneity out;
-  const VectorXd norm = rows.X.colwise().norm().transpose().cwiseMax(1e-300);
-  const MatrixXd scaled = rows.X * norm.cwiseInverse().asDiagonal();
-  const MatrixXd X = Directions(scaled, kSameColumn);
-  const MatrixXd left = Outside(rows.Z, scaled);
-  MatrixXd V = Directions(left, kNegligible);
-  if (V.cols() > 0) V = Directions(Outside(X, V.colwise().normalized()), kTold);
-  const auto k = X.cols(), q = V.cols();
-  MatrixXd all(X.rows(), k + q + 1);
-  all << X, V, rows.tau;
-  const VectorXd residual = Outside(X, rows.tau);
-  MatrixXd white = Whiten(all, Autoregression(residual, rows.run), rows.run);
-  // Least squares takes slow noise for slow columns, so that its residual looks faster than the noise is; the whitened
-  // rows' solution does not (Cochrane and Orcutt).
-  for (int round = 0; round < kRounds && white.rows() > k; ++round) {
-    const VectorXd x = white.leftCols(k).householderQr().solve(white.rightCols(1)).col(0);
-    white = Whiten(all, Autoregression(rows.tau - X * x, rows.run), rows.run);
-  }
-  out.left_Nm = residual.norm() / std::sqrt(static_cast<double>(residual.size()));
-  out.rows = static_cast<int>(white.rows());
-  if (q == 0 || static_cast<double>(out.rows) < kRowsPerColumn * static_cast<double>(k + q)) return out;
-  const auto solve = [&](Eigen::Index columns) {
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> all_of;
-    all_of.setThreshold(kSingular);
-    return all_of.compute(white.leftCols(columns));
-  };
-  const VectorXd y = white.rightCols(1);
-  const auto plain = solve(k), augmented = solve(k + q);
-  const VectorXd least_squares = plain.solve(y), both = augmented.solve(y);
-  const auto free = static_cast<double>(white.rows() - augmented.rank());
-  const double remains = (y - white.leftCols(k + q) * both).squaredNorm();
-  if (augmented.rank() <= plain.rank() || remains <= kSingular * kSingular * y.squaredNorm()) return out;  // no error
-  out.restrictions = static_cast<int>(augmented.rank() - plain.rank());
-  const double gained = (y - white.leftCols(k) * least_squares).squaredNorm() - remains;
-  out.F = std::max(0.0, gained) / out.restrictions / (remains / free);
-  out.p = cdf(complement(boost::math::fisher_f(out.restrictions, free), out.F));
-  out.bias_Nm = (X * (least_squares - both.head(k))).norm() / std::sqrt(static_cast<double>(X.rows()));
-  return out;
 }
 
 // The smallest p of m is judged at level / m, the next at level / (m - 1), ... until one is not small enough.
@@ -131,6 +36,39 @@ void JudgeByHolm(std::vector<JointExogeneity>& joint) {
   std::sort(tested.begin(), tested.end(), [](const auto* a, const auto* b) { return a->p < b->p; });
   for (std::size_t k = 0; k < tested.size() && tested[k]->p < kLevel / static_cast<double>(tested.size() - k); ++k)
     tested[k]->exogenous = tested[k]->bias_Nm < kMatters * tested[k]->left_Nm;
+}
+
+double Rate_Hz(const Dataset& d) { return (d.samples() - 1) / (d.s.t[d.samples() - 1] - d.s.t[0]); }
+
+// Every m-th sample; used where all m are.
+Dataset Thinned(const Dataset& d, int m) {
+  Dataset out = d;
+  const auto rows = Eigen::seqN(0, d.samples() / m, m);
+  out.s.t = d.s.t(rows), out.tau = d.tau(rows, Eigen::all);
+  for (auto signal : {&codegen::Signals::q, &codegen::Signals::qd, &codegen::Signals::qdd, &codegen::Signals::temp})
+    if ((d.s.*signal).size() > 0) out.s.*signal = (d.s.*signal)(rows, Eigen::all);
+  out.used = d.used(rows, Eigen::all);
+  for (int k = 1; k < m; ++k) out.used = out.used.cwiseMin(d.used(Eigen::seqN(k, d.samples() / m, m), Eigen::all));
+  return out;
+}
+
+// Joint's used rows of one log, below those that are there.
+void AddRows(const Dataset& data, const MatrixXd& measured, const MatrixXd& instrument, const std::vector<int>& columns,
+             int joint, JointRows& rows) {
+  std::vector<int> used;
+  const auto before = rows.tau.size();
+  for (int k = 0, run = 0; k < data.samples(); ++k) {
+    run = data.used(k, joint) ? run + 1 : 0;
+    if (run == 1) rows.pieces.push_back({before + static_cast<Eigen::Index>(used.size()), 0});
+    if (run > 0) ++rows.pieces.back().count, used.push_back(k);
+  }
+  const auto after = before + static_cast<Eigen::Index>(used.size());
+  rows.X.conservativeResize(after, static_cast<Eigen::Index>(columns.size()));
+  rows.Z.conservativeResize(after, static_cast<Eigen::Index>(columns.size()));
+  rows.tau.conservativeResize(after);
+  rows.X.bottomRows(after - before) = measured(used, columns);
+  rows.Z.bottomRows(after - before) = instrument(used, columns);
+  rows.tau.tail(after - before) = data.tau.col(joint)(used);
 }
 
 Dataset AlongSpline(const Dataset& data, const MatrixXd& q) {
@@ -153,28 +91,17 @@ Exogeneity TestExogeneity(const codegen::Model& model, const std::vector<const D
   const std::span<const double> eta{z.data() + model.columns(), static_cast<std::size_t>(model.nonlinear())};
   std::vector<JointRows> rows(static_cast<std::size_t>(model.joints()));
   for (std::size_t l = 0; l < data.size(); ++l) {
+    // What remembers the samples before has to see them all.
+    const int every = model.states() > 0 ? 1 : std::max(1, static_cast<int>(Rate_Hz(*data[l]) / kEnough_Hz));
+    const Dataset log = Thinned(*data[l], every);
     std::vector<MatrixXd> measured, instrument;
-    model.Regressor(data[l]->s, p, eta, measured);
-    model.Regressor(instruments[l].s, p, eta, instrument);
-    for (std::size_t j = 0; j < rows.size(); ++j) {
-      const int joint = static_cast<int>(j);
-      std::vector<int> used;
-      for (int k = 0, run = 0; k < data[l]->samples(); ++k) {
-        if (data[l]->used(k, joint)) used.push_back(k), rows[j].run.push_back(run++);
-        else run = 0;
-      }
-      const std::vector<int> columns = Present(model, joint);
-      const auto before = rows[j].tau.size(), after = before + static_cast<Eigen::Index>(used.size());
-      rows[j].X.conservativeResize(after, static_cast<Eigen::Index>(columns.size()));
-      rows[j].Z.conservativeResize(after, static_cast<Eigen::Index>(columns.size()));
-      rows[j].tau.conservativeResize(after);
-      rows[j].X.bottomRows(after - before) = measured[j](used, columns);
-      rows[j].Z.bottomRows(after - before) = instrument[j](used, columns);
-      rows[j].tau.tail(after - before) = data[l]->tau.col(joint)(used);
-    }
+    model.Regressor(log.s, p, eta, measured);
+    model.Regressor(Thinned(instruments[l], every).s, p, eta, instrument);
+    for (std::size_t j = 0; j < rows.size(); ++j)
+      AddRows(log, measured[j], instrument[j], Present(model, static_cast<int>(j)), static_cast<int>(j), rows[j]);
   }
   Exogeneity out;
-  for (const JointRows& r : rows) out.joint.push_back(r.tau.size() ? TestJoint(r) : JointExogeneity{});
+  for (const JointRows& r : rows) out.joint.push_back(r.tau.size() ? AugmentedRegression(r) : JointExogeneity{});
   JudgeByHolm(out.joint);
   return out;
 }
@@ -185,17 +112,16 @@ std::vector<Dataset> SimulatedInstruments(const Problem& problem, const VectorXd
   return loop.logs();
 }
 
-std::vector<Dataset> ReferenceInstruments(const std::vector<const Dataset*>& data,
-                                          const std::vector<MatrixXd>& reference) {
+std::vector<Dataset> ReferenceInstruments(const std::vector<const Dataset*>& data) {
   std::vector<Dataset> out;
-  for (std::size_t l = 0; l < data.size(); ++l) out.push_back(AlongSpline(*data[l], reference[l]));
+  for (const Dataset* d : data) out.push_back(AlongSpline(*d, d->reference));
   return out;
 }
 
 std::vector<Dataset> SmoothedInstruments(const std::vector<const Dataset*>& data) {
   std::vector<Dataset> out;
   for (const Dataset* d : data) {
-    const double rate = (d->samples() - 1) / (d->s.t[d->samples() - 1] - d->s.t[0]);
+    const double rate = Rate_Hz(*d);
     MatrixXd q = d->s.q;
     for (int j = 0; j < d->joints(); ++j) {
       const double bandwidth = d->cutoff_Hz.size() > j ? d->cutoff_Hz[j] : 0.4 * rate;

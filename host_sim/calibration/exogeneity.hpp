@@ -38,9 +38,8 @@ Exogeneity TestExogeneity(const codegen::Model& model, const std::vector<const D
 
 // Instruments, best first. Along the simulated loop at z: Problem::closed_loop; InputError where it runs away.
 std::vector<Dataset> SimulatedInstruments(const Problem& problem, const Eigen::VectorXd& z);
-// Along the commanded motion, one [N x n] a log.
-std::vector<Dataset> ReferenceInstruments(const std::vector<const Dataset*>& data,
-                                          const std::vector<Eigen::MatrixXd>& reference);
+// Along the commanded motion, which every log must have.
+std::vector<Dataset> ReferenceInstruments(const std::vector<const Dataset*>& data);
 // Along the measured motion below a fifth of its bandwidth: what is left of the noise there hardly counts.
 std::vector<Dataset> SmoothedInstruments(const std::vector<const Dataset*>& data);
 

@@ -6,6 +6,7 @@
 #include "codegen/src/generator/emit.hpp"
 #include "host_sim/cli/diagnose_batch.hpp"
 #include "host_sim/cli/diagnosis_words.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 #include "host_sim/cli/logs.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/diagnosis/model_file.hpp"
@@ -46,7 +47,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   run->catalogue = LoadCatalogue();
   run->model = std::make_unique<codegen::Model>(codegen::ReadRobot(RobotPath(o.robot)), run->catalogue);
   const codegen::Model& model = *run->model;
-  const LogReader read(model, o.channels);
+  const LogReader read(model, o.channels, o.cutoff_Hz);
   run->train = read.All(o.train);
   const std::vector<calibration::Dataset> narrow = read.Narrow(o.train);
   const auto start = std::chrono::steady_clock::now();
@@ -54,6 +55,11 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
       std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, Pointers(run->train), Pointers(narrow));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const diagnosis::Finding& finding = run->diagnosis->finding();
+
+  Eigen::VectorXd z(model.columns() + model.nonlinear());
+  z << finding.x.head(model.columns()), Eigen::VectorXd::Map(finding.declared.eta.data(), model.nonlinear());
+  const calibration::Exogeneity exogeneity =
+      CheckExogeneity(model, run->diagnosis->WithoutTerms(), z, Instruments::kCommanded);
 
   // The model is written, and its hash taken, before the held-out log is opened.
   std::string provenance = "Train:", model_hash;
@@ -71,12 +77,14 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   if (!o.model_out.empty() && after_test != before_test)
     io::AtomicWrite(o.model_out, after_test);  // what was not confirmed is taken out
 
-  run->view = {&model, &finding, &run->test, &run->held_out, run->diagnosis->TermTorque(run->test), seconds, {}};
+  run->view = {&model,  &finding,   &run->test, &run->held_out, run->diagnosis->TermTorque(run->test),
+               seconds, exogeneity, {}};
   for (const diagnosis::Term& t : finding.terms)
-    run->view.separation.push_back(Separations(t, model, run->catalogue, o.robot));
+    run->view.separation.push_back(Separations(t, finding, model, run->catalogue, o.robot, o.json));
   nlohmann::ordered_json& json = run->json;
   json = DiagnosisJson(run->view);
   json["provenance"] = provenance;
+  for (const calibration::Dataset& log : run->train) json["cutoff_Hz"].push_back(ToList(log.cutoff_Hz));
   if (!o.model_out.empty()) {
     // The same schema: a table can switch the terms on. Another one: the model must be generated and the drive built.
     const codegen::Model next(codegen::ReadRobot(o.model_out), run->catalogue);
@@ -126,6 +134,7 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--train", o->train, "log(s) on which everything is decided");
   verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  AddCutoff(*verb, o->cutoff_Hz);
   verb->add_option("--json", o->json, "write the verdict here");
   verb->add_option("--report", o->report, "write a self-contained page here");
   verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");

@@ -123,7 +123,7 @@ int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch) {
   Check(one, batch);
   if (!batch.splits.empty()) return RunSplits(one, batch);
   const Verdicts verdicts = batch.summary.empty() ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part),
-                                                                one.channels, batch.out, batch.jobs)
+                                                                one, batch.out, batch.jobs)
                                                   : Collect(batch, one);
   const nlohmann::ordered_json summary = SummaryJson(verdicts);
   fmt::print("{}", SummaryText(summary));

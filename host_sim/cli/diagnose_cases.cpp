@@ -24,7 +24,7 @@ std::string Reason(const fs::path& log, int code) {
   return last.starts_with(mark) ? last.substr(mark.size()) : fmt::format("ended with code {}", code);
 }
 
-nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const std::string& channels, const fs::path& out) {
+nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& one, const fs::path& out) {
   const auto file = [&](const char* end) { return (out / (c.name + end)).string(); };
   for (const char* end : {".json", ".html", ".toml", ".log"}) fs::remove(file(end));
   std::string why = c.train.empty()   ? "no train log"
@@ -39,7 +39,8 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const std::string& chann
     };
     add("--train", c.train), add("--test", c.test);
     add("--json", {file(".json")}), add("--report", {file(".html")}), add("--model-out", {file(".toml")});
-    if (!channels.empty()) add("--channels", {channels});
+    if (!one.channels.empty()) add("--channels", {one.channels});
+    if (one.cutoff_Hz > 0) add("--cutoff", {fmt::format("{}", one.cutoff_Hz)});
     const int code = RunProgram(words, file(".log"));
     if (code == kOk) return ReadVerdict(file(".json"));
     why = Reason(file(".log"), code);
@@ -50,7 +51,7 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const std::string& chann
 
 }  // namespace
 
-Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const std::string& channels, const fs::path& out,
+Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const DiagnoseOptions& one, const fs::path& out,
                      int jobs) {
   fs::create_directories(out);
   Verdicts verdicts;
@@ -58,7 +59,7 @@ Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const std::string&
   std::mutex mutex;
   search::InParallel(static_cast<int>(cases.size()), jobs, [&](int k) {
     const DiagnosisCase& c = cases[static_cast<std::size_t>(k)];
-    const nlohmann::ordered_json verdict = Diagnose(c, channels, out);
+    const nlohmann::ordered_json verdict = Diagnose(c, one, out);
     const std::lock_guard lock(mutex);
     verdicts[c.name] = verdict;
     progress.Set(static_cast<double>(verdicts.size()) / static_cast<double>(cases.size()));

@@ -17,8 +17,8 @@ struct DiagnosisCase {
   std::string robot;
 };
 
-// NAME.json, .html, .toml and .log of each case go to `out`. jobs: at a time; 0: one a core.
-Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const std::string& channels,
+// NAME.json, .html, .toml and .log of each case go to `out`. one: how each log is read. jobs: at a time; 0: one a core.
+Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const DiagnoseOptions& one,
                      const std::filesystem::path& out, int jobs);
 
 }  // namespace armcal::cli

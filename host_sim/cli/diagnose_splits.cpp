@@ -49,7 +49,7 @@ std::vector<DiagnosisCase> MakeSplits(const std::vector<std::string>& groups, co
 
 int RunSplits(const DiagnoseOptions& one, const BatchOptions& options) {
   const std::vector<DiagnosisCase> cases = MakeSplits(options.splits, one.robot);
-  const Verdicts verdicts = DiagnoseAll(cases, one.channels, options.out, options.jobs);
+  const Verdicts verdicts = DiagnoseAll(cases, one, options.out, options.jobs);
   const Agreed agreed = Agree(verdicts);
   fmt::print("{}", SplitsText(verdicts, agreed));
   nlohmann::ordered_json json = SplitsJson(verdicts, agreed);

@@ -1,5 +1,6 @@
 // cli - a diagnosis as JSON.
 #include "host_sim/cli/diagnosis_words.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 #include "host_sim/cli/logs.hpp"
 
 namespace armcal::cli {
@@ -20,6 +21,16 @@ std::vector<std::string> Signals(const Term& t) {
   return out;
 }
 
+nlohmann::ordered_json RefutedJson(const diagnosis::Refutation& why) {
+  nlohmann::ordered_json out;
+  if (why.joint < 0) out["joint"] = "all";
+  else out["joint"] = why.joint + 1;
+  out["without_it"] = why.beside_others ? "the other terms" : "the declared model";
+  out["factor"] = why.factor;
+  out["rms_with"] = ToList(why.with), out["rms_without"] = ToList(why.without);
+  return out;
+}
+
 }  // namespace
 
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
@@ -33,6 +44,10 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     nlohmann::ordered_json term{{"kind", t.record->kind}, {"record", t.record->name}, {"class", t.record->kind_class}};
     if (t.joints.size() == 1 || IsUnknown(t)) term["joint"] = t.joints[0] + 1;
     else term["joint"] = JointName(t);
+    const codegen::EffectUse use = Found(t);
+    term["joints"] = nlohmann::ordered_json::array();
+    for (const int joint : use.joints) term["joints"].push_back(joint + 1);
+    term["unknowns"] = use.nonlinear;
     term["signals"] = Signals(t);
     nlohmann::ordered_json parameters, deviations;
     for (std::size_t k = 0; k < t.eta.size(); ++k) {
@@ -46,6 +61,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["parameter_sd"] = deviations;
     term["also_fits"] = t.also_fits;
     term["confirmed"] = t.confirmed;
+    if (t.refuted) term["refuted"] = RefutedJson(*t.refuted);
     if (t.confirmed && !t.training_only) {
       const Dependence d = DependenceOf(v, n);
       term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true));
@@ -77,6 +93,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["noise_innovation"] = ToList(f.innovation);
   j["smallest_detectable"] = ToList(f.smallest);
   if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
+  j["exogeneity"] = ToJson(v.exogeneity);
   j["seconds"] = v.seconds;
   return j;
 }

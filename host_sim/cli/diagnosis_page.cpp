@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_sim/cli/diagnosis_words.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 #include "host_sim/report/axis.hpp"
 
 namespace armcal::cli {
@@ -61,12 +62,15 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
                           report::Number(am[j]), report::Number(f.sigma[j]), report::Number(f.smallest[j])});
   page.Add(table);
   if (!v.held_out->tracking.empty()) page.Text(v.held_out->tracking + ".");
+  page.Section("Exogeneity");
+  page.Text("A Durbin-Wu-Hausman test on the training logs, with the terms in the model.");
+  page.Code(ExogeneityText(v.exogeneity, kLacksMore));
   for (std::size_t k = 0; k < f.terms.size(); ++k) {
     const Term& t = f.terms[k];
     page.Section(fmt::format("{}, joint {}", t.record->kind, JointName(t)));
     page.Text(t.record->title + ". " + t.record->source + ".");
     page.Facts({{"parameters", Parameters(t)},
-                {"in the new model", InTheModel(t)},
+                {"in the new model", InTheModel(t, v.model->robot())},
                 {"score", ScoreText(t)},
                 {"folds", FoldText(t)},
                 {"runner-up", RunnerUp(t)},

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include "host_sim/cli/diagnosis_words.hpp"
+#include "host_sim/cli/exogeneity.hpp"
 
 namespace armcal::cli {
 
@@ -15,6 +16,7 @@ std::string DiagnosisText(const DiagnosisView& v) {
     const Term& t = v.finding->terms[k];
     out += fmt::format("  {}, joint {}{}: {}\n", t.record->kind, JointName(t), Remark(t), t.record->title);
     if (t.confirmed) out += fmt::format("    {}\n", Parameters(t));
+    else out += fmt::format("    refuted on the held-out log: {}\n", WhyRefuted(t, v.model->robot()));
     out += fmt::format("    score {}; {}\n", ScoreText(t), FoldText(t));
     out += fmt::format("    runner-up: {}; fits equally: {}\n", RunnerUp(t), AlsoFits(t));
     for (const Separation& s : v.separation[k]) {
@@ -23,7 +25,7 @@ std::string DiagnosisText(const DiagnosisView& v) {
     }
     if (t.confirmed && !t.record->on_target) out += fmt::format("    {}\n", t.record->remedy);
   }
-  return out;
+  return out + ExogeneityText(v.exogeneity, kLacksMore);
 }
 
 }  // namespace armcal::cli

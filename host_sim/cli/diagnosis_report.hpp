@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_sim/calibration/exogeneity.hpp"
 #include "host_sim/diagnosis/diagnose.hpp"
 #include "host_sim/report/page.hpp"
 
@@ -25,12 +26,14 @@ struct DiagnosisView {
   const diagnosis::HeldOut* held_out = nullptr;
   std::vector<Eigen::MatrixXd> term_torque;  // on the test log
   double seconds = 0;
+  calibration::Exogeneity exogeneity;               // of the training logs, with the terms in
   std::vector<std::vector<Separation>> separation;  // per term
 };
 
 struct DiagnoseOptions {
   std::string robot, channels, test, json, report, model_out;
   std::vector<std::string> train;
+  double cutoff_Hz = 0;
 };
 
 // One diagnosis from files to files, with everything its view refers to.

@@ -94,8 +94,23 @@ std::string AlsoFits(const Term& t) {
   return t.also_fits.empty() ? "nothing else in the catalogue" : fmt::format("{}", fmt::join(t.also_fits, ", "));
 }
 
-std::vector<Separation> Separations(const Term& t, const codegen::Model& model, const codegen::Catalogue& records,
-                                    const std::string& robot) {
+codegen::EffectUse Found(const Term& t) {
+  codegen::EffectUse use;
+  use.effect = t.record->name, use.joints = t.joints;
+  for (std::size_t k = 0; k < t.eta.size(); ++k) use.nonlinear.emplace(t.unknowns[k].key, t.eta[k]);
+  return use;
+}
+
+std::vector<Separation> Separations(const Term& t, const diagnosis::Finding& finding, const codegen::Model& model,
+                                    const codegen::Catalogue& records, const std::string& robot,
+                                    const std::string& verdict) {
+  std::vector<codegen::EffectUse> found;
+  for (const Term& term : finding.terms)
+    if (!term.eta.empty() && !verdict.empty()) found.push_back(Found(term));
+  const auto is_found = [&](const codegen::EffectRecord& record, const std::vector<int>& joints) {
+    return std::any_of(found.begin(), found.end(),
+                       [&](const auto& use) { return use.effect == record.name && use.joints == joints; });
+  };
   std::vector<Separation> out;
   for (const Rival& rival : t.rivals) {
     if (Apart(t.joints, rival.joints) || (rival.record == t.record && rival.joints == t.joints)) continue;
@@ -104,15 +119,31 @@ std::vector<Separation> Separations(const Term& t, const codegen::Model& model, 
     if (other != s.how && !other.empty()) s.how += (s.how.empty() ? "" : "; ") + other;
     if (s.how.empty()) s.how = "motion in which what they depend on does not go together";
     const std::string one = Asked(*t.record, t.joints), another = Asked(*rival.record, rival.joints);
-    if (excitation::CanSeparate(model.robot(), records, {one, another}))
-      s.command = fmt::format("armcal excite --separate {},{} --robot {} --out separate.csv", one, another, robot);
+    if (excitation::CanSeparate(model.robot(), records, {one, another}, found)) {
+      s.command = fmt::format("armcal excite --separate {},{}", one, another);
+      if (is_found(*t.record, t.joints) || is_found(*rival.record, rival.joints)) s.command += " --from " + verdict;
+      s.command += fmt::format(" --robot {} --out separate.csv", robot);
+    }
     out.push_back(s);
   }
   return out;
 }
 
-std::string InTheModel(const Term& t) {
-  if (!t.confirmed) return "left out: the held-out log did not bear it out";
+std::string WhyRefuted(const Term& t, const codegen::Robot& robot) {
+  const diagnosis::Refutation& why = *t.refuted;
+  const char* without = why.beside_others ? "with the other terms alone" : "by the declared model";
+  if (why.joint < 0)
+    return fmt::format(
+        "all joints together are predicted worse with it than {}: the product of their errors is {:.4g} "
+        "times as large",
+        without, why.factor);
+  const bool slides = robot.joint[why.joint].kinematics.type == codegen::JointType::kPrismatic;
+  return fmt::format("joint {} is predicted worse with it than {}: {:.4g} instead of {:.4g} {}", why.joint + 1, without,
+                     why.with[why.joint], why.without[why.joint], slides ? "N" : "N m");
+}
+
+std::string InTheModel(const Term& t, const codegen::Robot& robot) {
+  if (!t.confirmed) return "left out; refuted on the held-out log: " + WhyRefuted(t, robot);
   return t.record->on_target ? "yes, as an estimated effect" : "no model can hold it: " + t.record->remedy;
 }
 

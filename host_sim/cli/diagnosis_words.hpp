@@ -33,14 +33,22 @@ std::string RivalName(const diagnosis::Rival& rival);
 std::string RunnerUp(const diagnosis::Term& t);
 std::string AlsoFits(const diagnosis::Term& t);
 
-// robot: as the user named the model's robot file.
-std::vector<Separation> Separations(const diagnosis::Term& t, const codegen::Model& model,
-                                    const codegen::Catalogue& records, const std::string& robot);
+// The term as a robot file would use its record, with the nonlinear parameters that were found; of several uses the
+// first.
+codegen::EffectUse Found(const diagnosis::Term& t);
+
+// Of one term of the finding. robot, verdict: as the user named the robot file and the JSON, which may be empty.
+std::vector<Separation> Separations(const diagnosis::Term& t, const diagnosis::Finding& finding,
+                                    const codegen::Model& model, const codegen::Catalogue& records,
+                                    const std::string& robot, const std::string& verdict);
 
 // What the words say where there is no command.
 inline constexpr const char* kNoMotion = "armcal excite cannot search a motion for it";
 
+// "joint 3 is predicted worse with it than by the declared model: 0.412 instead of 0.398 N m"; of one not confirmed.
+std::string WhyRefuted(const diagnosis::Term& t, const codegen::Robot& robot);
+
 // What the new model file makes of the term.
-std::string InTheModel(const diagnosis::Term& t);
+std::string InTheModel(const diagnosis::Term& t, const codegen::Robot& robot);
 
 }  // namespace armcal::cli

@@ -7,6 +7,7 @@
 
 #include "host_sim/cli/interrupt.hpp"
 #include "host_sim/cli/verb.hpp"
+#include "host_sim/cli/verdict_file.hpp"
 #include "host_sim/excitation/compose.hpp"
 #include "host_sim/excitation/optimise.hpp"
 #include "host_sim/excitation/target.hpp"
@@ -15,7 +16,8 @@ namespace armcal::cli {
 namespace {
 
 struct Options {
-  std::string robot, out, json, purpose = "train", curve = "fourier", criterion = "condition", search = "gradient";
+  std::string robot, out, json, from;
+  std::string purpose = "train", curve = "fourier", criterion = "condition", search = "gradient";
   std::vector<std::string> separate;
   std::uint64_t seed = 1;
   int periods = 0, harmonics = 5, starts = 0;
@@ -28,7 +30,7 @@ constexpr int kTrainPeriods = 4, kTestPeriods = 2, kTrainSpeeds = 6, kTestSpeeds
 excitation::Target MakeTarget(const codegen::Robot& robot, const Options& o) {
   using Kind = excitation::Criterion::Kind;
   const codegen::Catalogue records = LoadCatalogue();
-  if (!o.separate.empty()) return {robot, records, o.separate};
+  if (!o.separate.empty()) return {robot, records, o.separate, ReadFound(o.from, o.separate)};
   if (o.criterion == "friction") return excitation::Target::Friction(robot, records);
   return {robot, records, o.criterion == "d-optimal" ? Kind::kDOptimal : Kind::kCondition};
 }
@@ -52,7 +54,7 @@ excitation::Optimum Search(const excitation::Target& target, const Options& o) {
       fmt::print(stderr, "\r{} searches, {} {:.4g}  ", starts, excitation::Name(target.criterion().kind), figure);
     };
   const InterruptGuard guard;
-  const excitation::Optimum best = Optimise(target.observation(), s);
+  excitation::Optimum best = Optimise(target.observation(), s);
   if (s.progress) fmt::print(stderr, "\n");
   return best;
 }
@@ -217,9 +219,12 @@ void AddExcite(CLI::App& app, Action& action) {
                        "condition: cond(K); d-optimal: det(K'K); friction: accuracy of friction, low speeds included")
           ->check(CLI::IsMember({"condition", "d-optimal", "friction"}))
           ->capture_default_str();
-  verb->add_option("--separate", o->separate, "effects to tell apart: record, record:joint or record:joint-joint, ...")
-      ->delimiter(',')
-      ->excludes(criterion);
+  auto* separate = verb->add_option("--separate", o->separate,
+                                    "effects to tell apart: record, record:joint or record:joint-joint, ...")
+                       ->delimiter(',')
+                       ->excludes(criterion);
+  verb->add_option("--from", o->from, "with --separate: verdict (diagnose --json) with what was found of them")
+      ->needs(separate);
   verb->add_option("--search", o->search, "gradient, or the survey's genetic algorithm")
       ->check(CLI::IsMember({"gradient", "genetic"}))
       ->capture_default_str();

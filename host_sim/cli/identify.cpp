@@ -17,7 +17,7 @@ struct Options {
   std::string robot, channels, table, json, test, method;
   std::vector<std::string> train;
   bool force = false;
-  double band_Hz = 0;
+  double band_Hz = 0, cutoff_Hz = 0;
   PayloadOptions payload;
 };
 
@@ -58,15 +58,16 @@ int Run(const Options& o) {
       throw io::InputError("--with, --without: expected no --train, --test or --method beside them");
     PayloadOptions payload = o.payload;
     payload.robot = o.robot, payload.channels = o.channels, payload.table = o.table, payload.json = o.json;
+    payload.cutoff_Hz = o.cutoff_Hz;
     return RunPayload(payload);
   }
   if (o.train.empty()) throw io::InputError("--train: expected log(s) to fit");
   if (!o.method.empty() && !o.table.empty())
     throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
-  MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, {}};
+  MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, o.cutoff_Hz, {}};
   if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
-  const LogReader read(model, o.channels);
+  const LogReader read(model, o.channels, o.cutoff_Hz);
   std::vector<calibration::Dataset> train = read.All(o.train);
   const calibration::Fit all = calibration::WeightedFit(model, Pointers(train));
   PrintColumns(model, all);
@@ -75,8 +76,9 @@ int Run(const Options& o) {
     json["sigma_Nm"].push_back(all.sigma[j]);
     json["torque_gain"].push_back(1 + all.x[model.columns() + j]);
   }
-  const calibration::Exogeneity exogeneity = CheckExogeneity(model, read, o.train, train, Unknowns(model, all));
-  fmt::print("{}", ExogeneityText(exogeneity));
+  const calibration::Exogeneity exogeneity =
+      CheckExogeneity(model, train, Unknowns(model, all), Instruments::kSimulated);
+  fmt::print("{}", ExogeneityText(exogeneity, "the model lacks a term: armcal diagnose"));
   json["exogeneity"] = ToJson(exogeneity);
   if (o.method == "auto" && !exogeneity.passed() && exogeneity.instruments == kSimulatedLoop) {
     method.method = "instrumental_variable", method.exogeneity = json["exogeneity"];
@@ -144,6 +146,7 @@ void AddIdentify(CLI::App& app, Action& action) {
   verb->add_option(
       "--band", o->band_Hz,
       "also compare in the band below this frequency (Hz): residual and torque through the same zero-phase filter");
+  AddCutoff(*verb, o->cutoff_Hz);
   verb->add_flag("--force", o->force, "let parameters move that the data hardly determine");
   verb->add_option("--json", o->json, "write everything here");
   AddPayloadOptions(*verb, o->payload);

@@ -31,14 +31,9 @@ nlohmann::ordered_json PrintUnknowns(const codegen::Model& model, const calibrat
 }
 
 // The arm under its control law along what the logs say was commanded; empty where that is not known.
-calibration::ClosedLoop Loop(const codegen::Model& model, const LogReader& read, const std::vector<std::string>& paths,
-                             const std::vector<calibration::Dataset>& data) {
-  std::map<std::string, Eigen::MatrixXd> reference;
-  for (std::size_t k = 0; k < paths.size(); ++k) {
-    const io::Log log = read.Raw(paths[k]);
-    if (log.qref.size() == 0 || model.robot().control.structure.empty()) return {};
-    reference.emplace(data[k].source, log.qref);
-  }
+calibration::ClosedLoop Loop(const codegen::Model& model, const std::vector<calibration::Dataset>& data) {
+  const std::map<std::string, Eigen::MatrixXd> reference = References(data);
+  if (reference.empty() || model.robot().control.structure.empty()) return {};
   return calibration::MakeClosedLoop(model, reference);
 }
 
@@ -62,10 +57,10 @@ std::string RangesFromLeastSquares(calibration::Problem& problem) {
 int RunMethod(const MethodOptions& o) {
   const calibration::Method& method = calibration::FindMethod(o.method);
   const codegen::Model model = LoadModel(o.robot);
-  const LogReader read(model, o.channels);
+  const LogReader read(model, o.channels, o.cutoff_Hz);
   const std::vector<calibration::Dataset> train = read.All(o.train);
   calibration::Problem problem = calibration::MakeProblem(model, Pointers(train));
-  if (method.needs_loop) problem.closed_loop = Loop(model, read, o.train, train);
+  if (method.needs_loop) problem.closed_loop = Loop(model, train);
   const std::string ranges =
       method.needs_ranges && !model.robot().has_prior ? RangesFromLeastSquares(problem) : std::string();
   if (!ranges.empty()) fmt::print("{}\n", ranges);

@@ -11,7 +11,7 @@ namespace armcal::cli {
 struct MethodOptions {
   std::string robot, method, channels, test, json;
   std::vector<std::string> train;
-  double band_Hz = 0;
+  double band_Hz = 0, cutoff_Hz = 0;
   nlohmann::ordered_json exogeneity;  // the test that chose the method, for the JSON; null: it was asked for
 };
 

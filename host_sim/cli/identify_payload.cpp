@@ -140,7 +140,7 @@ void AddPayloadOptions(CLI::App& verb, PayloadOptions& o) {
 int RunPayload(const PayloadOptions& o) {
   Check(o);
   const codegen::Model model = LoadModel(o.robot);
-  const LogReader read(model, o.channels);
+  const LogReader read(model, o.channels, o.cutoff_Hz);
   return o.payload.empty() ? RunLoad(o, model, read) : RunGains(o, model, read);
 }
 

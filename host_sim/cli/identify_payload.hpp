@@ -12,6 +12,7 @@ namespace armcal::cli {
 struct PayloadOptions {
   std::string robot, channels, payload, payload_out, table, json;
   std::vector<std::string> with, without;
+  double cutoff_Hz = 0;
   bool asked() const { return !with.empty() || !without.empty() || !payload.empty() || !payload_out.empty(); }
 };
 

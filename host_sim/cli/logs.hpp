@@ -1,19 +1,23 @@
 // cli - logs made ready for a model, and the error on a held-out one; knows no method.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "host_sim/calibration/dataset.hpp"
+#include "host_sim/cli/verb.hpp"
 
 namespace armcal::cli {
 
 class LogReader {
  public:
-  // channels: path of a channel map, empty for our own column names.
-  LogReader(const codegen::Model& model, std::string channels) : model_(model), channels_(std::move(channels)) {}
+  // channels: path of a channel map, empty for our own column names. cutoff_Hz: of the derived speeds; 0: chosen for
+  // each log.
+  LogReader(const codegen::Model& model, std::string channels, double cutoff_Hz = 0)
+      : model_(model), channels_(std::move(channels)), cutoff_Hz_(cutoff_Hz) {}
   io::Log Raw(const std::string& path) const;
   // Throws io::InputError where a log cannot be one of this arm; what is worth a line goes to stderr.
   calibration::Dataset One(const std::string& path) const;
@@ -26,7 +30,14 @@ class LogReader {
 
   const codegen::Model& model_;
   std::string channels_;
+  double cutoff_Hz_;
 };
+
+// Adds --cutoff: what is no frequency is refused in one line.
+void AddCutoff(CLI::App& verb, double& cutoff_Hz);
+
+// Commanded positions by the log's name; empty unless every log has them.
+std::map<std::string, Eigen::MatrixXd> References(const std::vector<calibration::Dataset>& data);
 
 std::vector<const calibration::Dataset*> Pointers(const std::vector<calibration::Dataset>& data);
 

@@ -71,22 +71,32 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
   return left;
 }
 
+// Whether these errors with a term refute it beside those without it: those of a joint of its own, or all together.
+std::optional<Refutation> Worse(const Chosen& term, const VectorXd& with, const VectorXd& without) {
+  const VectorXd change = (with.array().max(1e-12) / without.array().max(1e-12)).log();
+  const auto& own = term.candidate->rows();
+  const auto worst = std::max_element(own.begin(), own.end(), [&](int a, int b) { return change[a] < change[b]; });
+  if (worst != own.end() && change[*worst] > std::log(kWorse))
+    return Refutation{*worst, false, std::exp(change[*worst]), with, without};
+  // All joints: the base fit moves with every term, and where more is missing one joint's gain is another's loss.
+  if (change.sum() > std::log(kWorse)) return Refutation{-1, false, std::exp(change.sum()), with, without};
+  return {};
+}
+
 // The weakest term that makes a joint of its own worse, or all joints together: than the declared model is, or than the
 // other terms that could tell its cause are without it. A delay is judged with all others, which were found on logs
 // that it had aligned.
-Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after) {
+Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after,
+                std::optional<Refutation>& why) {
   for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
     if (!c->confirmed || c->candidate->is_event()) continue;
-    const auto is_worse_than = [&](const VectorXd& error) {
-      const auto& rows = c->candidate->rows();
-      const bool own = std::any_of(rows.begin(), rows.end(), [&](int j) { return after[j] > kWorse * error[j]; });
-      // All joints: the base fit moves with every term, and where more is missing one joint's gain is another's loss.
-      return own || (after.array().max(1e-12) / error.array().max(1e-12)).log().sum() > std::log(kWorse);
-    };
-    if (is_worse_than(before)) return &*c;
+    if ((why = Worse(*c, after, before))) return &*c;
     const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
     if (others.empty() || c->delay_s != 0) continue;
-    if (is_worse_than(calibration::Rms(log, Leaves(w, others, log), true))) return &*c;
+    if ((why = Worse(*c, after, calibration::Rms(log, Leaves(w, others, log), true)))) {
+      why->beside_others = true;
+      return &*c;
+    }
   }
   return nullptr;
 }
@@ -149,8 +159,8 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
     w.Polish();
   }
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
-    if (w.chosen[k].delay_s != 0) ++k;  // the logs are as it says now
-    else if (select.StillEarns(w.chosen[k], Rivals(w.chosen, w.chosen[k]))) ++k;
+    // A delay stays: the logs are as it says now.
+    if (w.chosen[k].delay_s != 0 || select.StillEarns(w.chosen[k], Rivals(w.chosen, w.chosen[k]))) ++k;
     else w.chosen.erase(w.chosen.begin() + static_cast<long>(k));
   }
   std::sort(w.chosen.begin(), w.chosen.end(),
@@ -172,16 +182,21 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   HeldOut out;
   out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
   const VectorXd before = calibration::Rms(test, out.before, true);
+  std::vector<std::optional<Refutation>> why;
+  for (const Term& t : finding_.terms) why.push_back(t.refuted);
   for (;;) {
     out.after = Leaves(w, Confirmed(w.chosen), test, &out.tracking);
     Work::Estimate with_all = w.estimate;
-    Chosen* refuted = Refuted(w, test, before, calibration::Rms(test, out.after, true));
+    std::optional<Refutation> reason;
+    Chosen* refuted = Refuted(w, test, before, calibration::Rms(test, out.after, true), reason);
     w.estimate = std::move(with_all);
     if (!refuted) break;
     refuted->confirmed = false;
+    why[static_cast<std::size_t>(refuted - w.chosen.data())] = reason;
     w.AlignLogs();
   }
   WriteTerms(w, finding_);
+  for (std::size_t k = 0; k < why.size(); ++k) finding_.terms[k].refuted = why[k];
   return out;
 }
 
@@ -198,6 +213,20 @@ std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) co
     const VectorXd& amplitude = w.estimate.amplitude[k++];
     if (!c.candidate->is_event()) out.back() = CandidateTorque(*c.candidate, q, c.eta, amplitude);
     if (c.delay_s != 0) out.back() += q.tau_model - calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
+  }
+  return out;
+}
+
+std::vector<calibration::Dataset> Diagnosis::WithoutTerms() const {
+  const Work& w = *work_;
+  const std::vector<const Chosen*> terms = Confirmed(w.chosen);
+  std::vector<calibration::Dataset> out;
+  for (const calibration::Dataset* log : w.train) {
+    out.push_back(*log);
+    if (terms.empty()) continue;
+    const Quantities q = MakeQuantities(model_, w.arm, *log, w.estimate.x, w.declared.eta, w.needs_flange);
+    for (std::size_t k = 0; k < terms.size(); ++k)
+      out.back().tau -= CandidateTorque(*terms[k]->candidate, q, terms[k]->eta, w.estimate.amplitude[k]);
   }
   return out;
 }

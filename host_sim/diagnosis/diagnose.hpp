@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,14 @@ struct Rival {
   double score = 0;
 };
 
+// How a held-out log refuted a term: who is predicted worse with it than without it.
+struct Refutation {
+  int joint = -1;                 // 0-based, of the term's own the one that got worst; -1: all joints together
+  bool beside_others = false;     // without it: the other terms alone; false: the declared model
+  double factor = 1;              // by which it makes the joint's error, or the product of all errors, larger
+  Eigen::VectorXd with, without;  // [n] RMS of measured minus predicted torque where the joint moves
+};
+
 struct Term {
   const codegen::EffectRecord* record = nullptr;
   std::vector<int> joints;                     // 0-based; empty: the whole arm or its flange
@@ -34,6 +43,7 @@ struct Term {
   std::vector<Rival> rivals;           // the runner-up, then those of also_fits that are not it
   bool training_only = false;          // an event of the training log: it says nothing about the arm or another log
   bool confirmed = true;               // false: the held-out log did not bear it out
+  std::optional<Refutation> refuted;   // why it is not confirmed
 };
 
 struct Finding {
@@ -62,13 +72,16 @@ class Diagnosis {
 
   const Finding& finding() const { return finding_; }
 
-  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint of their own by more than
-  // 0.5 % or another one by more than 2 %, against the declared model or against the other terms, as not confirmed and
-  // leaves them out of `after`; kinds and nonlinear parameters do not change.
+  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint of their own, or the product
+  // of all joints' errors, by more than 0.5 %, against the declared model or against the other terms, as not confirmed,
+  // says why, and leaves them out of `after`; kinds and nonlinear parameters do not change.
   HeldOut Judge(const calibration::Dataset& test);
 
   // One N x n torque a term on a log (run-state terms: as windows of that log's own time would give).
   std::vector<Eigen::MatrixXd> TermTorque(const calibration::Dataset& data) const;
+
+  // The training logs as the declared model alone should explain them: aligned, the torque of the terms taken off.
+  std::vector<calibration::Dataset> WithoutTerms() const;
 
  private:
   const codegen::Model& model_;

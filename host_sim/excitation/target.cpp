@@ -32,8 +32,9 @@ Wanted Parse(const std::string& name) {
   return wanted;
 }
 
-// Instances that the robot has already keep their values.
-void Estimate(const codegen::EffectRecord& record, const std::vector<int>& joints, codegen::Robot& robot) {
+// Instances that the robot has already keep their values, unless others were found.
+void Estimate(const codegen::EffectRecord& record, const std::vector<int>& joints,
+              const std::vector<codegen::EffectUse>& found, codegen::Robot& robot) {
   codegen::EffectUse use;
   use.effect = record.name;
   for (const codegen::EffectUse& known : robot.effect)
@@ -41,12 +42,15 @@ void Estimate(const codegen::EffectRecord& record, const std::vector<int>& joint
         (known.joints == joints ||
          (record.scope == "joint" && std::count(known.joints.begin(), known.joints.end(), joints[0]) > 0)))
       use = known;
+  for (const codegen::EffectUse& f : found)
+    if (f.effect == record.name && f.joints == joints) use.nonlinear = f.nonlinear;
   use.joints = joints;
   use.state = "estimated";
   robot.effect.push_back(use);
 }
 
-void Add(const std::string& name, const codegen::Catalogue& records, codegen::Robot& robot) {
+void Add(const std::string& name, const codegen::Catalogue& records, const std::vector<codegen::EffectUse>& values,
+         codegen::Robot& robot) {
   const Wanted wanted = Parse(name);
   const auto record = records.find(wanted.record);
   if (record == records.end()) throw io::InputError(name + ": expected the name of an effect record");
@@ -54,7 +58,7 @@ void Add(const std::string& name, const codegen::Catalogue& records, codegen::Ro
   bool found = false;
   for (const std::vector<int>& joints : codegen::JointSets(record->second, robot.joints())) {
     if (!wanted.joints.empty() && joints != wanted.joints) continue;
-    Estimate(record->second, joints, robot);
+    Estimate(record->second, joints, values, robot);
     found = true;
   }
   if (!found)
@@ -88,10 +92,11 @@ Target::Target(const codegen::Robot& robot, const codegen::Catalogue& records, C
       observation_(std::make_unique<Observation>(*model_)),
       criterion_{kind, {}} {}
 
-Target::Target(codegen::Robot robot, const codegen::Catalogue& records, const std::vector<std::string>& effects) {
+Target::Target(codegen::Robot robot, const codegen::Catalogue& records, const std::vector<std::string>& effects,
+               const std::vector<codegen::EffectUse>& found) {
   std::vector<std::string> asked;  // as Places has them: several joints share a column that belongs to none of them
   for (const std::string& name : effects) {
-    Add(name, records, robot);
+    Add(name, records, found, robot);
     const Wanted wanted = Parse(name);
     asked.push_back(wanted.joints.size() > 1 ? wanted.record : name);
   }
@@ -115,9 +120,9 @@ Target Target::Friction(const codegen::Robot& robot, const codegen::Catalogue& r
 }
 
 bool CanSeparate(const codegen::Robot& robot, const codegen::Catalogue& records,
-                 const std::vector<std::string>& effects) {
+                 const std::vector<std::string>& effects, const std::vector<codegen::EffectUse>& found) {
   try {
-    const Target target(robot, records, effects);
+    const Target target(robot, records, effects, found);
     return std::isfinite(Figure(target.criterion(), target.observation().Gram(AnyStates(robot))));
   } catch (const io::InputError&) {  // motion alone does not show one of them
     return false;

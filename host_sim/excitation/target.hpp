@@ -15,9 +15,11 @@ class Target {
  public:
   // The robot's own parameters, all of them.
   Target(const codegen::Robot& robot, const codegen::Catalogue& records, Criterion::Kind kind);
-  // effects: to be told apart and from all else: "record" (every joint), "record:2", "record:1-2". InputError: no such
-  // record or joints, or one whose column motion alone does not show.
-  Target(codegen::Robot robot, const codegen::Catalogue& records, const std::vector<std::string>& effects);
+  // effects: to be told apart and from all else: "record" (every joint), "record:2", "record:1-2". found: uses whose
+  // nonlinear parameters are known; those of the others are the robot's or the record's. InputError: no such record or
+  // joints, or one whose column motion alone does not show.
+  Target(codegen::Robot robot, const codegen::Catalogue& records, const std::vector<std::string>& effects,
+         const std::vector<codegen::EffectUse>& found = {});
   // Every parameter of friction, and a Stribeck term on every joint: it shows where low speeds do.
   static Target Friction(const codegen::Robot& robot, const codegen::Catalogue& records);
 
@@ -32,7 +34,7 @@ class Target {
 
 // Some motion within the limits of speed and acceleration tells these effects from each other and from all else.
 bool CanSeparate(const codegen::Robot& robot, const codegen::Catalogue& records,
-                 const std::vector<std::string>& effects);
+                 const std::vector<std::string>& effects, const std::vector<codegen::EffectUse>& found = {});
 
 // "cond(K)", ...
 const char* Name(Criterion::Kind kind);

@@ -1,6 +1,8 @@
 // io - the derivation of speed and acceleration; knows no model.
 #include "host_sim/io/signals.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -25,8 +27,9 @@ constexpr double kHighest_Hz = 60;  // above, the current loop no longer follows
 constexpr double kHighestOfRate = 0.4;   // the filter needs room below half the rate
 constexpr double kShareOfJitter = 0.07;  // encoder noise adds 0.25 % to the torque's noise power at this share
 constexpr double kShareOfWidth =
-    0.05;                       // friction is a hundred times the noise, and a slow joint is within the width often
-constexpr double kWideGap = 5;  // sample times over which a spline may still bridge
+    0.05;                           // friction is a hundred times the noise, and a slow joint is within the width often
+constexpr double kEdgePeriods = 3;  // of the lowest cut-off that are not settled at an end
+constexpr double kWideGap = 5;      // sample times over which a spline may still bridge
 constexpr double kIrregular = 1e-4;      // time jitter over sample time below which a grid counts as uniform
 constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
 
@@ -117,7 +120,8 @@ void DerivePiece(const VectorXd& t, const Eigen::MatrixXd& q, const Piece& piece
   out.q.middleRows(piece.first, count) = spline.Evaluate(t, 0);
   out.qd.middleRows(piece.first, count) = spline.Evaluate(t, 1);
   out.qdd.middleRows(piece.first, count) = spline.Evaluate(t, 2);
-  const double edge_s = 3 / out.cutoff_Hz.minCoeff();  // the reflection there bends q: 1 % of qdd after 1.5 periods
+  const double edge_s =
+      kEdgePeriods / out.cutoff_Hz.minCoeff();  // the reflection there bends q: 1 % of qdd after 1.5 periods
   for (Index k = 0; k < count; ++k) {
     out.settled[piece.first + k] = t[k] - t[0] >= edge_s && t[count - 1] - t[k] >= edge_s;
   }
@@ -154,6 +158,21 @@ double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, 
   return std::min(std::max(cutoff_Hz, std::min(kLowest_Hz, kAboveMotion * noise.band_Hz)), highest_Hz);
 }
 
+// What the user has set.
+static VectorXd SetCutoffs_Hz(const Log& log, const Bandwidth& bandwidth) {
+  const double half_Hz = 0.5 / log.step_s(), cutoff_Hz = bandwidth.cutoff_Hz * bandwidth.scale;
+  if (bandwidth.cutoff_Hz >= half_Hz)
+    throw InputError(fmt::format("{}: cut-off {:g} Hz, expected below half the sample rate, {:g} Hz", log.source,
+                                 bandwidth.cutoff_Hz, half_Hz));
+  const double length_s = log.t[log.samples() - 1] - log.t[0], least_Hz = 2 * kEdgePeriods / length_s;
+  if (cutoff_Hz <= least_Hz)
+    throw InputError(
+        fmt::format("{}: cut-off {:g} Hz, expected above {:.2g} Hz: the filter needs {:g} periods of it "
+                    "at either end of the log",
+                    log.source, bandwidth.cutoff_Hz, least_Hz / bandwidth.scale, kEdgePeriods));
+  return VectorXd::Constant(log.joints, cutoff_Hz);
+}
+
 // The most sensitive of the joints' torques decides.
 static VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity) {
   const double rate_Hz = 1 / log.step_s();
@@ -170,7 +189,7 @@ static VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity)
   return out;
 }
 
-Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, double cutoff_scale) {
+Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const Bandwidth& bandwidth) {
   const Eigen::MatrixXd& inertia = sensitivity.inertia;
   if (inertia.rows() != log.joints || inertia.cols() != log.joints) {
     throw InputError(log.source + ": has " + std::to_string(log.joints) + " joints, the model has " +
@@ -181,7 +200,8 @@ Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, double
   out.q = log.q;
   out.qd = out.qdd = Eigen::MatrixXd::Zero(log.samples(), log.joints);
   out.settled = Eigen::VectorXi::Zero(log.samples());
-  out.cutoff_Hz = ChooseCutoffs_Hz(log, sensitivity) * cutoff_scale;
+  out.cutoff_Hz = bandwidth.cutoff_Hz > 0 ? SetCutoffs_Hz(log, bandwidth)
+                                          : VectorXd(ChooseCutoffs_Hz(log, sensitivity) * bandwidth.scale);
   for (const Piece& piece : Pieces(log)) {
     if (piece.count < QuinticSpline::kMinSamples) continue;
     DerivePiece(log.t.segment(piece.first, piece.count), log.q.middleRows(piece.first, piece.count), piece, out);

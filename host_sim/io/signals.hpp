@@ -36,11 +36,17 @@ struct Sensitivity {
 double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz,
                        double sign_width_radps = std::numeric_limits<double>::infinity());
 
+// The cut-off of all joints: chosen for each, or the user's own.
+struct Bandwidth {
+  double cutoff_Hz = 0;  // 0: ChooseCutoff_Hz
+  double scale = 1;      // multiplies either: 0.62 shows which findings hang on it
+};
+
 // q through a zero-phase Butterworth of order 4 (run forward and backward), then derivatives of a quintic spline.
 // An irregular grid is resampled by a quintic spline first. Positions are never carried across a gap of more than five
 // sample times; a piece too short for the spline keeps its q and has zero derivatives (settled = 0).
-// One joint's acceleration is in every joint's torque: the most sensitive one decides. cutoff_scale multiplies every
-// chosen cut-off (0.62 shows which findings hang on it). InputError: wrong number of inertias, fewer than 8 samples.
-Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, double cutoff_scale = 1);
+// One joint's acceleration is in every joint's torque: the most sensitive one decides. InputError: wrong number of
+// inertias, fewer than 8 samples, a cut-off from half the sample rate on or so low that no sample is settled.
+Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const Bandwidth& bandwidth = {});
 
 }  // namespace armcal::io

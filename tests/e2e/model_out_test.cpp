@@ -1,6 +1,9 @@
 // end-to-end tests - armcal diagnose --model-out where no model can hold what was found: said, not written as an
 // effect.
+#include <iomanip>
 #include <numbers>
+#include <random>
+#include <regex>
 
 #include "host_sim/io/log.hpp"
 #include "tests/e2e/tool.hpp"
@@ -15,13 +18,18 @@ using Change = std::function<void(Dataset&)>;
 class ModelOut : public testing::Test {
  protected:
   // Logs of a small arm whose measurement underwent this; what diagnose said, and the new file generated from.
-  void Diagnose(const std::string& name, const Change& train, const Change& test) {
+  void Diagnose(const std::string& name, const Change& train, const Change& test,
+                const std::vector<std::string>& options = {}) {
     folder_ = FreshFolder("model_out_" + name);
     SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 9);
     Write(arm.Run(20, 90), train, "train.csv");
     Write(arm.Run(20, 91), test, "test.csv");
-    said_ = Tool({"diagnose", "--robot", "two_link", "--train", Path("train.csv"), "--test", Path("test.csv"),
-                  "--model-out", Path("new.toml"), "--json", Path("verdict.json"), "--report", Path("page.html")});
+    std::vector<std::string> words{"diagnose",        "--robot", "two_link",           "--train",
+                                   Path("train.csv"), "--test",  Path("test.csv"),     "--model-out",
+                                   Path("new.toml"),  "--json",  Path("verdict.json"), "--report",
+                                   Path("page.html")};
+    words.insert(words.end(), options.begin(), options.end());
+    said_ = Tool(words);
     ASSERT_EQ(said_.code, 0) << said_.err << said_.out;
     verdict_ = ReadJson(Path("verdict.json"));
     const Outcome generated = Tool({"generate", "--robot", Path("new.toml"), "--out", Path("generated")});
@@ -88,6 +96,87 @@ TEST_F(ModelOut, OfATorqueWithAWrongScale_SaysWhichNumberIsOff) {
   const auto scaled = [](Dataset& d) { d.tau.col(1) *= 1.25; };
   Diagnose("gain", scaled, scaled);
   ExpectARemedyFor("torque_gain_error");
+}
+
+// What the held-out log refutes is in no model, and text, JSON and page say who got worse, and by how much.
+TEST_F(ModelOut, OfATermThatTheHeldOutLogRefutes_SaysWhichJointRefutesIt) {
+  Diagnose("refuted", [](Dataset& d) { d.tau.col(1).array() += 0.1; }, {});
+  ASSERT_EQ(verdict_.at("terms").size(), 1u) << said_.out;
+  const nlohmann::json why = verdict_["terms"][0].at("refuted");
+  EXPECT_EQ(why.at("joint"), 2);
+  EXPECT_EQ(why.at("without_it"), "the declared model");
+  EXPECT_GT(why.at("factor").get<double>(), 1.005);
+  EXPECT_NEAR(why["rms_without"][1].get<double>(), verdict_["before_moving"][1].get<double>(), 1e-12);
+  EXPECT_EQ(verdict_["after_moving"], verdict_["before_moving"]);
+  std::ostringstream figures;
+  figures << std::setprecision(4) << why["rms_with"][1].get<double>() << " instead of "
+          << why["rms_without"][1].get<double>() << " N m";
+  const std::string words = "joint 2 is predicted worse with it than by the declared model: " + figures.str();
+  EXPECT_NE(said_.out.find("refuted on the held-out log: " + words), std::string::npos) << said_.out;
+  EXPECT_NE(ReadText(Path("page.html")).find(words), std::string::npos);
+  EXPECT_EQ(ReadText(Path("new.toml")).find("[[effect]]"), std::string::npos);
+}
+
+// Noise of the positions is in the derived accelerations and their columns, unless the derivation ends below it.
+TEST_F(ModelOut, OfANoisyPosition_SaysThatLeastSquaresIsBiased_UntilTheCutoffIsLower) {
+  const auto noisy = [](Dataset& d) {
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> noise(0, 2e-5);
+    for (double& q : d.s.q.reshaped()) q += noise(random);
+  };
+  for (const double cutoff_Hz : {49.0, 5.0}) {  // motion ends at 0.5 Hz; its turns, where friction jumps, do not
+    Diagnose("noisy", noisy, noisy, {"--cutoff", std::to_string(cutoff_Hz)});
+    if (HasFatalFailure()) return;
+    EXPECT_EQ(verdict_.at("cutoff_Hz"), nlohmann::json({{cutoff_Hz, cutoff_Hz}}));
+    const nlohmann::json e = verdict_.at("exogeneity");
+    const bool biased = cutoff_Hz > 20;
+    EXPECT_EQ(e.at("instruments"), "smoothed positions");
+    EXPECT_EQ(e.at("passed").get<bool>(), !biased) << said_.out;
+    ASSERT_EQ(e.at("joints").size(), 2u);
+    for (const auto& j : e["joints"]) EXPECT_TRUE(j.at("told").get<bool>());
+    const std::string page = ReadText(Path("page.html"));
+    for (const std::string& text : {said_.out, page}) {
+      EXPECT_EQ(text.find("FAILS on joint") != text.npos, biased) << text;
+      EXPECT_EQ(text.find("armcal identify --method instrumental_variable") != text.npos, biased) << text;
+    }
+  }
+}
+
+// The command that tells a ripple from its runner-up can be run as it stands, and searches for the ripple that was
+// found.
+TEST_F(ModelOut, OfARipple_TheCommandThatSeparatesIt_TakesWhatWasFound) {
+  const auto ripple = [](Dataset& d) {
+    for (int k = 0; k < d.samples(); ++k) d.tau(k, 1) += 0.3 * std::cos(12 * d.s.q(k, 1));
+  };
+  Diagnose("ripple", ripple, ripple);
+  if (HasFatalFailure()) return;
+  ASSERT_FALSE(verdict_.at("terms").empty()) << said_.out;
+  const nlohmann::json& t = verdict_["terms"][0];
+  EXPECT_EQ(t.at("record"), "torque_ripple");
+  EXPECT_EQ(t.at("joints"), nlohmann::json({2}));
+  EXPECT_NEAR(t.at("unknowns").at("k").get<double>(), 12, 0.1);
+  std::string command;
+  for (const auto& s : t.at("separate")) command = s.at("command").get<std::string>();
+  ASSERT_NE(command.find(" --from " + Path("verdict.json")), std::string::npos) << said_.out;
+  std::vector<nlohmann::json> accuracy;
+  for (const std::string& shell : {command, std::regex_replace(command, std::regex(" --from [^ ]*"), "")}) {
+    std::string words = std::regex_replace(shell, std::regex("^armcal"), ARMCAL_TOOL);
+    words = std::regex_replace(words, std::regex("separate.csv"), Path("separate.csv"));
+    const Outcome o = RunProgram(
+        {"sh", "-c", words + " --no-slow --starts 1 --harmonics 10 --seconds 60 --json " + Path("excite.json")});
+    ASSERT_EQ(o.code, 0) << o.err;
+    accuracy.push_back(ReadJson(Path("excite.json")).at("accuracy"));
+  }
+  EXPECT_NE(accuracy[0], accuracy[1]);  // one search, one seed: only the ripple's k differs
+  const std::string never = Path("never.csv");
+  const auto refused = [&](const std::string& effects, const std::string& verdict, const std::string& named) {
+    ExpectOneLine(Tool({"excite", "--robot", "two_link", "--separate", effects, "--from", verdict, "--out", never}), 2,
+                  named);
+    EXPECT_FALSE(fs::exists(never));
+  };
+  refused("stribeck:1,viscous_cuberoot:1", Path("verdict.json"), "among stribeck:1, viscous_cuberoot:1");
+  refused("torque_ripple:2", Path("train.csv"), "train.csv: expected a verdict");
+  refused("torque_ripple:2", Path("absent.json"), "absent.json");
 }
 
 // A contact says nothing about another log: it is named, stands apart, and moves no error there.

@@ -88,6 +88,19 @@ TEST_F(BadFiles, DiagnoseAndEstimate_RefuseLikeIdentify) {
   for (const fs::path& p : {json, page, model}) EXPECT_FALSE(fs::exists(p)) << p;
 }
 
+TEST_F(BadFiles, ACutoffThatIsNone_IsRefused) {
+  const std::string good = Write("good.csv", LogText(400)).string();  // 125 Hz, 3.2 s
+  const auto expect = [&](const std::string& cutoff, const std::string& named) {
+    ExpectOneLine(Tool({"diagnose", "--robot", "er20_like", "--train", good, "--test", good, "--cutoff", cutoff}),
+                  kBadInput, named);
+    ExpectOneLine(Tool({"identify", "--robot", "er20_like", "--train", good, "--cutoff", cutoff}), kBadInput, named);
+  };
+  for (const std::string cutoff : {"0", "-20", "nan", "inf", "20Hz", "high"})
+    expect(cutoff, "--cutoff " + cutoff + ":");
+  expect("63", "half the sample rate, 62.5 Hz");
+  expect("1", "good.csv: cut-off 1 Hz, expected above");
+}
+
 TEST_F(BadFiles, Scenarios_AreRefused) {
   ExpectOneLine(Tool({"simulate", "--scenario", "no_such_scenario", "--port", "0"}), kBadInput, "no_such_scenario");
   const fs::path bad = Write("bad.toml",

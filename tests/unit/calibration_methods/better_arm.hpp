@@ -43,6 +43,7 @@ inline calibration::Dataset Measured(const SyntheticArm& arm, const calibration:
   const calibration::LoopRun run = loop.Run(reference.s.t, reference.s.q, Truth(arm));
   calibration::Dataset d = reference;
   d.source = "loop";
+  d.reference = reference.s.q;
   d.s = run.s;
   KdlArm kdl(model.robot(), arm.bodies());
   std::mt19937_64 random(seed);

@@ -38,6 +38,33 @@ TEST(Separate, TakesEveryConfusablePairThatMotionShows_AndRefusesTheOthers) {
   EXPECT_GT(refused, 15);
 }
 
+// A ripple's columns are cos and sin of k q: with the k that was found, not the record's.
+TEST(Separate, LooksAtTheEffectAsItWasFound) {
+  constexpr double kFound = 12.25;
+  const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
+  const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");
+  codegen::EffectUse ripple;
+  ripple.effect = "torque_ripple", ripple.joints = {1}, ripple.nonlinear = {{"k", kFound}};
+  const Target target(robot, records, {"torque_ripple:2", "position_torque:2"}, {ripple});
+  codegen::Signals s;
+  s.t.setZero(9), s.q.setZero(9, 2), s.qd.setOnes(9, 2), s.qdd.setZero(9, 2);
+  s.q.col(1) = Eigen::VectorXd::LinSpaced(9, -1, 1);
+  std::vector<Eigen::MatrixXd> row;
+  target.observation().Rows(s, row);
+  const codegen::Model& model = target.observation().model();
+  int seen = 0;
+  for (int c = 0; c < model.columns(); ++c)
+    for (const bool cosine : {true, false}) {
+      if (model.column_name(c) != (cosine ? "torque_ripple.Rc2" : "torque_ripple.Rs2")) continue;
+      ++seen;
+      for (int k = 0; k < 9; ++k) {
+        const double angle = kFound * s.q(k, 1);
+        EXPECT_NEAR(row[1](k, c), cosine ? std::cos(angle) : std::sin(angle), 1e-12);
+      }
+    }
+  EXPECT_EQ(seen, 2);
+}
+
 // What is said to be separable is what a search finds a motion for; what is not, what it finds none for.
 TEST(Separate, IsPromisedWhereASearchSucceeds) {
   const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");

@@ -199,8 +199,38 @@ TEST(Signals, CoarseEncoderUnderSlowMotion_IsSmoothedFurther_ButNeverIntoTheMoti
 TEST(Signals, CutoffScale_ScalesAndChangesNothingElse) {
   const Log log = MakeLog({{0.3, 1.1}}, Uniform(10, 250), 1e-5, 3.0);
   const Sensitivity inertia{40.0 * Eigen::MatrixXd::Identity(1, 1)};
-  EXPECT_DOUBLE_EQ(DeriveSignals(log, inertia, 0.62).cutoff_Hz[0], 0.62 * DeriveSignals(log, inertia).cutoff_Hz[0]);
+  EXPECT_DOUBLE_EQ(DeriveSignals(log, inertia, {0, 0.62}).cutoff_Hz[0],
+                   0.62 * DeriveSignals(log, inertia).cutoff_Hz[0]);
   EXPECT_THROW(DeriveSignals(log, {40.0 * Eigen::MatrixXd::Identity(2, 2)}), InputError);
+}
+
+// Two tones, 2 Hz and 30 Hz. The filter runs both ways, so its gain is the square of a fourth order's.
+TEST(Signals, ACutoffOfTheUsersOwn_KeepsTheToneBelowAndTakesTheOneAbove) {
+  constexpr double kSlow_Hz = 2, kFast_Hz = 30, kCutoff_Hz = 8;
+  Log log = MakeLog({{0.3, kSlow_Hz}}, Uniform(10, 250), 1e-9, 3.0);
+  const Eigen::VectorXd fast = (kTau * kFast_Hz * log.t.array()).sin();
+  log.q.col(0) += 1e-3 * fast;
+  const Sensitivity inertia{40.0 * Eigen::MatrixXd::Identity(1, 1)};
+  const auto tone_left = [&](const Bandwidth& bandwidth) {  // of the acceleration, away from the ends
+    const Derivatives d = DeriveSignals(log, inertia, bandwidth);
+    const Eigen::Index edge = 500, count = log.samples() - 2 * edge;
+    return std::abs(d.qdd.col(0).segment(edge, count).dot(fast.segment(edge, count))) /
+           (1e-3 * std::pow(kTau * kFast_Hz, 2) * fast.segment(edge, count).squaredNorm());
+  };
+  const double gain = 1 / (1 + std::pow(kFast_Hz / kCutoff_Hz, 8));
+  EXPECT_LT(tone_left({kCutoff_Hz}), 2 * gain + 1e-4);  // 1e-4: of the other tone, over a number of periods not whole
+  EXPECT_GT(tone_left({100}), 0.98);                    // from 0.4 of the rate on nothing is filtered
+  const Derivatives half = DeriveSignals(log, inertia, {kCutoff_Hz, 0.5});
+  EXPECT_EQ(half.cutoff_Hz[0], 0.5 * kCutoff_Hz);
+}
+
+TEST(Signals, ACutoffThatTheLogCannotHave_IsRefused) {
+  const Log log = MakeLog({{0.3, 1.1}}, Uniform(10, 250), 1e-5, 3.0);
+  const Sensitivity inertia{40.0 * Eigen::MatrixXd::Identity(1, 1)};
+  EXPECT_NO_THROW(DeriveSignals(log, inertia, {124}));
+  EXPECT_THROW(DeriveSignals(log, inertia, {125}), InputError);
+  EXPECT_NO_THROW(DeriveSignals(log, inertia, {0.7}));
+  EXPECT_THROW(DeriveSignals(log, inertia, {0.6}), InputError);  // three periods at either end are the whole log
 }
 
 TEST(Butterworth, GainIsTheSquareOfOrderFour_AndLinesPassUnchanged) {

@@ -1,0 +1,46 @@
+// cli - terms of a verdict become uses of their records.
+#include "host_sim/cli/verdict_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "host_sim/io/files.hpp"
+#include "host_sim/io/input_error.hpp"
+
+namespace armcal::cli {
+
+namespace {
+
+bool IsAmong(const codegen::EffectUse& use, const std::vector<std::string>& effects) {
+  std::string joints;
+  for (const int j : use.joints) joints += fmt::format("{}{}", joints.empty() ? ":" : "-", j + 1);
+  return std::any_of(effects.begin(), effects.end(),
+                     [&](const std::string& e) { return e == use.effect || e == use.effect + joints; });
+}
+
+}  // namespace
+
+std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::vector<std::string>& effects) {
+  std::vector<codegen::EffectUse> out;
+  if (path.empty()) return out;
+  try {
+    const auto verdict = nlohmann::json::parse(io::ReadWholeFile(path));
+    for (const auto& term : verdict.at("terms")) {
+      codegen::EffectUse use;
+      use.effect = term.at("record").get<std::string>();
+      for (const int joint : term.at("joints")) use.joints.push_back(joint - 1);
+      use.nonlinear = term.at("unknowns").get<std::map<std::string, double>>();
+      if (!use.nonlinear.empty() && IsAmong(use, effects)) out.push_back(use);
+    }
+  } catch (const nlohmann::json::exception&) {
+    throw io::InputError(path + ": expected a verdict that armcal diagnose --json wrote");
+  }
+  if (out.empty())
+    throw io::InputError(
+        fmt::format("{}: expected a term with nonlinear parameters among {}", path, fmt::join(effects, ", ")));
+  return out;
+}
+
+}  // namespace armcal::cli

@@ -92,7 +92,7 @@ VectorXd Diagnosis::Work::SlopeOverModelTorque(const std::vector<const Chosen*>&
         kept.push_back(log.tau_model.col(j));
         log.tau_model.col(j).array() += shift;
       }
-      const VectorXd out =
+      VectorXd out =
           GatherColumns(c, evidence, terms[t]->eta).block[static_cast<std::size_t>(row)] * estimate.amplitude[t];
       for (std::size_t l = 0; l < kept.size(); ++l) evidence.logs[l].tau_model.col(j) = kept[l];
       return out;

@@ -43,14 +43,19 @@ calibration::Dataset AsTermsSay(const Diagnosis::Work& w, const calibration::Dat
   return w.delay_s != 0 ? calibration::Delayed(log, w.delay_s) : log;
 }
 
+Quantities AtEstimate(const Diagnosis::Work& w, const calibration::Dataset& log) {
+  Quantities q = MakeQuantities(w.model, log, w.needs_flange);
+  Follow(w.model, w.arm, w.estimate.x, w.declared.eta, q);
+  return q;
+}
+
 // What the declared model with these terms leaves of another log, [N x n]; w keeps their estimate. tracking: how run
 // states among them were followed.
 MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
                 std::string* tracking = nullptr) {
   w.Solve(terms);
   const calibration::Dataset seen = AsTermsSay(w, log);
-  Quantities q = MakeQuantities(w.model, seen, w.needs_flange);
-  Follow(w.model, w.arm, w.estimate.x, w.declared.eta, q);
+  const Quantities q = AtEstimate(w, seen);
   MatrixXd left = log.tau - calibration::Predict(w.model, seen, w.estimate.x, w.declared.eta);
   if (tracking) tracking->clear();
   // Run states are followed in what is left once everything else has been taken off.
@@ -203,8 +208,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
 std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
   const Work& w = *work_;
   const calibration::Dataset seen = AsTermsSay(w, data);
-  Quantities q = MakeQuantities(model_, seen, w.needs_flange);
-  Follow(model_, w.arm, w.estimate.x, w.declared.eta, q);
+  const Quantities q = AtEstimate(w, seen);
   std::vector<MatrixXd> out;
   std::size_t k = 0;
   for (const Chosen& c : w.chosen) {
@@ -224,7 +228,7 @@ std::vector<calibration::Dataset> Diagnosis::WithoutTerms() const {
   for (const calibration::Dataset* log : w.train) {
     out.push_back(*log);
     if (terms.empty()) continue;
-    const Quantities q = MakeQuantities(model_, w.arm, *log, w.estimate.x, w.declared.eta, w.needs_flange);
+    const Quantities q = AtEstimate(w, *log);
     for (std::size_t k = 0; k < terms.size(); ++k)
       out.back().tau -= CandidateTorque(*terms[k]->candidate, q, terms[k]->eta, w.estimate.amplitude[k]);
   }

@@ -128,7 +128,8 @@ double Metric::CurveEvidence(const Projection& p, MatrixXd* precision) const {
     const VectorXd seen = eigen.eigenvalues().cwiseMax(0),
                    u = eigen.eigenvectors().transpose() * (root.transpose() * p.g);
     if (seen[k - 1] <= 0) return 0;
-    for (double size2 = 0.1 / seen[k - 1]; size2 < 1e9 / seen[k - 1]; size2 *= 2) {
+    for (int doubled = 0; doubled < 34; ++doubled) {
+      const double size2 = std::ldexp(0.1 / seen[k - 1], doubled);
       double evidence = 0;
       for (int i = 0; i < k; ++i) evidence += u[i] * u[i] * size2 / (1 + size2 * seen[i]) - std::log1p(size2 * seen[i]);
       if (evidence <= best) continue;

@@ -21,7 +21,9 @@ VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const Matrix
   std::vector<MatrixXd> gram(folds, MatrixXd::Zero(d + k, d + k));  // of each fold's own rows
   std::vector<VectorXd> right(folds, VectorXd::Zero(d + k));
   std::vector<MatrixXd> extended(n), map(n);
-  std::vector<std::vector<std::pair<int, int>>> fold_rows(static_cast<std::size_t>(folds * n));  // row ranges
+  // [fold][joint] row ranges
+  std::vector<std::vector<std::vector<std::pair<int, int>>>> fold_rows(folds);
+  for (auto& joints : fold_rows) joints.resize(n);
   for (int j = 0; j < n; ++j) {
     const auto at = std::find(c.joints.begin(), c.joints.end(), j);
     const int r = static_cast<int>(q_[j].cols()), extra = at == c.joints.end() ? 0 : k;
@@ -39,7 +41,7 @@ VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const Matrix
       const MatrixXd part = extended[j].middleRows(begin, end - begin);
       own[b % folds] += SelfProduct(part);
       right[b % folds] += map[j].transpose() * (part.transpose() * y_[j].segment(begin, end - begin));
-      fold_rows[static_cast<std::size_t>((b % folds) * n + j)].emplace_back(begin, end);
+      fold_rows[b % folds][j].emplace_back(begin, end);
     }
     for (int f = 0; f < folds; ++f) gram[f] += map[j].transpose() * own[f] * map[j];
   }
@@ -54,7 +56,7 @@ VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const Matrix
     const VectorXd x = MatrixXd(total - gram[f] + ridge).ldlt().solve(total_right - right[f]);
     for (int j = 0; j < n; ++j) {
       const VectorXd local = map[j] * x;
-      for (const auto& [begin, end] : fold_rows[static_cast<std::size_t>(f * n + j)])
+      for (const auto& [begin, end] : fold_rows[f][j])
         error[f] +=
             (y_[j].segment(begin, end - begin) - extended[j].middleRows(begin, end - begin) * local).squaredNorm();
     }

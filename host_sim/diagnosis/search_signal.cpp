@@ -116,7 +116,7 @@ void Searcher::Spline() {
   const Found all = Scored();
   if (last - first == kCells) return;
   best_.searched = 2;
-  best_.tried = 4 * kCells / kNarrowest;
+  best_.tried = 4.0 * kCells / kNarrowest;
   best_.gain = Gain{};
   Consider({lo + range * first / kCells, lo + range * last / kCells});
   if (Scored().score < all.score) best_ = all;

@@ -50,7 +50,7 @@ void Searcher::Onset() {
   for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
   constexpr int kGrid = 12;
   best_.searched = 2;
-  best_.tried = kGrid * kGrid / 2;
+  best_.tried = 0.5 * kGrid * kGrid;
   // Each cell of time once; a window is the sum of its cells.
   std::vector<double> edge{begin - 1};
   for (int k = 1; k < kGrid; ++k) edge.push_back(begin + (end - begin) * k / kGrid);

@@ -52,7 +52,7 @@ WIDEST_VECTORS void Apply(Op op, const double* a, const double* b, double* z) {
 
 }  // namespace
 
-Tape::Tape(const Graph& graph, std::vector<Expr> roots) {
+Tape::Tape(const Graph& graph, const std::vector<Expr>& roots) {
   const auto& nodes = graph.nodes();
   std::vector<char> needed(nodes.size(), 0);
   for (const Expr& r : roots) needed[r.id()] = 1;

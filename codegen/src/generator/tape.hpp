@@ -18,7 +18,7 @@ struct Binding {
 // The part of a graph that some roots need, in order. Immutable; many threads may evaluate it.
 class Tape {
  public:
-  Tape(const Graph& graph, std::vector<Expr> roots);
+  Tape(const Graph& graph, const std::vector<Expr>& roots);
 
   // bindings: one per graph input (Graph::inputs()); out: one pointer per root, each to `samples` values.
   void Evaluate(std::span<const Binding> bindings, int samples, std::span<double* const> out) const;

@@ -136,7 +136,7 @@ TEST(Memory, LongRun_IsTheRecursionByHand_AndStartsAnewWhereItIsBroken) {
   for (std::size_t k = 0; k < x.size(); ++k) {
     const bool starts = k == 0 || k == 150;
     slow = starts ? x[k] : slow;
-    slow = x[k] + (slow - x[k]) * std::exp2(-0.01 / 0.02);
+    slow = x[k] + (slow - x[k]) * std::exp(-0.01 / 0.02);
     EXPECT_NEAR(y[k], slow + x[k] * x[starts ? k : k - 1], 1e-12) << k;
   }
 }

@@ -106,6 +106,24 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const Vecto
   return nullptr;
 }
 
+// Of kinds that training could not tell apart the held-out log has refuted one that would be the arm's own: what it
+// leaves of them belongs to the run. False if nothing does.
+bool OfTheRunInstead(Diagnosis::Work& w, const Chosen& refuted, Chosen& out) {
+  for (const Rival& rival : refuted.rivals) {
+    const auto& names = refuted.also_fits;
+    if (rival.record->kind_class != "run_state" ||
+        std::find(names.begin(), names.end(), rival.record->kind) == names.end())
+      continue;
+    const auto is_it = [&](const auto& c) { return &c->record() == rival.record && c->joints() == rival.joints; };
+    const auto candidate = std::find_if(w.candidates.begin(), w.candidates.end(), is_it);
+    out = Chosen{};
+    out.candidate = candidate->get();
+    out.folds = refuted.folds;
+    if (Selector(w).StillEarns(out, Confirmed(w.chosen))) return true;
+  }
+  return false;
+}
+
 // Parameters of every use of a record: F_1, F_2 where there are two.
 template <class Parameter>
 void Repeat(const std::vector<Parameter>& once, std::size_t count, std::vector<Parameter>& out) {
@@ -196,9 +214,14 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
     Chosen* refuted = Refuted(w, test, before, calibration::Rms(test, out.after, true), reason);
     w.estimate = std::move(with_all);
     if (!refuted) break;
+    const auto at = refuted - w.chosen.data();
     refuted->confirmed = false;
-    why[static_cast<std::size_t>(refuted - w.chosen.data())] = reason;
+    why[static_cast<std::size_t>(at)] = reason;
     w.AlignLogs();
+    if (Chosen instead; OfTheRunInstead(w, *refuted, instead)) {
+      w.chosen.insert(w.chosen.begin() + at + 1, instead);
+      why.insert(why.begin() + at + 1, std::nullopt);
+    }
   }
   WriteTerms(w, finding_);
   for (std::size_t k = 0; k < why.size(); ++k) finding_.terms[k].refuted = why[k];

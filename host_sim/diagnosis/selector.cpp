@@ -19,6 +19,7 @@ constexpr double kIndistinguishable = 25;  // chi^2 left at most when one kind i
 constexpr double kImitated = 0.1;          // and of the trace's own
 constexpr double kNear = 0.05;             // of a score: the logs do not tell which of two it is
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
+constexpr double kAsLarge = 0.5;           // of what it would gain there if it was as large as it seemed
 constexpr int kSharpenings = 3;
 constexpr double kNothing = 10;         // a gain that no score above zero can come from
 constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms differ a little from any record
@@ -138,15 +139,20 @@ bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& t
 }
 
 // Delay, elasticity and backlash look like what a derivation of speed and acceleration leaves: a term that is real
-// gains about as much when these are derived otherwise.
-bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, double gain,
+// gains about as much when these are derived otherwise. One of high frequencies loses more; it must then be worth
+// accepting there, too, and be as large as it was.
+bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
                                      const std::vector<NoiseModel>& noise) {
   if (!w_.narrow) return true;
   Diagnosis::Work& narrow = *w_.narrow;
   narrow.estimate = w_.estimate;
   narrow.FollowEstimate();
   narrow.Prepare(terms);
-  return Metric(narrow.rows, noise).Try(GatherColumns(*f.candidate, narrow.evidence, f.eta)).gain > kStays * gain;
+  const Metric metric(narrow.rows, noise);
+  const Columns c = GatherColumns(*f.candidate, narrow.evidence, f.eta);
+  const double left = metric.Try(c).gain;
+  if (left > kStays * gain.gain) return true;
+  return Score(f, left) > kAccept && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second;
 }
 
 bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
@@ -166,7 +172,7 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
       bursts_.push_back(f.candidate);
     return false;
   }
-  if (!StaysAtLowerBandwidth(f, terms, gain.gain, noise)) return false;
+  if (!StaysAtLowerBandwidth(f, terms, gain, noise)) return false;
   out = Chosen{};
   out.candidate = f.candidate;
   out.eta = f.eta;

@@ -30,7 +30,7 @@ class Selector {
   bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   // Best first: by score, but a named cause before a curve that explains little more.
   void Sort(std::vector<Found>& ranked) const;
-  bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, double gain,
+  bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
                              const std::vector<NoiseModel>& noise);
   bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
               std::size_t k, Chosen& out);

@@ -17,8 +17,8 @@ struct RegressorCalls {
   const float *front_rows, *dense_rows, *jacobian;
 };
 
-// The regressor of one generated model. What `Evaluate` needs of code and stack is the model's. Without friction: what
-// goes into a local `front` is thrown away, so the compiler leaves it out and the base parameters' columns remain.
+// The regressor of one generated model. What `Rows` needs of code and stack is the model's. Without friction: what goes
+// into a local `front` is thrown away, so the compiler leaves it out and the base parameters' columns remain.
 template <class Model, bool kFriction>
 struct RegressorInstance {
   static constexpr int n = Model::kJoints;
@@ -32,14 +32,17 @@ struct RegressorInstance {
     if constexpr (Model::kStates > 0) Model::InitialState(x, parameters, eta, state);
     for (int k = Model::kStates; k < kMemory; ++k) state[k] = 0.0f;
   }
-  static void Evaluate() {
+  // noipa: called as from another object, or the addresses above become constants that need registers.
+  [[gnu::noipa]] static void Rows(const model::ModelInput<float, n>& input, const float* now, float* after,
+                                  float* front_rows, float* dense_rows) {
     if constexpr (kFriction) {
-      Model::Regressor(x, parameters, eta, state, next, front, dense);
+      Model::Regressor(input, parameters, eta, now, after, front_rows, dense_rows);
     } else {
       float unused[Model::kFront + 1];
-      Model::Regressor(x, parameters, eta, state, next, unused, dense);
+      Model::Regressor(input, parameters, eta, now, after, unused, dense_rows);
     }
   }
+  static void Evaluate() { Rows(x, state, next, front, dense); }
   static void Differentiate() {
     if constexpr (Model::kNonlinear > 0) Model::Jacobian(x, parameters, eta, parameters, state, next, jacobian);
     for (int k = 0; k < kMemory; ++k) state[k] = next[k];

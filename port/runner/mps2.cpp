@@ -25,6 +25,13 @@ struct Timer {
 };
 volatile Timer& Timer0() { return *reinterpret_cast<volatile Timer*>(0x40000000u); }
 
+struct Tick {
+  std::uint32_t control, reload, value;
+};
+volatile Tick& SysTick() { return *reinterpret_cast<volatile Tick*>(0xE000E010u); }
+void (*on_tick)() = nullptr;
+volatile std::uint32_t ticks_left = 0;
+
 constexpr std::uint32_t kNotOpen = ~0u;
 std::uint32_t input = kNotOpen;
 
@@ -58,6 +65,18 @@ std::size_t Read(void* bytes, std::size_t capacity) {
 std::uint32_t Count() { return ~Timer0().value; }
 std::uint32_t Spent(std::uint32_t from, std::uint32_t to) { return ((to - from) * 5u + 8u) / 16u; }
 
+void RunContexts(std::uint32_t count, std::uint32_t period, void (*tick)(), bool (*background)()) {
+  on_tick = tick;
+  ticks_left = count;
+  SysTick().reload = period * 16u / 5u;
+  SysTick().value = 0;
+  SysTick().control = 7;  // core clock, interrupt, enabled
+  while (ticks_left != 0) (void)background();
+  SysTick().control = 0;
+  while (background()) {
+  }
+}
+
 }  // namespace armcal::port::runner
 
 extern "C" {
@@ -76,7 +95,11 @@ void Fault() {
   Exit(99);
 }
 
-void TickInterrupt() { Fault(); }
+void TickInterrupt() {
+  if (ticks_left == 0) return;
+  on_tick();
+  ticks_left = ticks_left - 1;
+}
 void SerialInterrupt() { Fault(); }
 
 }  // extern "C"

@@ -16,12 +16,18 @@ endforeach()
 foreach(program ${bits} filters_Os regressors_Os estimator_Os)
   string(REPLACE _Os "" source ${program})
   set(input "")
-  if(source STREQUAL estimator)
+  if(source MATCHES "estimator|preempted")
     set(input --input ${host_programs}/trace.bin)
   endif()
   add_test(NAME bits_${program} COMMAND ${run} ${ARMCAL_BOARD} $<TARGET_FILE:bits_${program}> --same-as ${host_programs}/bits_${source} ${input})
   set_tests_properties(bits_${program} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300)
 endforeach()
+
+# With a board's own start-up instead of the runner's.
+add_executable(cortex_m_bench cortex_m_main.cpp ${PROJECT_SOURCE_DIR}/port/mps2/startup.cpp ${PROJECT_SOURCE_DIR}/port/mps2/fault.cpp)
+target_link_libraries(cortex_m_bench PRIVATE armcal_bench armcal_port)
+target_include_directories(cortex_m_bench PRIVATE ${PROJECT_SOURCE_DIR})
+target_link_options(cortex_m_bench PRIVATE -L${PROJECT_SOURCE_DIR}/port/mps2 -T ${ARMCAL_BOARD}.ld)
 
 # The example firmware's three contexts; together with three exception frames they have 16 KB (sections.ld).
 add_test(NAME Stack_OfEveryContextOfTheFirmware_IsBounded COMMAND_EXPAND_LISTS

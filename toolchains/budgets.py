@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""toolchains - what filters and regressors cost on a core: prints a table, writes JSON, fails when a figure has risen.
+"""toolchains - what filters and regressors cost on a core: a table, the same as JSON, and a failure when a figure has risen.
 
   budgets.py --core NAME --bench TEXT --budgets TOML --json OUT --size PROGRAM --objects LIST
 
@@ -101,18 +101,19 @@ def compare(rows, keys, accepted, limits, section, rise, faults):
 def table(figures, core, budgets):
     clock, rate = budgets["clock_MHz"][core], budgets["sample_rate_Hz"]
     cpi = budgets["cycles_per_instruction"][core]
-    print(f"{core}: instructions a 6-row sample; share of {clock} MHz at {rate} samples/s, ESTIMATED with "
-          f"{cpi} cycles an instruction")
-    print(f"{'filter':14}{'n':>4}{'front':>6}{'instr.':>9}{'share':>8}{'solve':>9}{'slice':>8}{'least':>8}"
-          f"{'text':>7}{'state':>7}{'stack':>6}")
-    for f in figures["filters"]:
-        share = f["instructions"] * cpi * rate / (clock * 1e6)
-        print(f"{f['filter']:14}{f['n']:4}{f['n_front']:6}{f['instructions']:9}{share:8.2%}{f['solve']:9}"
-              f"{f['slice_max']:8}{f['slice_min']:8}{f['text_bytes']:7}{f['state_bytes']:7}{f['stack_bytes']:6}")
-    print(f"{'regressor':24}{'instr.':>9}{'share':>8}{'text':>7}{'stack':>6}")
-    for r in figures["regressors"]:
-        share = r["instructions"] * cpi * rate / (clock * 1e6)
-        print(f"{r['robot']:24}{r['instructions']:9}{share:8.2%}{r['text_bytes']:7}{r['stack_bytes']:6}")
+
+    def share(row):
+        return row["instructions"] * cpi * rate / (clock * 1e6)
+
+    lines = [f"{core}: instructions a 6-row sample; share of {clock} MHz at {rate} samples/s, ESTIMATED with {cpi} cycles an "
+             "instruction; bytes", f"{'filter':14}{'n':>4}{'front':>6}{'instr.':>9}{'share':>8}{'solve':>9}{'slice':>8}"
+             f"{'least':>8}{'text':>7}{'state':>7}{'stack':>6}"]
+    lines += [f"{f['filter']:14}{f['n']:4}{f['n_front']:6}{f['instructions']:9}{share(f):8.2%}{f['solve']:9}{f['slice_max']:8}"
+              f"{f['slice_min']:8}{f['text_bytes']:7}{f['state_bytes']:7}{f['stack_bytes']:6}" for f in figures["filters"]]
+    lines += [f"{'regressor':24}{'instr.':>9}{'share':>8}{'text':>24}{'stack':>13}"]
+    lines += [f"{r['robot']:24}{r['instructions']:9}{share(r):8.2%}{r['text_bytes']:24}{r['stack_bytes']:13}"
+              for r in figures["regressors"]]
+    return "\n".join(lines) + "\n"
 
 
 def main():
@@ -125,7 +126,9 @@ def main():
     objects = Path(options.objects).read_text(encoding="utf-8").split()
     figures = measure(read_bench(options.bench), objects, options.size, faults)
     Path(options.json).write_text(json.dumps({"core": options.core, **figures}, indent=1) + "\n", encoding="utf-8")
-    table(figures, options.core, budgets)
+    text = table(figures, options.core, budgets)
+    Path(options.json).with_suffix(".txt").write_text(text, encoding="utf-8")
+    print(text)
     accepted, rise = budgets.get(options.core, {}), budgets["rise"]
     for kind, keys in ("filters", FILTER_KEYS), ("regressors", REGRESSOR_KEYS):
         compare(figures[kind], keys, accepted.get(kind, {}), budgets["limits"], f"{options.core}.{kind}", rise, faults)

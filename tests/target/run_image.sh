@@ -37,7 +37,7 @@ fi
 "$program" ${input:+"$input"} >"$work/host" || { echo "$program: answered $?"; exit 1; }
 [[ -s $work/host ]] || { echo "$program printed nothing"; exit 1; }
 if ! cmp -s "$work/host" "$work/target"; then
-  echo "the PC's bits (<) differ from the target's (>):"
+  echo "the PC's bits (<) differ from the target's (>); is $program as new as $image?"
   diff "$work/host" "$work/target" | head -n 20
   exit 1
 fi

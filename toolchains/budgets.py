@@ -19,6 +19,7 @@ import stack
 
 FILTER_KEYS = ["instructions", "solve", "slice_max", "slice_min", "text_bytes", "state_bytes", "stack_bytes"]
 REGRESSOR_KEYS = ["instructions", "text_bytes", "stack_bytes"]
+ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "state_bytes"]
 NOT_THE_FILTERS = re.compile(r"Get_|Calls|\.rodata.*\.str")  # the bench's own part of an object
 
 
@@ -49,8 +50,11 @@ def stack_bytes(file, root, faults):
 def measure(rows, objects, size, faults):
     """The rows of the JSON file, by kind."""
     by_name = {Path(o).name.split(".")[0]: o for o in objects}
-    figures = {"filters": [], "regressors": []}
+    figures = {"filters": [], "regressors": [], "estimators": []}
     for row in rows:
+        if row["kind"] == "estimator":
+            figures["estimators"].append({"estimator": row["name"]} | {k: row[k] for k in ESTIMATOR_KEYS})
+            continue
         is_filter = row["kind"] == "filter"
         name = f"{row['name']}_{row['n']}" if is_filter else f"regressor_{row['name']}"
         file = by_name[name]
@@ -74,7 +78,7 @@ def measure(rows, objects, size, faults):
 
 
 def label(row):
-    return f"{row['filter']}_{row['n']}" if "filter" in row else row["robot"]
+    return f"{row['filter']}_{row['n']}" if "filter" in row else row.get("robot") or row["estimator"]
 
 
 def compare(rows, keys, accepted, limits, section, rise, faults):
@@ -113,6 +117,9 @@ def table(figures, core, budgets):
     lines += [f"{'regressor':24}{'instr.':>9}{'share':>8}{'text':>24}{'stack':>13}"]
     lines += [f"{r['robot']:24}{r['instructions']:9}{share(r):8.2%}{r['text_bytes']:24}{r['stack_bytes']:13}"
               for r in figures["regressors"]]
+    lines += [f"{'estimator, er20_like':24}{'tick':>8}{'longest':>9}{'sample':>9}{'slice':>8}{'state':>8}"]
+    lines += [f"{e['estimator']:24}{e['push']:8}{e['push_max']:9}{e['sample']:9}{e['slice_max']:8}{e['state_bytes']:8}"
+              for e in figures["estimators"]]
     return "\n".join(lines) + "\n"
 
 
@@ -130,7 +137,7 @@ def main():
     Path(options.json).with_suffix(".txt").write_text(text, encoding="utf-8")
     print(text)
     accepted, rise = budgets.get(options.core, {}), budgets["rise"]
-    for kind, keys in ("filters", FILTER_KEYS), ("regressors", REGRESSOR_KEYS):
+    for kind, keys in ("filters", FILTER_KEYS), ("regressors", REGRESSOR_KEYS), ("estimators", ESTIMATOR_KEYS):
         compare(figures[kind], keys, accepted.get(kind, {}), budgets["limits"], f"{options.core}.{kind}", rise, faults)
     for fault in faults:
         print(f"over budget: {fault}", file=sys.stderr)

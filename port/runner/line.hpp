@@ -23,6 +23,8 @@ class Line {
     while ((value /= 10u) != 0u);
     return Text(p);
   }
+  Line& Decimal(int value) { return Decimal(static_cast<std::uint32_t>(value)); }  // not negative
+  Line& Value(const char* name, std::uint32_t value) { return Text(name).Decimal(value); }
   Line& Hex(std::uint32_t value) {
     char digits[9] = {};
     for (int k = 0; k < 8; ++k) digits[k] = "0123456789abcdef"[(value >> (28 - 4 * k)) & 15u];

@@ -22,8 +22,8 @@ std::size_t Read(void* bytes, std::size_t capacity);
 std::uint32_t Count();
 std::uint32_t Spent(std::uint32_t from, std::uint32_t to);
 
-// Calls tick() `count` times and background() in between and until it answers false. On the emulated boards tick() is an
-// interrupt, every `period` instructions, and falls into background() wherever that happens to be; elsewhere the two
+// Calls tick() `count` times and background() in between and until it answers false. On the emulated boards tick() is
+// an interrupt, every `period` instructions, and falls into background() wherever that happens to be; elsewhere the two
 // take turns.
 void RunContexts(std::uint32_t count, std::uint32_t period, void (*tick)(), bool (*background)());
 

@@ -1,4 +1,5 @@
-// tests - what filters and regressors cost on the machine that runs this: a line each, in its counter's unit.
+// tests - what filters, regressors and estimators cost on the machine that runs this: a line each, in its counter's
+// unit.
 //
 // On the emulated boards the unit is one instruction; the budgets target reads these lines. On a board of yours it is
 // one core cycle (PORTING.md says how). Every count is taken on rows and inputs of all kinds; "least" is the smallest.
@@ -7,6 +8,7 @@
 #include "port/runner/line.hpp"
 #include "port/runner/stack.hpp"
 #include "tests/target/filter_list.hpp"
+#include "tests/target/measure.hpp"
 #include "tests/target/regressor_list.hpp"
 #include "tests/target/rows.hpp"
 
@@ -14,23 +16,6 @@ using namespace armcal::target;        // NOLINT: the bench of these programs
 using namespace armcal::port::runner;  // NOLINT: what it runs on
 
 namespace {
-
-std::uint32_t empty = 0;  // what a measurement costs by itself
-
-template <class Call>
-std::uint32_t CostOf(Call call) {
-  const std::uint32_t from = Count();
-  call();
-  return Spent(from, Count()) - empty;
-}
-
-struct Range {
-  std::uint32_t most = 0, least = ~0u;
-  void Add(std::uint32_t value) {
-    most = value > most ? value : most;
-    least = value < least ? value : least;
-  }
-};
 
 // Slices are what the background may not divide: an update by one row, the end of a sample, a step of the read-out.
 struct FilterCost {
@@ -87,19 +72,19 @@ void MeasureFilter(const FilterCalls& filter) {
   Deepest(filter, rows, cost);
   Line("filter")
       .Text(filter.name)
-      .Text("n").Decimal(static_cast<std::uint32_t>(filter.columns))
-      .Text("n_front").Decimal(static_cast<std::uint32_t>(filter.front))
-      .Text("instructions").Decimal(cost.sample.most)
-      .Text("instructions_least").Decimal(cost.sample.least)
-      .Text("solve").Decimal(cost.solve.most)
-      .Text("solve_least").Decimal(cost.solve.least)
-      .Text("slice_max").Decimal(cost.row.most)
-      .Text("slice_min").Decimal(cost.row.least)
-      .Text("end").Decimal(cost.end.most)
-      .Text("step_max").Decimal(cost.step.most)
-      .Text("step_min").Decimal(cost.step.least)
-      .Text("state_bytes").Decimal(filter.state_bytes)
-      .Text("painted_bytes").Decimal(cost.stack_bytes)
+      .Value("n", static_cast<std::uint32_t>(filter.columns))
+      .Value("n_front", static_cast<std::uint32_t>(filter.front))
+      .Value("instructions", cost.sample.most)
+      .Value("instructions_least", cost.sample.least)
+      .Value("solve", cost.solve.most)
+      .Value("solve_least", cost.solve.least)
+      .Value("slice_max", cost.row.most)
+      .Value("slice_min", cost.row.least)
+      .Value("end", cost.end.most)
+      .Value("step_max", cost.step.most)
+      .Value("step_min", cost.step.least)
+      .Value("state_bytes", filter.state_bytes)
+      .Value("painted_bytes", cost.stack_bytes)
       .End();
 }
 
@@ -114,17 +99,17 @@ void MeasureRegressor(const RegressorCalls& model) {
   }
   Line("regressor")
       .Text(model.name)
-      .Text("instructions").Decimal(cost.most)
-      .Text("instructions_least").Decimal(cost.least)
-      .Text("painted_bytes").Decimal(StackOf([&] { model.evaluate(); }))
+      .Value("instructions", cost.most)
+      .Value("instructions_least", cost.least)
+      .Value("painted_bytes", StackOf([&] { model.evaluate(); }))
       .End();
 }
 
 }  // namespace
 
 int Program() {
-  empty = CostOf([] {});
   ForEachFilter(MeasureFilter);
   ForEachRegressor(MeasureRegressor);
+  MeasureEstimators();
   return 0;
 }

@@ -73,18 +73,8 @@ struct Instance {
 
   static FilterCalls Calls(const char* name) {
     MakePrior(prior);
-    return {name,
-            Layout::kColumns,
-            Layout::kFront,
-            Layout::kRowBegin,
-            sizeof(Filter),
-            Restart,
-            Update,
-            EndSample,
-            BeginReadOut,
-            StepReadOut,
-            read_out.x,
-            read_out.sd};
+    return {name,   Layout::kColumns, Layout::kFront, Layout::kRowBegin, sizeof(Filter), Restart,
+            Update, EndSample,        BeginReadOut,   StepReadOut,       read_out.x,     read_out.sd};
   }
 };
 

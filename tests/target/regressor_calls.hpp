@@ -50,8 +50,7 @@ struct RegressorInstance {
 
   static RegressorCalls Calls(const char* name) {
     for (int k = 0; k < Model::kColumns; ++k) parameters[k] = 1.0f / static_cast<float>(1 + k % 5);
-    for (int k = 0; k < Model::kNonlinear; ++k)
-      eta[k] = Model::kInfo[Model::kParameters - Model::kNonlinear + k].mean;
+    for (int k = 0; k < Model::kNonlinear; ++k) eta[k] = Model::kInfo[Model::kParameters - Model::kNonlinear + k].mean;
     return {name,
             n,
             Model::kFront,

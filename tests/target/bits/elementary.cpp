@@ -24,7 +24,7 @@ void Sweep(const char* name, float lower, float upper, F f) {
       f(x, digest);
       f(-x, digest);
     }
-    Line(name).Decimal(static_cast<std::uint32_t>(line)).Hex(digest.value()).End();
+    Line(name).Decimal(line).Hex(digest.value()).End();
   }
 }
 

@@ -50,14 +50,10 @@ struct Run {
     }
     estimator.Take(estimates);
     for (int k = 0; k < Model::kColumns; ++k)
-      Line("column")
-          .Decimal(static_cast<std::uint32_t>(k))
-          .Hex(ResultBits(estimates.value[k]))
-          .Hex(ResultBits(estimates.sd[k]))
-          .End();
+      Line("column").Decimal(k).Hex(ResultBits(estimates.value[k])).Hex(ResultBits(estimates.sd[k])).End();
     for (int i = 0; i < 6; ++i)
       Line("joint")
-          .Decimal(static_cast<std::uint32_t>(i + 1))
+          .Decimal(i + 1)
           .Decimal(estimates.rows_used[i])
           .Decimal(estimates.rows_gated[i])
           .Hex(ResultBits(estimates.nis[i]))

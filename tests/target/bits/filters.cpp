@@ -13,16 +13,12 @@ void PrintReadOut(const FilterCalls& filter) {
   while (!filter.step_read_out()) {
   }
   for (int k = 0; k < filter.columns; ++k)
-    Line("column")
-        .Decimal(static_cast<std::uint32_t>(k))
-        .Hex(ResultBits(filter.value[k]))
-        .Hex(ResultBits(filter.sd[k]))
-        .End();
+    Line("column").Decimal(k).Hex(ResultBits(filter.value[k])).Hex(ResultBits(filter.sd[k])).End();
 }
 
 void Run(const FilterCalls& filter) {
   constexpr int kSamples = 400, kPrinted = 40;
-  Line("filter").Text(filter.name).Decimal(static_cast<std::uint32_t>(filter.columns)).End();
+  Line("filter").Text(filter.name).Decimal(filter.columns).End();
   filter.restart();
   Rows rows(filter);
   Digest digest;
@@ -35,8 +31,7 @@ void Run(const FilterCalls& filter) {
       digest.Add(static_cast<std::uint32_t>(row.report.status) << 1 | row.report.accepted);
     }
     filter.end_sample(sample % 7 == 0 ? 21u : 63u);
-    if (sample % kPrinted == 0)
-      Line("sample").Decimal(static_cast<std::uint32_t>(sample)).Hex(digest.value()).End();
+    if (sample % kPrinted == 0) Line("sample").Decimal(sample).Hex(digest.value()).End();
   }
   PrintReadOut(filter);
 }

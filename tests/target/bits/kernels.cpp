@@ -20,7 +20,7 @@ void Fill(Numbers& numbers, float* x, int count) {
 void Print(const char* name, int round, const float* x, int count) {
   Digest digest;
   digest.Add(x, count);
-  Line(name).Decimal(static_cast<std::uint32_t>(round)).Hex(digest.value()).End();
+  Line(name).Decimal(round).Hex(digest.value()).End();
 }
 
 // A covariance from its square root, then through every kernel that changes or reads it.

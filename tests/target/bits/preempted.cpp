@@ -14,7 +14,8 @@ using Model = generated::Er20Like;
 namespace {
 
 constexpr std::uint32_t kTicks = 10000;
-// Instructions between two ticks: a prime, so that ticks drift through the slices; an eighth of a sample's work fits in.
+// Instructions between two ticks: a prime, so that ticks drift through the slices; an eighth of a sample's work fits
+// in.
 constexpr std::uint32_t kPeriod = 8009;
 
 TraceTick trace[kTicks];
@@ -53,11 +54,7 @@ int Program() {
   estimator::Estimates<Model> estimates;
   arm.Take(estimates);
   for (int k = 0; k < Model::kColumns; ++k)
-    Line("column")
-        .Decimal(static_cast<std::uint32_t>(k))
-        .Hex(ResultBits(estimates.value[k]))
-        .Hex(ResultBits(estimates.sd[k]))
-        .End();
+    Line("column").Decimal(k).Hex(ResultBits(estimates.value[k])).Hex(ResultBits(estimates.sd[k])).End();
   Line("samples").Decimal(estimates.samples).Decimal(estimates.refused).Decimal(estimates.rows_used[0]).End();
   return estimates.refused == 0 && estimates.rows_used[0] > 0 ? 0 : 1;
 }

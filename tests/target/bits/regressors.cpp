@@ -29,8 +29,7 @@ void Run(const RegressorCalls& model) {
     digest.Add(model.front_rows, model.front);
     digest.Add(model.dense_rows, model.dense);
     digest.Add(model.jacobian, model.nonlinear);
-    if (sample % kPrinted == 0)
-      Line("sample").Decimal(static_cast<std::uint32_t>(sample)).Hex(digest.value()).End();
+    if (sample % kPrinted == 0) Line("sample").Decimal(sample).Hex(digest.value()).End();
   }
 }
 

@@ -1,7 +1,7 @@
 // tests - the signal path on raw ticks with gaps, wrapping counts, stale and saturated axes and a coupling.
 #include "armcal/signal/signal_path.hpp"
 #include "port/runner/line.hpp"
-#include "tests/target/numbers.hpp"
+#include "tests/target/raw_ticks.hpp"
 
 using namespace armcal;          // NOLINT: all of it is under test
 using namespace armcal::target;  // NOLINT: the bench of these programs
@@ -27,35 +27,6 @@ signal::Axes<n> CoupledAxes() {
   return axes;
 }
 
-// Ticks of axes that speed up and slow down at random.
-class RawTicks {
- public:
-  const model::RawSample<n>& Next() {
-    const int event = numbers_.Below(4000);
-    raw_.tick += event == 0 ? 3u : 1u;
-    for (int i = 0; i < n; ++i) {
-      speed_[i] += numbers_.Below(41) - 20;
-      const auto counts = static_cast<std::uint32_t>(raw_.counts[i]) + static_cast<std::uint32_t>(speed_[i] / 4);
-      raw_.counts[i] = static_cast<std::int32_t>(counts);
-      raw_.current[i] = static_cast<std::int16_t>(numbers_.Below(20001) - 10000);
-      raw_.flags[i] = model::kEnabled;
-      raw_.temperature_degC[i] = numbers_.Between(20.0f, 60.0f);
-    }
-    if (event == 1) raw_.flags[2] |= model::kSaturated;
-    if (event == 2) raw_.flags[4] = 0;
-    if (event == 3) raw_.flags[0] |= model::kStale;
-    return raw_;
-  }
-  RawTicks() {
-    for (int i = 0; i < n; ++i) raw_.counts[i] = 2147480000 - 50000 * i;  // wraps soon
-  }
-
- private:
-  Numbers numbers_{3};
-  model::RawSample<n> raw_;
-  std::int32_t speed_[n] = {};
-};
-
 }  // namespace
 
 int Program() {
@@ -66,7 +37,7 @@ int Program() {
     settings.torque_scale[i] = 1.0f + 0.01f * static_cast<float>(i);
   }
   path.SetSettings(settings);
-  RawTicks ticks;
+  RawTicks<n> ticks;
   Digest digest;
   int samples = 0;
   for (int k = 1; k <= 64000; ++k) {
@@ -77,8 +48,8 @@ int Program() {
       for (const float* values : {s.q, s.qd, s.qdd, s.tau, s.temperature_degC}) digest.Add(values, n);
       for (const std::uint8_t flags : s.flags) digest.Add(std::uint32_t{flags});
     }
-    if (k % 1000 == 0) Line("tick").Decimal(static_cast<std::uint32_t>(k)).Hex(digest.value()).End();
+    if (k % 1000 == 0) Line("tick").Decimal(k).Hex(digest.value()).End();
   }
-  Line("samples").Decimal(static_cast<std::uint32_t>(samples)).Decimal(path.gap_count()).End();
+  Line("samples").Decimal(samples).Decimal(path.gap_count()).End();
   return 0;
 }

@@ -1,0 +1,62 @@
+// physical - a filter's result made by dense double algebra from any amount of data; the tests' bench.
+#pragma once
+
+#include <Eigen/Dense>
+#include <memory>
+#include <random>
+
+#include "armcal/estimator/image.hpp"
+#include "armcal/physical/map_read_out.hpp"
+
+namespace armcal::physical::test {
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+// U D U' of a packed float factor, in double.
+inline Matrix Covariance(const float* ud, int n) {
+  Matrix u = Matrix::Identity(n, n);
+  Vector d(n);
+  for (int j = 0; j < n; ++j) {
+    d(j) = ud[math::UdIndex(j, j)];
+    for (int i = 0; i < j; ++i) u(i, j) = ud[math::UdIndex(i, j)];
+  }
+  return u * d.asDiagonal() * u.transpose();
+}
+
+// A table, and what a filter would say after rows of a made-up regressor; its rounding to float included.
+template <class Model>
+struct Case {
+  static constexpr int kColumns = Model::kColumns;
+  estimator::Table<Model> table = estimator::DefaultTable<Model>();
+  std::unique_ptr<estimator::ImageWork<Model>> work = std::make_unique<estimator::ImageWork<Model>>();
+  std::unique_ptr<estimator::Image<Model>> image = std::make_unique<estimator::Image<Model>>();
+  std::vector<float> x = std::vector<float>(kColumns), ud = std::vector<float>(math::UdSize(kColumns));
+
+  core::Status Build() {
+    const core::Status status = estimator::BuildImage<Model>(table, 1, *work, *image);
+    filter::ExpandPrior(image->prior, ud.data());
+    std::fill(x.begin(), x.end(), 0.0f);
+    return status;
+  }
+  // Rows h' x = y of variance 1 in prior units, as the filters take them.
+  void Take(const Matrix& h, const Vector& y) {
+    std::vector<double> factor(ud.begin(), ud.end()), mean(x.begin(), x.end()), f(kColumns), gain(kColumns);
+    for (int r = 0; r < h.rows(); ++r) {
+      const Vector row = h.row(r);
+      math::UdProject<kColumns>(factor.data(), row.data(), f.data());
+      double innovation = y(r);
+      for (int k = 0; k < kColumns; ++k) innovation -= row(k) * mean[k];
+      math::UdMeasure<kColumns>(factor.data(), f.data(), 1.0, gain.data());
+      for (int k = 0; k < kColumns; ++k) mean[k] += gain[k] * innovation;
+    }
+    for (std::size_t k = 0; k < ud.size(); ++k) ud[k] = static_cast<float>(factor[k]);
+    for (int k = 0; k < kColumns; ++k) x[k] = static_cast<float>(mean[k]);
+  }
+  MapPrior<Model> prior() const {
+    return {work->rigid.mean, work->rigid.sd, image->committed.p, image->scale, image->prior.dense_ud};
+  }
+  Posterior<Model> posterior() const { return {x.data(), ud.data()}; }
+};
+
+}  // namespace armcal::physical::test

@@ -35,7 +35,7 @@ class Rows {
     if (kind == RowKind::kNotFinite) dense_[kDense - 1] = std::numeric_limits<float>::quiet_NaN();
     if (kind == RowKind::kBeyondLimit) dense_[kDense - 2] = 2e6f;
     if (kind == RowKind::kOutlier) y += 1e4f;
-    return {joint, front_, dense_, y, kind != RowKind::kGated, {}};
+    return {joint, front_, dense_, y, kind != RowKind::kGated};
   }
 
  private:

@@ -63,7 +63,8 @@ struct Run {
 };
 
 Run<filter::ForgettingFilter<Model>> forgetting = {"forgetting", {}, {}, {}};
-Run<filter::KalmanFilter<Model>> kalman = {"kalman", {}, {}, {}};
+Run<filter::KalmanFilter<Model>> dense = {"kalman_dense", {}, {}, {}};
+Run<filter::KalmanFilter<Model, filter::Form::kBlock>> block = {"kalman_block", {}, {}, {}};
 
 }  // namespace
 
@@ -72,7 +73,8 @@ int Program() {
   const auto table = estimator::DefaultTable<Model>();
   if (!core::IsOk(estimator::BuildImage(table, 1, work, image))) return 1;
   forgetting.Start();
-  kalman.Start();
+  dense.Start();
+  block.Start();
   static TraceTick ticks[256];
   model::RawSample<6> raw;
   for (std::size_t bytes; (bytes = port::runner::Read(ticks, sizeof ticks)) != 0;) {
@@ -84,12 +86,14 @@ int Program() {
         raw.temperature_degC[i] = 0.01f * static_cast<float>(tick->temperature_cdegC[i]);
       }
       forgetting.Tick(raw);
-      kalman.Tick(raw);
+      dense.Tick(raw);
+      block.Tick(raw);
       ++raw.tick;
     }
   }
   forgetting.Finish();
-  kalman.Finish();
+  dense.Finish();
+  block.Finish();
   Line("ticks").Decimal(raw.tick).End();
-  return forgetting.estimates.rows_used[0] > 0 && kalman.estimates.rows_used[0] > 0 ? 0 : 1;
+  return forgetting.estimates.rows_used[0] > 0 && dense.estimates.rows_used[0] > 0 ? 0 : 1;
 }

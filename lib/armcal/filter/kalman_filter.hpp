@@ -76,7 +76,7 @@ class KalmanFilter {
       for (int e = 0; e < Layout::kNonlinear; ++e) put(Layout::kColumns + e, eta[e]);
 
     report_.status = Judge(largest);
-    const std::uint32_t taken = math::MaskOf(use && report_.status == core::Status::kOk);
+    const std::uint32_t taken = math::MaskOf(use & (report_.status == core::Status::kOk));
     for (int p = first; p < kSize; ++p) row[p] = math::Masked(row[p], taken);
     used_ = taken != 0u;
     estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f, prior_->gate_sigma);
@@ -86,8 +86,8 @@ class KalmanFilter {
     if (!estimate_.StepRow(considered, credit)) return false;
     report_.innovation = estimate_.innovation();
     report_.variance = estimate_.variance();
-    report_.accepted = used_ && estimate_.inside();
-    if (report_.status == core::Status::kOk && !report_.accepted) report_.status = core::Status::kGated;
+    report_.accepted = used_ & estimate_.inside();
+    report_.status = Answer(report_.status, report_.accepted);
     return true;
   }
   const UpdateReport& report() const { return report_; }

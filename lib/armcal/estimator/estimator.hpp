@@ -1,6 +1,8 @@
 // estimator - where model and filter meet: samples in, estimates out; knows no register and no storage.
 #pragma once
 
+#include <type_traits>
+
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/sample_ring.hpp"
 #include "armcal/estimator/axes.hpp"

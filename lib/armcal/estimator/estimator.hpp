@@ -118,6 +118,8 @@ class Estimator {
   std::uint32_t pending() const { return ring_.size(); }         // samples waiting for Step; context: any
   std::uint32_t tick_gaps() const { return path_.gap_count(); }  // restarts of the signal path; context: tick
   const Filter& filter() const { return filter_; }
+  // What Take showed last, for BeginPhysical: right after Take, before the next Step.
+  const typename Filter::ReadOut& read_out() const { return read_out_; }
 
  private:
   enum class Stage : std::uint8_t { kIdle, kRow, kEnd, kReadOut };

@@ -56,7 +56,17 @@ struct Case {
   MapPrior<Model> prior() const {
     return {work->rigid.mean, work->rigid.sd, image->committed.p, image->scale, image->prior.dense_ud};
   }
-  Posterior<Model> posterior() const { return {x.data(), ud.data()}; }
+  template <class ReadOut>
+  core::Status HandOver(ReadOut& out, bool warm = false) const {
+    core::Status status = out.Begin(prior(), x.data(), warm);
+    for (int j = 0; j < kColumns && core::IsOk(status); ++j) {
+      float column[kColumns] = {};
+      for (int i = 0; i < j; ++i) column[i] = ud[math::UdIndex(i, j)];
+      column[j] = 1;
+      status = out.AddSpread(ud[math::UdIndex(j, j)], column);
+    }
+    return status;
+  }
 };
 
 }  // namespace armcal::physical::test

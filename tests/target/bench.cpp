@@ -111,5 +111,6 @@ int Program() {
   ForEachFilter(MeasureFilter);
   ForEachRegressor(MeasureRegressor);
   MeasureEstimators();
+  MeasureReadOut();
   return 0;
 }

@@ -1,41 +1,46 @@
 // estimator - hands a filter's result to the physical read-out; knows each filter's way to keep it, and no register.
 #pragma once
 
-#include "armcal/estimator/image.hpp"
+#include <type_traits>
+
+#include "armcal/estimator/estimator.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
 #include "armcal/physical/map_read_out.hpp"
 
 namespace armcal::estimator {
 
-// The factor U D U' behind a finished read-out, packed. Shape: [UdSize(kColumns)].
+// The estimate behind a finished read-out.
 template <class Layout>
-const float* FactorOf(const filter::ForgettingFilter<Layout>&,
-                      const typename filter::ForgettingFilter<Layout>::ReadOut& done) {
-  return done.ud;
+const auto& EstimateOf(const filter::ForgettingFilter<Layout>&,
+                       const typename filter::ForgettingFilter<Layout>::ReadOut& done) {
+  return done.estimate;
 }
-template <class Layout>
-const float* FactorOf(const filter::KalmanFilter<Layout>& filter,
-                      const typename filter::KalmanFilter<Layout>::ReadOut&) {
-  return filter.factor();
+template <class Layout, filter::Form form, filter::Beside beside>
+const auto& EstimateOf(const filter::KalmanFilter<Layout, form, beside>& filter,
+                       const typename filter::KalmanFilter<Layout, form, beside>::ReadOut&) {
+  return filter.estimate();
 }
 
-// From a filter's finished read-out, before another row: read_out.Step may follow, and the filter may go on. rigid: the
-// one that BuildImage filled in for this image; both must stay until the read-out is done. warm: the image is that of
-// the last read-out. Answers as MapReadOut::Begin and AddSpread. Some kColumns^3 multiplications and additions; call
-// those two yourself to cut it into slices. Context: background.
+// From an estimator's filter between two samples: read_out.Step may follow while the estimator goes on. image, rigid:
+// what the estimator runs on, and what BuildImage left for it; both must stay until the read-out is done. warm: the
+// image is that of the last read-out. kBusy: rows have come in since the filter's own read-out; ask for one
+// (RequestReadOut) and come back. Else as MapReadOut::Begin and AddSpread. Some kColumns^3 multiplications and
+// additions; to cut that into slices call those two as here. Context: background.
 template <class Model, class Filter, class T>
-core::Status BeginPhysical(const Image<Model>& image, const RigidPrior<Model, float>& rigid, const Filter& filter,
-                           const typename Filter::ReadOut& done, bool warm, physical::MapReadOut<Model, T>& read_out) {
-  constexpr int n = Model::kColumns;
+core::Status BeginPhysical(const Image<Model>& image, const RigidPrior<Model, float>& rigid,
+                           const Estimator<Model, Filter>& estimator, bool warm,
+                           physical::MapReadOut<Model, T>& read_out) {
+  const typename Filter::ReadOut* done = estimator.read_out();
+  if (done == nullptr) return core::Status::kBusy;
   core::Status status =
-      read_out.Begin({rigid.mean, rigid.sd, image.committed.p, image.scale, image.prior.dense_ud}, done.x, warm);
-  const float* ud = FactorOf(filter, done);
-  for (int j = 0; j < n && core::IsOk(status); ++j) {
-    float column[n] = {};
-    for (int i = 0; i < j; ++i) column[i] = ud[math::UdIndex(i, j)];
-    column[j] = 1.0f;
-    status = read_out.AddSpread(ud[math::UdIndex(j, j)], column);
+      read_out.Begin({rigid.mean, rigid.sd, image.committed.p, image.scale, image.prior.dense_ud}, done->x, warm);
+  const auto& estimate = EstimateOf(estimator.filter(), *done);
+  constexpr int kSize = std::decay_t<decltype(estimate)>::kSize;
+  for (int p = 0; p < kSize && core::IsOk(status); ++p) {
+    float spread[kSize];
+    const float d = estimate.Spread(p, spread);
+    status = read_out.AddSpread(d, spread);
   }
   return status;
 }

@@ -78,11 +78,19 @@ class DataInformation {
     }
   }
   T at(int i, int j) const { return packed_[i < j ? math::UdIndex(i, j) : math::UdIndex(j, i)]; }
-  // Row i of the information times y [kFree].
-  T Times(int i, const T* y) const {
-    T sum = T(0);
-    for (int j = 0; j < kFree; ++j) sum += at(i, j) * y[j];
-    return sum;
+  // out = information y. Shapes: [kFree].
+  void Times(const T* y, T* out) const {
+    const T* packed = packed_;
+    for (int j = 0; j < kFree; ++j) {
+      T sum = T(0);
+      const T own = y[j];
+      for (int i = 0; i < j; ++i) {
+        sum += packed[i] * y[i];
+        out[i] += packed[i] * own;
+      }
+      out[j] = sum + packed[j] * own;
+      packed += j + 1;
+    }
   }
 
  private:

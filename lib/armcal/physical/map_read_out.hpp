@@ -95,7 +95,8 @@ class MapReadOut {
         return false;
       case Stage::kStart:
         for (int i = 0; i < kFree; ++i) change_[i] = Shift(i);
-        for (int i = 0; i < kFree; ++i) gradient_[i] += information_.Times(i, change_);
+        information_.Times(change_, turned_);
+        for (int i = 0; i < kFree; ++i) gradient_[i] += turned_[i];
         Enter(Stage::kColumn);
         return false;
       case Stage::kColumn:
@@ -187,10 +188,8 @@ class MapReadOut {
       change_[i] = i < kBodies ? trial_.body[i] - point_.body[i] : moved;
       if (i < kBodies) cost += moved * (point_.u[i] + T(0.5) * moved);
     }
-    for (int i = 0; i < kFree; ++i) {
-      turned_[i] = information_.Times(i, change_);
-      cost += change_[i] * (gradient_[i] + T(0.5) * turned_[i]);
-    }
+    information_.Times(change_, turned_);
+    for (int i = 0; i < kFree; ++i) cost += change_[i] * (gradient_[i] + T(0.5) * turned_[i]);
     const bool last = level_ == kLast, gain = inside && cost < -kGain * share * expected;
     const bool enough = expected <= (last ? kNothing : kEnough);
     if (gain) {

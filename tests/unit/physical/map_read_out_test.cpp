@@ -80,9 +80,8 @@ calibration::BarrierFit Offline(const codegen::Model& model, const Case<Six>& c)
   for (int k = 0; k < size; ++k)
     if (c.image->prior.active[k]) active.push_back(k);
   const Vector scale = Eigen::Map<const Eigen::VectorXf>(c.image->scale, size).cast<double>();
-  std::vector<float> before(c.ud.size());
-  filter::ExpandPrior(c.image->prior, before.data());
-  const Matrix p = Covariance(c.ud.data(), size)(active, active), p0 = Covariance(before.data(), size)(active, active);
+  const Matrix p = Covariance(c.ud.data(), size)(active, active),
+               p0 = Covariance(c.Before().data(), size)(active, active);
   const Vector x = Eigen::Map<const Eigen::VectorXf>(c.x.data(), size).cast<double>()(active);
   const Vector inverse = scale(active).cwiseInverse();
   const Matrix information = p.inverse() - p0.inverse();

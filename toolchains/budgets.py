@@ -20,6 +20,7 @@ import stack
 FILTER_KEYS = ["instructions", "solve", "read_out", "slice_max", "slice_min", "text_bytes", "state_bytes", "stack_bytes"]
 REGRESSOR_KEYS = ["instructions", "text_bytes", "stack_bytes"]
 ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "state_bytes"]
+READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "state_bytes", "stack_bytes"]
 NOT_THE_FILTERS = re.compile(r"Get_|Calls|\.rodata.*\.str")  # the bench's own part of an object
 
 
@@ -50,10 +51,13 @@ def stack_bytes(file, root, faults):
 def measure(rows, objects, size, faults):
     """The rows of the JSON file, by kind."""
     by_name = {Path(o).name.split(".")[0]: o for o in objects}
-    figures = {"filters": [], "regressors": [], "estimators": []}
+    figures = {"filters": [], "regressors": [], "estimators": [], "read_outs": []}
     for row in rows:
         if row["kind"] == "estimator":
             figures["estimators"].append({"estimator": row["name"]} | {k: row[k] for k in ESTIMATOR_KEYS})
+            continue
+        if row["kind"] == "read_out":
+            figures["read_outs"].append({"read_out": row["name"]} | {k: row[k] for k in READ_OUT_KEYS})
             continue
         is_filter = row["kind"] == "filter"
         name = f"{row['name']}_{row['n']}" if is_filter else f"regressor_{row['name']}"
@@ -78,7 +82,7 @@ def measure(rows, objects, size, faults):
 
 
 def label(row):
-    return f"{row['filter']}_{row['n']}" if "filter" in row else row.get("robot") or row["estimator"]
+    return f"{row['filter']}_{row['n']}" if "filter" in row else row.get("robot") or row.get("estimator") or row["read_out"]
 
 
 def compare(rows, keys, accepted, limits, section, rise, faults):
@@ -123,6 +127,10 @@ def table(figures, core, budgets):
     lines += [f"{'estimator, er20_like':24}{'tick':>8}{'longest':>9}{'sample':>9}{'slice':>8}{'state':>8}"]
     lines += [f"{e['estimator']:24}{e['push']:8}{e['push_max']:9}{e['sample']:9}{e['slice_max']:8}{e['state_bytes']:8}"
               for e in figures["estimators"]]
+    if figures["read_outs"]:
+        lines += [f"{'physical read-out, er20_like':28}{'instr.':>10}{'slices':>8}{'longest':>9}{'hand-over':>11}{'state':>8}{'stack':>7}"]
+    lines += [f"{r['read_out']:28}{r['instructions']:10}{r['slices']:8}{r['slice_max']:9}{r['hand_over']:11}{r['state_bytes']:8}"
+              f"{r['stack_bytes']:7}" for r in figures["read_outs"]]
     return "\n".join(lines) + "\n"
 
 
@@ -140,7 +148,8 @@ def main():
     Path(options.json).with_suffix(".txt").write_text(text, encoding="utf-8")
     print(text)
     accepted, rise = budgets.get(options.core, {}), budgets["rise"]
-    for kind, keys in ("filters", FILTER_KEYS), ("regressors", REGRESSOR_KEYS), ("estimators", ESTIMATOR_KEYS):
+    for kind, keys in ("filters", FILTER_KEYS), ("regressors", REGRESSOR_KEYS), ("estimators", ESTIMATOR_KEYS), \
+            ("read_outs", READ_OUT_KEYS):
         compare(figures[kind], keys, accepted.get(kind, {}), budgets["limits"], f"{options.core}.{kind}", rise, faults)
     for fault in faults:
         print(f"over budget: {fault}", file=sys.stderr)

@@ -153,5 +153,6 @@ int Program() {
   ForEachFilter(MeasureFilter);
   ForEachRegressor(MeasureRegressor);
   MeasureEstimators();
+  MeasureReadOut();
   return 0;
 }

@@ -28,5 +28,7 @@ struct Range {
 
 // A line for each estimator: see estimator_cost.cpp.
 void MeasureEstimators();
+// Of the physical read-out: see read_out_cost.cpp.
+void MeasureReadOut();
 
 }  // namespace armcal::target

@@ -130,6 +130,8 @@ class Estimator {
   std::uint32_t pending() const { return ring_.size(); }         // samples waiting for Step; context: any
   std::uint32_t tick_gaps() const { return path_.gap_count(); }  // restarts of the signal path; context: tick
   const Filter& filter() const { return filter_; }
+  // The filter's finished read-out, for BeginPhysical; nullptr: rows have come in since. Context: background.
+  const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
 
  private:
   enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReadOut };
@@ -168,11 +170,13 @@ class Estimator {
   bool StartSample() {
     if (image_ != nullptr && read_out_due_) {
       read_out_due_ = false;
+      stands_ = false;
       filter_.BeginReadOut(read_out_);
       stage_ = Stage::kReadOut;
       return true;
     }
     if (!core::IsOk(ring_.Pop(item_))) return false;
+    stands_ = false;
     credit_ -= kSampleCost;
     if (image_ == nullptr || item_.generation != image_->committed.generation) {
       ++estimates_.stale;
@@ -296,6 +300,7 @@ class Estimator {
     }
     estimates_.refused = ring_.refused();
     published_.Post(estimates_);
+    stands_ = true;
     stage_ = Stage::kIdle;
   }
 
@@ -325,6 +330,7 @@ class Estimator {
   int joint_ = 0;
   Stage stage_ = Stage::kIdle;
   bool read_out_due_ = false;
+  bool stands_ = false;  // nothing has changed since the read-out
 };
 
 }  // namespace armcal::estimator

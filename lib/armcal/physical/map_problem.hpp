@@ -2,7 +2,6 @@
 // alone said. Knows no filter.
 #pragma once
 
-#include "armcal/core/status.hpp"
 #include "armcal/math/ud.hpp"
 #include "armcal/physical/physical.hpp"
 
@@ -19,18 +18,11 @@ struct MapPrior {
   const float* dense_ud;  // [UdSize(kDense)] the filter's prior of the dense columns, in prior units
 };
 
-// Mean and covariance U D U' after the data, prior inside, whichever filter it comes from.
-template <class Layout>
-struct Posterior {
-  const float* x;   // [kColumns]
-  const float* ud;  // [UdSize(kColumns)]
-};
-
 // v [n] = b U^-1 for the unit upper triangle of the n columns from `offset` on, in place; b is zero before `first`.
-template <int n, class T>
-void SolveRow(const float* ud, int offset, int first, T* v) {
+template <int n, class S, class T>
+void SolveRow(const S* ud, int offset, int first, T* v) {
   for (int i = first + 1; i < n; ++i) {
-    const float* column = ud + math::UdIndex(offset, offset + i);
+    const S* column = ud + math::UdIndex(offset, offset + i);
     for (int k = first; k < i; ++k) v[i] -= v[k] * T(column[k]);
   }
 }
@@ -49,9 +41,8 @@ void RowOfBodies(const float* scale, const T* row, T* out) {
 }
 
 // What the data alone say of y = [bodies about the link origins - their means, dense effects in prior units], all
-// friction left free: minus log likelihood = y' information y / 2 + gradient' y. The filter's covariance, less the
-// prior that it holds: P^-1 - C^-1 = U^-T D^-1 U^-1 - (that of the prior). Front columns are left out of P by leaving
-// them out of its factor's end.
+// friction left free: minus log likelihood = y' information y / 2 + gradient' y. It is the filter's information less
+// that of the prior which the filter started from: P^-1 - C^-1, with P^-1 = U^-T D^-1 U^-1 row by row.
 template <class Layout, class T>
 class DataInformation {
  public:
@@ -61,48 +52,64 @@ class DataInformation {
   void Clear() {
     for (T& a : packed_) a = T(0);
   }
-  // One row of the filter's U^-1, or of the prior's. gradient [kFree]: gets the row's part.
-  void AddRow(int k, const MapPrior<Layout>& prior, const Posterior<Layout>& posterior, T* gradient) {
+  // Row k of the filter's U^-1, then of the prior's. x [kColumns], ud [UdSize(kColumns)]: the filter's result in the
+  // order [front, dense]: the dense part of the factor is then that of P without the front columns. gradient [kFree]
+  // gets the row's part.
+  void AddRow(int k, const MapPrior<Layout>& prior, const T* x, const T* ud, T* gradient) {
+    constexpr int kFront = Layout::kFront;
+    T v[Layout::kDense] = {}, a[kFree], at = T(0), weight;
     const bool from_filter = k < Layout::kDense;
-    const int row = from_filter ? k : k - Layout::kDense, offset = from_filter ? Layout::kFront : 0;
-    const float* ud = from_filter ? posterior.ud : prior.dense_ud;
-    T v[Layout::kDense] = {}, a[kFree], at = T(0);
+    const int row = from_filter ? k : k - Layout::kDense;
     v[row] = T(1);
-    if (from_filter) SolveRow<Layout::kDense>(ud, offset, row, v);
-    else SolveRow<Layout::kRigid>(ud, offset, row, v);
-    for (int i = 0; i < Layout::kDense; ++i) at += v[i] * T(posterior.x[Layout::kFront + i]);
+    if (from_filter) {
+      SolveRow<Layout::kDense>(ud, kFront, row, v);
+      for (int i = 0; i < Layout::kDense; ++i) at += v[i] * x[kFront + i];
+      weight = math::Divide(T(1), ud[math::UdIndex(kFront + row, kFront + row)]);
+    } else {
+      SolveRow<Layout::kRigid>(prior.dense_ud, 0, row, v);
+      weight = math::Divide(T(-1), T(prior.dense_ud[math::UdIndex(row, row)]));
+    }
     RowOfBodies<Layout>(prior.scale, v, a);
-    const T weight = math::Divide(T(from_filter ? 1 : -1), T(ud[math::UdIndex(offset + row, offset + row)]));
     T* packed = packed_;
     for (int j = 0; j < kFree; ++j) {
       const T scaled = weight * a[j];
       for (int i = 0; i <= j; ++i) *packed++ += scaled * a[i];
-      if (from_filter) gradient[j] -= scaled * at;
+      gradient[j] -= scaled * at;
     }
   }
   T at(int i, int j) const { return packed_[i < j ? math::UdIndex(i, j) : math::UdIndex(j, i)]; }
-  // Row i of the information times y [kFree].
-  T Times(int i, const T* y) const {
-    T sum = T(0);
-    for (int j = 0; j < kFree; ++j) sum += at(i, j) * y[j];
-    return sum;
+  // out = information y. Shapes: [kFree].
+  void Times(const T* y, T* out) const {
+    const T* packed = packed_;
+    for (int j = 0; j < kFree; ++j) {
+      T sum = T(0);
+      const T own = y[j];
+      for (int i = 0; i < j; ++i) {
+        sum += packed[i] * y[i];
+        out[i] += packed[i] * own;
+      }
+      out[j] = sum + packed[j] * own;
+      packed += j + 1;
+    }
   }
 
  private:
   T packed_[math::UdSize(kFree)] = {};
 };
 
-// kUnphysical: a body of the prior cannot exist. kNotFinite: a number of the result is none, or a D is negative.
-template <class Layout>
-core::Status Judge(const MapPrior<Layout>& prior, const Posterior<Layout>& posterior) {
-  constexpr int kBlock = Layout::kBodyParameters / Layout::kJoints;
-  for (int link = 0; link < Layout::kJoints; ++link)
-    if (!IsPhysical(prior.body + link * kBlock)) return core::Status::kUnphysical;
-  bool finite = true;
-  for (int k = 0; k < Layout::kColumns; ++k)
-    finite &= math::IsFinite(posterior.x[k]) && posterior.ud[math::UdIndex(k, k)] >= 0.0f;
-  for (int k = 0; k < math::UdSize(Layout::kColumns); ++k) finite &= math::IsFinite(posterior.ud[k]);
-  return finite ? core::Status::kOk : core::Status::kNotFinite;
+// Front column k given the dense ones: x_k = value + row' w, with that variance about it. row [kDense].
+template <class Layout, class T>
+void FrontGivenDense(const T* x, const T* ud, int k, T* row, T& value, T& variance) {
+  constexpr int kFront = Layout::kFront, kDense = Layout::kDense;
+  for (int i = 0; i < kDense; ++i) row[i] = ud[math::UdIndex(k, kFront + i)];
+  SolveRow<kDense>(ud, kFront, 0, row);  // U_fd U_dd^-1
+  value = x[k];
+  for (int i = 0; i < kDense; ++i) value -= row[i] * x[kFront + i];
+  variance = ud[math::UdIndex(k, k)];  // of U_ff D_f U_ff'
+  for (int i = k + 1; i < kFront; ++i) {
+    const T u = ud[math::UdIndex(k, i)];
+    variance += u * u * ud[math::UdIndex(i, i)];
+  }
 }
 
 }  // namespace armcal::physical

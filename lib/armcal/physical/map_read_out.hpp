@@ -13,14 +13,16 @@
 // the prior bends, and its curvature is neglected.
 #pragma once
 
+#include "armcal/core/status.hpp"
 #include "armcal/math/cholesky.hpp"
 #include "armcal/physical/map_arm.hpp"
 
 namespace armcal::physical {
 
-// T: double, on the host and on cores with a double FPU; float is too coarse for P^-1 - C^-1. Some 50 KB for six
-// joints. Begin copies the filter's numbers, so the filter may go on while Step works; the table's must stay. A slice
-// costs at most kFree^2 multiplications and additions. Context of every call: background.
+// T: double, on the host and on cores with a double FPU; float is too coarse for P^-1 - C^-1. Some 60 KB for six
+// joints. Use: Begin, AddSpread for every column of the filter's factor, Step until it answers true. From the first
+// Step on the filter may go on; the table's numbers must stay. A slice, AddSpread included, costs at most kFree^2
+// multiplications and additions. Context of every call: background.
 template <class Layout, class T>
 class MapReadOut {
  public:
@@ -39,25 +41,39 @@ class MapReadOut {
     bool converged = false;      // less than 1e-4 of chi^2 is left to gain; the bodies can exist in any case
   };
 
-  // kOk: call Step until it answers true. warm: start at the last solution and the last eps; the prior is the same.
-  // Refused as Judge says; then the object is as before.
-  core::Status Begin(const MapPrior<Layout>& prior, const Posterior<Layout>& posterior, bool warm = false) {
-    const core::Status status = Judge(prior, posterior);
-    if (!core::IsOk(status)) return status;
+  // x [kColumns]: the filter's mean in prior units, its prior inside. warm: start at the last solution and the last
+  // eps; the prior is the same. kUnphysical: a body of the prior cannot exist, or hardly (MapArm::kMargin). kNotFinite:
+  // x. When refused, the object is as before.
+  core::Status Begin(const MapPrior<Layout>& prior, const float* x, bool warm = false) {
+    bool good = true;
+    for (int k = 0; k < kColumns; ++k) good &= math::IsFinite(x[k]);
+    if (!good) return core::Status::kNotFinite;
+    for (int at = 0; at < kBodies; at += Arm::kBlock)
+      if (!IsPhysical(prior.body + at)) return core::Status::kUnphysical;
     Arm arm;
     arm.Start(prior);
     for (T& u : trial_.u) u = T(0);
     if (!arm.Place(trial_)) return core::Status::kUnphysical;
+
     arm_ = arm;
-    for (int k = 0; k < kColumns; ++k) x_[k] = posterior.x[k];
-    for (int k = 0; k < math::UdSize(kColumns); ++k) ud_[k] = posterior.ud[k];
-    const bool keep = warm && result_.converged;
-    if (!keep) point_ = trial_;
-    level_ = keep ? kLast : 0;
-    result_ = Result{};
-    information_.Clear();
-    for (T& g : gradient_) g = T(0);
-    Enter(Stage::kData);
+    warm_ = warm && result_.converged;
+    for (int k = 0; k < kColumns; ++k) x_[k] = T(x[k]);
+    for (T& u : ud_) u = T(0);
+    Enter(Stage::kSpread);
+    return core::Status::kOk;
+  }
+
+  // The filter's covariance in prior units: P += d column column'. Its factor's columns, in whatever order the filter
+  // keeps them. kNotFinite: a number, or d < 0; the read-out cannot go on, result() is the last one. column [kColumns].
+  core::Status AddSpread(float d, const float* column) {
+    bool good = math::IsFinite(d) && d >= 0.0f;
+    for (int k = 0; k < kColumns; ++k) {
+      good &= math::IsFinite(column[k]);
+      spread_[k] = T(column[k]);
+    }
+    if (!good) Enter(Stage::kDone);
+    if (stage_ != Stage::kSpread) return core::Status::kNotFinite;
+    math::UdAdd<kColumns>(ud_, T(d), spread_);
     return core::Status::kOk;
   }
 
@@ -65,13 +81,22 @@ class MapReadOut {
   bool Step() {
     const int k = next_++;
     switch (stage_) {
+      case Stage::kSpread:
+        if (!warm_) point_ = trial_;
+        level_ = warm_ ? kLast : 0;
+        result_ = Result{};
+        information_.Clear();
+        for (T& g : gradient_) g = T(0);
+        Enter(Stage::kData);
+        return false;
       case Stage::kData:
-        information_.AddRow(k, arm_.prior(), {x_, ud_}, gradient_);
+        information_.AddRow(k, arm_.prior(), x_, ud_, gradient_);
         if (next_ == DataInformation<Layout, T>::kRows) Enter(Stage::kStart);
         return false;
       case Stage::kStart:
         for (int i = 0; i < kFree; ++i) change_[i] = Shift(i);
-        for (int i = 0; i < kFree; ++i) gradient_[i] += information_.Times(i, change_);
+        information_.Times(change_, turned_);
+        for (int i = 0; i < kFree; ++i) gradient_[i] += turned_[i];
         Enter(Stage::kColumn);
         return false;
       case Stage::kColumn:
@@ -110,18 +135,11 @@ class MapReadOut {
   const Result& result() const { return result_; }
 
  private:
+  // clang-format off
   enum class Stage : std::uint8_t {
-    kData,
-    kStart,
-    kColumn,
-    kLower,
-    kUpper,
-    kTrial,
-    kCurvature,
-    kBody,
-    kColumnRead,
-    kDone
+    kSpread, kData, kStart, kColumn, kLower, kUpper, kTrial, kCurvature, kBody, kColumnRead, kDone
   };
+  // clang-format on
   static constexpr int kLast = 2;  // of kBarrier
   // The prior's curvature is 1 in every direction and data only add to it: a smaller pivot is the filter's rounding.
   static constexpr T kLeastPivot = T(0.5);
@@ -170,10 +188,8 @@ class MapReadOut {
       change_[i] = i < kBodies ? trial_.body[i] - point_.body[i] : moved;
       if (i < kBodies) cost += moved * (point_.u[i] + T(0.5) * moved);
     }
-    for (int i = 0; i < kFree; ++i) {
-      turned_[i] = information_.Times(i, change_);
-      cost += change_[i] * (gradient_[i] + T(0.5) * turned_[i]);
-    }
+    information_.Times(change_, turned_);
+    for (int i = 0; i < kFree; ++i) cost += change_[i] * (gradient_[i] + T(0.5) * turned_[i]);
     const bool last = level_ == kLast, gain = inside && cost < -kGain * share * expected;
     const bool enough = expected <= (last ? kNothing : kEnough);
     if (gain) {
@@ -204,23 +220,11 @@ class MapReadOut {
     result_.body_sd[k] = Deviation(change_);
   }
 
-  // A front column follows the dense ones: x = x^ + l (w - w^), l = U_fd U_dd^-1, with variance U_ff D_f U_ff' about
-  // that.
   void ReadColumn(int k) {
-    constexpr int kFront = Layout::kFront, kDense = Layout::kDense;
-    T row[kDense] = {}, value = T(0), variance = T(0);
-    if (k < kFront) {
-      for (int i = 0; i < kDense; ++i) row[i] = T(ud_[math::UdIndex(k, kFront + i)]);
-      SolveRow<kDense>(ud_, kFront, 0, row);
-      value = T(x_[k]);
-      for (int i = 0; i < kDense; ++i) value -= row[i] * T(x_[kFront + i]);
-      for (int i = k; i < kFront; ++i) {
-        const T u = i == k ? T(1) : T(ud_[math::UdIndex(k, i)]);
-        variance += u * u * T(ud_[math::UdIndex(i, i)]);
-      }
-    } else {
-      row[k - kFront] = T(1);
-    }
+    constexpr int kFront = Layout::kFront;
+    T row[Layout::kDense] = {}, value = T(0), variance = T(0);
+    if (k < kFront) FrontGivenDense<Layout>(x_, ud_, k, row, value, variance);
+    else row[k - kFront] = T(1);
     RowOfBodies<Layout>(arm_.prior().scale, row, change_);
     for (int i = 0; i < kFree; ++i) value += change_[i] * Shift(i);
     arm_.ToFree(point_, Arm::kLinks, change_);
@@ -230,7 +234,8 @@ class MapReadOut {
   }
 
   Arm arm_;
-  float x_[kColumns] = {}, ud_[math::UdSize(kColumns)] = {};
+  T x_[kColumns] = {}, spread_[kColumns] = {};
+  T ud_[math::UdSize(kColumns)] = {};  // the filter's covariance in the order [front, dense]
   DataInformation<Layout, T> information_;
   T gradient_[kFree] = {};              // of the data term over y, at point_
   T factor_[math::UdSize(kFree)] = {};  // of the Hessian over u
@@ -238,6 +243,7 @@ class MapReadOut {
   MapPoint<Layout, T> point_, trial_;
   Result result_;
   int next_ = 0, level_ = 0;
+  bool warm_ = false;
   Stage stage_ = Stage::kDone;
 };
 

@@ -40,7 +40,7 @@ std::unique_ptr<Case<Model>> Draw(unsigned seed, double weight, double size) {
 
 template <class Model>
 const typename ReadOut<Model>::Result& Solve(ReadOut<Model>& read_out, const Case<Model>& c, bool warm = false) {
-  EXPECT_EQ(read_out.Begin(c.prior(), c.posterior(), warm), core::Status::kOk);
+  EXPECT_EQ(c.HandOver(read_out, warm), core::Status::kOk);
   while (!read_out.Step()) {
   }
   return read_out.result();
@@ -80,9 +80,8 @@ calibration::BarrierFit Offline(const codegen::Model& model, const Case<Six>& c)
   for (int k = 0; k < size; ++k)
     if (c.image->prior.active[k]) active.push_back(k);
   const Vector scale = Eigen::Map<const Eigen::VectorXf>(c.image->scale, size).cast<double>();
-  std::vector<float> before(c.ud.size());
-  filter::ExpandPrior(c.image->prior, before.data());
-  const Matrix p = Covariance(c.ud.data(), size)(active, active), p0 = Covariance(before.data(), size)(active, active);
+  const Matrix p = Covariance(c.ud.data(), size)(active, active),
+               p0 = Covariance(c.Before().data(), size)(active, active);
   const Vector x = Eigen::Map<const Eigen::VectorXf>(c.x.data(), size).cast<double>()(active);
   const Vector inverse = scale(active).cwiseInverse();
   const Matrix information = p.inverse() - p0.inverse();
@@ -191,8 +190,8 @@ TEST(MapReadOut, WithAnotherBetweenItsSlicesAndAFilterThatGoesOn_GivesTheSameBit
   auto alone = std::make_unique<ReadOut<Six>>(), first = std::make_unique<ReadOut<Six>>(),
        second = std::make_unique<ReadOut<Six>>();
   const auto& expected = Solve(*alone, *c);
-  ASSERT_EQ(first->Begin(c->prior(), c->posterior()), core::Status::kOk);
-  ASSERT_EQ(second->Begin(other->prior(), other->posterior()), core::Status::kOk);
+  ASSERT_EQ(c->HandOver(*first), core::Status::kOk);
+  ASSERT_EQ(other->HandOver(*second), core::Status::kOk);
   std::fill(c->x.begin(), c->x.end(), 1e9f);
   std::fill(c->ud.begin(), c->ud.end(), 1e9f);
   bool done = false;
@@ -202,6 +201,26 @@ TEST(MapReadOut, WithAnotherBetweenItsSlicesAndAFilterThatGoesOn_GivesTheSameBit
   }
   for (int k = 0; k < 66; ++k) EXPECT_EQ(first->result().body[k], expected.body[k]) << k;
   for (int k = 0; k < Six::kColumns; ++k) EXPECT_EQ(first->result().column_sd[k], expected.column_sd[k]) << k;
+}
+
+TEST(MapReadOut, FromAnotherFactorOfTheSameCovariance_IsTheSame) {
+  const auto c = Draw<Six>(8, 0.2, 0.5);
+  auto one = std::make_unique<ReadOut<Six>>(), two = std::make_unique<ReadOut<Six>>();
+  const auto& expected = Solve(*one, *c);
+  // Eigenvectors: columns in no order at all.
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(Covariance(c->ud.data(), Six::kColumns));
+  ASSERT_EQ(two->Begin(c->prior(), c->x.data()), core::Status::kOk);
+  for (int k = 0; k < Six::kColumns; ++k) {
+    const Eigen::VectorXf column = eigen.eigenvectors().col(k).cast<float>();
+    const double d = std::max(0.0, eigen.eigenvalues()(k));
+    ASSERT_EQ(two->AddSpread(static_cast<float>(d), column.data()), core::Status::kOk);
+  }
+  while (!two->Step()) {
+  }
+  // Eigenvectors rounded to float: 1e-7 of the largest variance, in the smallest one's inverse.
+  EXPECT_LT(Distance(*c, two->result().body, expected.body), 0.02);
+  for (int k = 0; k < Six::kColumns; ++k)
+    EXPECT_NEAR(two->result().column_sd[k], expected.column_sd[k], 0.01 * expected.column_sd[k]) << k;
 }
 
 // The objective as the header states it, in dense double algebra: all links' central coordinates, then the effects.
@@ -294,13 +313,13 @@ TEST(MapReadOut, RefusedInput_LeavesTheLastResult) {
   auto read_out = std::make_unique<ReadOut<Six>>();
   const std::vector<double> before(Solve(*read_out, *c).body, read_out->result().body + 66);
   c->x[20] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(read_out->Begin(c->prior(), c->posterior()), core::Status::kNotFinite);
+  EXPECT_EQ(c->HandOver(*read_out), core::Status::kNotFinite);
   c->x[20] = 0;
   c->ud[math::UdIndex(30, 30)] = -1e-9f;
-  EXPECT_EQ(read_out->Begin(c->prior(), c->posterior()), core::Status::kNotFinite);
+  EXPECT_EQ(c->HandOver(*read_out), core::Status::kNotFinite);
   c->ud[math::UdIndex(30, 30)] = 0.5f;
   c->work->rigid.mean[0] = -1;
-  EXPECT_EQ(read_out->Begin(c->prior(), c->posterior()), core::Status::kUnphysical);
+  EXPECT_EQ(c->HandOver(*read_out), core::Status::kUnphysical);
   EXPECT_TRUE(read_out->Step());
   EXPECT_TRUE(std::equal(before.begin(), before.end(), read_out->result().body));
 }

@@ -35,9 +35,18 @@ struct Case {
 
   core::Status Build() {
     const core::Status status = estimator::BuildImage<Model>(table, 1, *work, *image);
-    filter::ExpandPrior(image->prior, ud.data());
+    ud = Before();
     std::fill(x.begin(), x.end(), 0.0f);
     return status;
+  }
+  // The prior's factor of all columns.
+  std::vector<float> Before() const {
+    std::vector<float> whole(math::UdSize(kColumns));
+    for (int k = 0; k < Model::kFront; ++k) whole[math::UdIndex(k, k)] = image->prior.active[k] ? 1.0f : 0.0f;
+    for (int j = 0; j < Model::kDense; ++j)
+      for (int i = 0; i <= j; ++i)
+        whole[math::UdIndex(Model::kFront + i, Model::kFront + j)] = image->prior.dense_ud[math::UdIndex(i, j)];
+    return whole;
   }
   // Rows h' x = y of variance 1 in prior units, as the filters take them.
   void Take(const Matrix& h, const Vector& y) {
@@ -56,7 +65,17 @@ struct Case {
   MapPrior<Model> prior() const {
     return {work->rigid.mean, work->rigid.sd, image->committed.p, image->scale, image->prior.dense_ud};
   }
-  Posterior<Model> posterior() const { return {x.data(), ud.data()}; }
+  template <class ReadOut>
+  core::Status HandOver(ReadOut& out, bool warm = false) const {
+    core::Status status = out.Begin(prior(), x.data(), warm);
+    for (int j = 0; j < kColumns && core::IsOk(status); ++j) {
+      float column[kColumns] = {};
+      for (int i = 0; i < j; ++i) column[i] = ud[math::UdIndex(i, j)];
+      column[j] = 1;
+      status = out.AddSpread(ud[math::UdIndex(j, j)], column);
+    }
+    return status;
+  }
 };
 
 }  // namespace armcal::physical::test

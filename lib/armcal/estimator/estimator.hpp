@@ -34,6 +34,7 @@ struct Estimates {
   std::uint32_t rows_refused[Model::kJoints] = {};  // not finite or beyond filter::kRowLimit
   float nis[Model::kJoints] = {};                   // see monitor::JointMonitor
   float residual_rms_Nm[Model::kJoints] = {};       // measured minus committed model, used rows
+  bool inconsistent = false;                        // the deviations are too small: see monitor::Consistency
 };
 
 // Filter: filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>, filter::ExtendedKalmanFilter<Model>,
@@ -82,6 +83,7 @@ class Estimator {
     live_.Restart();
     stage_ = Stage::kIdle;
     credit_ = 0;
+    resets_due_ = 0;
     slice_ = filter::EqualSlices(filter_.SampleCost() + kSampleCost + n * kRowCost);
     read_out_due_ = true;
     signal::Settings<n> settings = {};
@@ -111,6 +113,19 @@ class Estimator {
   // One slice: a sample's work is cut into equal ones, whichever rows they hold.
   bool Step() { return Step(slice_); }
 
+  // True: rows no longer change the estimate, and it does not forget; statistics go on. An adoption leaves it as it is.
+  // From the next sample on. Context: background.
+  void Hold(bool hold) { hold_ = hold; }
+
+  // What is known of a block no longer counts, from the next sample on: after work on that joint, or another payload.
+  // block: a joint (its own columns), or n: the links and what else acts on several joints. kOutOfRange: there is no
+  // such block, or the filter's form cannot reset it (Adopt restarts all). Context: background.
+  core::Status Reset(int block) {
+    if (!Filter::CanReset(block)) return core::Status::kOutOfRange;
+    resets_due_ |= 1u << block;
+    return core::Status::kOk;
+  }
+
   // Latest published estimates; false: nothing new since the last call. Context: one reader, any.
   bool Take(Estimates<Model>& out) { return published_.Take(out); }
 
@@ -134,7 +149,7 @@ class Estimator {
   const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReadOut };
+  enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReset, kReadOut };
   // What a sample's regressor and a row's whitening and statistics are worth, from counts of six-axis models.
   static constexpr int kSampleCost = n * Model::kDense, kRowCost = 3 * Model::kDense;
   struct Item {
@@ -160,6 +175,9 @@ class Estimator {
       case Stage::kEnd:
         if (filter_.StepEnd(credit_)) FinishSample();
         return true;
+      case Stage::kReset:
+        if (filter_.StepReset(credit_)) stage_ = Stage::kIdle;
+        return true;
       case Stage::kReadOut:
         if (filter_.StepReadOut(read_out_, credit_)) Publish();
         return true;
@@ -168,6 +186,10 @@ class Estimator {
   }
 
   bool StartSample() {
+    if (image_ != nullptr && resets_due_ != 0u) {
+      BeginReset();
+      return true;
+    }
     if (image_ != nullptr && read_out_due_) {
       read_out_due_ = false;
       stands_ = false;
@@ -207,9 +229,19 @@ class Estimator {
     }
     for (int i = 0; i < n; ++i)
       if (Model::kReadyState[i] >= 0 && !(memory_.now[Model::kReadyState[i]] > 0.5f)) moving_ &= ~(1u << i);
+    updating_ = hold_ ? 0u : moving_;
     joint_ = 0;
     stage_ = Stage::kRow;
     return true;
+  }
+
+  void BeginReset() {
+    int block = 0;
+    while ((resets_due_ >> block & 1u) == 0u) ++block;
+    resets_due_ &= ~(1u << block);
+    stands_ = false;
+    filter_.BeginReset(block);
+    stage_ = Stage::kReset;
   }
 
   const feedforward::Rows<Model>& FilterRows() const {
@@ -231,7 +263,7 @@ class Estimator {
     load_Nm_ = feedforward::LoadTorque(image_->committed.p, rows_, i);
     tau_model_Nm_[i] = feedforward::RowTorque(image_->committed.p, rows_, i, load_Nm_);
     residual_Nm_ = item_.sample.tau[i] - tau_model_Nm_[i];
-    const bool use = ((moving_ >> i) & 1u) != 0u;
+    const bool use = ((updating_ >> i) & 1u) != 0u;
     if constexpr (Filter::kExtended) {
       float eta[Model::kNonlinear];
       live_.EtaRow(*image_, i, eta);
@@ -268,7 +300,7 @@ class Estimator {
     if constexpr (Filter::kExtended)
       for (int e = 0; e < Model::kNonlinear; ++e)
         filter_.Clamp(Model::kColumns + e, image_->eta_low[e], image_->eta_high[e]);
-    filter_.BeginEnd(moving_);
+    filter_.BeginEnd(updating_);
   }
 
   void FinishSample() {
@@ -322,7 +354,8 @@ class Estimator {
   float residual_Nm_ = 0.0f, load_Nm_ = 0.0f;  // of joint_
   int credit_ = 0, slice_ = filter::kSliceCredit;
   std::uint32_t adopted_tick_ = 0, last_tick_ = 0;
-  std::uint32_t moving_ = 0;
+  std::uint32_t moving_ = 0, updating_ = 0;  // joints, a bit each; without those on hold
+  std::uint32_t resets_due_ = 0;             // blocks, a bit each
   std::uint32_t publish_every_ = 125;
   monitor::ResidualStatistics<n>* residuals_ = nullptr;
   Observer observer_ = nullptr;
@@ -330,6 +363,7 @@ class Estimator {
   int joint_ = 0;
   Stage stage_ = Stage::kIdle;
   bool read_out_due_ = false;
+  bool hold_ = false;
   bool stands_ = false;  // nothing has changed since the read-out
 };
 

@@ -144,6 +144,20 @@ class ForgettingFilter {
     return true;
   }
 
+  // What the filter knew of a block's columns no longer counts; they start again without data. block: a joint's front
+  // columns, or kJoints: the dense ones. Between samples; interface shared by all filters.
+  static constexpr bool CanReset(int block) { return block >= 0 && block <= Layout::kJoints; }
+  void BeginReset(int block) {
+    const bool joint = block < Layout::kJoints;
+    const int begin = joint ? Layout::kFrontBegin[block] : Layout::kFront;
+    const int end = joint ? Layout::kFrontBegin[block + 1] : kColumns;
+    for (int k = begin; k < end; ++k) d_[k] = kFloor;
+  }
+  bool StepReset(int& credit) {
+    credit -= kEndCost;
+    return true;
+  }
+
   // Shape: x [kColumns], prior units. What the data alone say, by back substitution; zero where they say nothing. No
   // prior, no standard deviation: a hundredth of the read-out's work.
   void Solve(float* x) const {

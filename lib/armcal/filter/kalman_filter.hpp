@@ -123,6 +123,28 @@ class KalmanFilter {
   }
   bool StepEnd(int& credit) { return turns_ == 0 || estimate_.StepSum(credit); }
 
+  // What the filter knew of a block's columns no longer counts: their prior's variance is added to what they have. The
+  // estimate stays until data move it. block: a joint's front columns, or kJoints: all others, which the block form
+  // cannot reset. Between samples, in slices: StepReset, which spends credit, until it answers true.
+  static constexpr bool CanReset(int block) {
+    return block >= 0 && (form == Form::kDense ? block <= Layout::kJoints : block < Layout::kJoints);
+  }
+  void BeginReset(int block) {
+    const bool joint = block < Layout::kJoints;
+    reset_next_ = joint ? Layout::kFrontBegin[block] : Layout::kFront;
+    reset_end_ =
+        joint ? Layout::kFrontBegin[block + 1] : Layout::kColumns + (beside == Beside::kEta ? Layout::kNonlinear : 0);
+    BeginResetColumn();
+  }
+  bool StepReset(int& credit) {
+    while (reset_next_ < reset_end_ && credit > 0) {
+      if (!estimate_.StepSum(credit)) continue;
+      ++reset_next_;
+      BeginResetColumn();
+    }
+    return reset_next_ == reset_end_;
+  }
+
   // Read-out in slices, interface shared by all filters: Begin, then Step until it answers true. No update between.
   void BeginReadOut(ReadOut& out) const {
     for (float& v : out.variance) v = 0.0f;
@@ -159,6 +181,12 @@ class KalmanFilter {
  private:
   static constexpr int kEndCost = 80;
 
+  void BeginResetColumn() {
+    if (reset_next_ == reset_end_) return;
+    const int p = Columns::kAt.position[reset_next_];
+    estimate_.BeginUnitSum(p, math::Masked(1.0f, prior_->active[reset_next_]), p);
+  }
+
   bool AnyConsidered() const { return form == Form::kDense && prior_->any_considered; }
   int ConsideredCost() const { return AnyConsidered() ? Estimate::SumCost(kSize - 1) : 0; }
 
@@ -173,6 +201,7 @@ class KalmanFilter {
   std::uint32_t considered_[(kSize + 31) / 32] = {};
   std::uint8_t turn_[kSize] = {};  // positions with noise
   int turns_ = 0, next_turn_ = 0, last_noise_ = 0;
+  int reset_next_ = 0, reset_end_ = 0;  // columns
   std::uint32_t floor_count_ = 0, clamp_count_ = 0;
   bool used_ = false;
 };

@@ -68,6 +68,44 @@ TYPED_TEST(EitherForm, EachReport_IsTheTextbookInnovationAndVariance) {
   }
 }
 
+template <class Any>
+void Reset(Any& filter, int block) {
+  filter.BeginReset(block);
+  for (int credit = 8; !filter.StepReset(credit); credit = 8) {
+  }
+}
+
+TYPED_TEST(EitherForm, Reset_AddsThePriorsVarianceToItsBlockAndNothingElse) {
+  for (int block = 0; TypeParam::CanReset(block); ++block) {
+    Bench bench;
+    TypeParam filter;
+    filter.Restart(bench.prior);
+    Textbook textbook(bench.prior);
+    for (const Row& r : bench.Rows(40)) {
+      (void)filter.Update(r.joint, r.front, r.dense, r.y, true);
+      (void)textbook.Update(Full<Small>(r), r.y, Vector::Zero(Small::kColumns));
+    }
+    const typename TypeParam::ReadOut before = Read(filter);
+    Reset(filter, block);
+    const bool joint = block < Small::kJoints;
+    for (int k = joint ? Small::kFrontBegin[block] : Small::kFront;
+         k < (joint ? Small::kFrontBegin[block + 1] : Small::kColumns); ++k)
+      textbook.p(k, k) += 1;
+    const typename TypeParam::ReadOut after = Read(filter);
+    for (int k = 0; k < Small::kColumns; ++k) {
+      EXPECT_EQ(after.x[k], before.x[k]);
+      EXPECT_NEAR(after.sd[k] / std::sqrt(textbook.p(k, k)), 1, 1e-3) << "block " << block << ", column " << k;
+    }
+    for (const Row& r : bench.Rows(20)) {  // covariances, too
+      const Vector h = Full<Small>(r);
+      const UpdateReport report = TypeParam(filter).Update(r.joint, r.front, r.dense, r.y, true);
+      EXPECT_NEAR(report.variance / (1 + h.dot(textbook.p * h)), 1, 1e-3);
+    }
+  }
+  EXPECT_FALSE(TypeParam::CanReset(-1));
+  EXPECT_FALSE(TypeParam::CanReset(Small::kJoints + 1));
+}
+
 TEST(KalmanFilter, ConsideredColumns_CountAndDoNotMove) {
   Bench bench;
   for (const int k : {1, 6}) {

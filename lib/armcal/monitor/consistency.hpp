@@ -7,8 +7,8 @@
 
 namespace armcal::monitor {
 
-// What chi^2 of `freedom` degrees (> 0, need not be whole) passes as often as a normal number passes `sigmas`: Wilson
-// and Hilferty's cube root, a hundredth off from one degree on.
+// What chi^2 of `freedom` degrees (> 0, need not be whole) passes as often as a normal number passes `sigmas`, less
+// often where there are only a few degrees: Wilson and Hilferty's cube root.
 inline float ChiSquareLimit(float freedom, float sigmas) {
   const float ninth = 2.0f / (9.0f * freedom), root = 1.0f - ninth + sigmas * math::Sqrt(ninth);
   return freedom * root * root * root;

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import stack
 
-FILTER_KEYS = ["instructions", "solve", "slice_max", "slice_min", "text_bytes", "state_bytes", "stack_bytes"]
+FILTER_KEYS = ["instructions", "solve", "read_out", "slice_max", "slice_min", "text_bytes", "state_bytes", "stack_bytes"]
 REGRESSOR_KEYS = ["instructions", "text_bytes", "stack_bytes"]
 ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "state_bytes"]
 READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "state_bytes", "stack_bytes"]
@@ -73,7 +73,7 @@ def measure(rows, objects, size, faults):
         if is_filter:
             figures["filters"].append({
                 "filter": row["name"], "n": row["n"], "n_front": row["n_front"], "instructions": row["instructions"],
-                "solve": row["solve"], "slice_max": row["slice_max"], "slice_min": row["slice_min"], **code,
+                "solve": row["solve"], "read_out": row["read_out"], "slice_max": row["slice_max"], "slice_min": row["slice_min"], **code,
                 "state_bytes": row["state_bytes"], "stack_bytes": deep})
         else:
             figures["regressors"].append(
@@ -99,6 +99,9 @@ def compare(rows, keys, accepted, limits, section, rise, faults):
                 faults.append(f"{name}: {key} {now}, was {before} (+{100 * (now / before - 1):.1f} %)")
             if most is not None and now > most:
                 faults.append(f"{name}: {key} {now}, limit {most}")
+        ratio = limits.get(name, {}).get("slice_ratio")
+        if ratio is not None and row["slice_max"] > ratio * row["slice_min"]:
+            faults.append(f"{name}: slices of {row['slice_min']} to {row['slice_max']}, limit 1 : {ratio}")
         if any(known.get(k) != row[k] for k in keys):
             lines.append(line)
     if lines:
@@ -114,9 +117,9 @@ def table(figures, core, budgets):
         return row["instructions"] * cpi * rate / (clock * 1e6)
 
     lines = [f"{core}: instructions a 6-row sample; share of {clock} MHz at {rate} samples/s, ESTIMATED with {cpi} cycles an "
-             "instruction; bytes", f"{'filter':14}{'n':>4}{'front':>6}{'instr.':>9}{'share':>8}{'solve':>9}{'slice':>8}"
+             "instruction; bytes", f"{'filter':14}{'n':>4}{'front':>6}{'instr.':>9}{'share':>8}{'solve':>8}{'read-out':>9}{'slice':>7}"
              f"{'least':>8}{'text':>7}{'state':>7}{'stack':>6}"]
-    lines += [f"{f['filter']:14}{f['n']:4}{f['n_front']:6}{f['instructions']:9}{share(f):8.2%}{f['solve']:9}{f['slice_max']:8}"
+    lines += [f"{f['filter']:14}{f['n']:4}{f['n_front']:6}{f['instructions']:9}{share(f):8.2%}{f['solve']:8}{f['read_out']:9}{f['slice_max']:7}"
               f"{f['slice_min']:8}{f['text_bytes']:7}{f['state_bytes']:7}{f['stack_bytes']:6}" for f in figures["filters"]]
     lines += [f"{'regressor':24}{'instr.':>9}{'share':>8}{'text':>24}{'stack':>13}"]
     lines += [f"{r['robot']:24}{r['instructions']:9}{share(r):8.2%}{r['text_bytes']:24}{r['stack_bytes']:13}"

@@ -55,6 +55,7 @@ void Measure(const char* name) {
 void MeasureEstimators() {
   if (!core::IsOk(estimator::BuildImage(estimator::DefaultTable<Model>(), 1, work, image))) return;
   Measure<filter::ForgettingFilter<Model>>("forgetting");
+  Measure<filter::KalmanFilter<Model, filter::Form::kBlock>>("kalman_block");
   Measure<filter::KalmanFilter<Model>>("kalman_dense");
 }
 

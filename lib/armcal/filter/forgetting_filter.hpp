@@ -17,6 +17,7 @@ template <class Layout>
 class ForgettingFilter {
  public:
   static constexpr int kColumns = Layout::kColumns;
+  static constexpr bool kExtended = false;
   static constexpr float kFloor = 1e-6f;
   using Columns = Order<Layout, Form::kBlock, Beside::kNothing>;
 
@@ -94,9 +95,9 @@ class ForgettingFilter {
     for (int k = begin; k < Layout::kDense; ++k) put(width_ + k - begin, dense[k]);
     put(length_, y);
 
-    report_.status = Judge(largest);
-    report_.accepted = use && report_.status == core::Status::kOk;
-    if (report_.status == core::Status::kOk && !use) report_.status = core::Status::kGated;
+    const core::Status judged = Judge(largest);
+    report_.accepted = use & (judged == core::Status::kOk);
+    report_.status = Answer(judged, report_.accepted);
     const std::uint32_t mask = math::MaskOf(report_.accepted);
     for (int k = 0; k <= length_; ++k) row_[k] = math::Masked(row_[k], mask);
     weight_ = 1.0f;

@@ -13,6 +13,7 @@ namespace armcal::filter {
 template <class Layout, Form form = Form::kDense, Beside beside = Beside::kNothing>
 class KalmanFilter {
  public:
+  static constexpr bool kExtended = beside == Beside::kEta;  // rows carry d tau / d eta after the columns
   using Columns = Order<Layout, form, beside>;
   using Estimate = UdEstimate<Columns>;
   static constexpr int kSize = Columns::kSize;
@@ -76,7 +77,7 @@ class KalmanFilter {
       for (int e = 0; e < Layout::kNonlinear; ++e) put(Layout::kColumns + e, eta[e]);
 
     report_.status = Judge(largest);
-    const std::uint32_t taken = math::MaskOf(use && report_.status == core::Status::kOk);
+    const std::uint32_t taken = math::MaskOf(use & (report_.status == core::Status::kOk));
     for (int p = first; p < kSize; ++p) row[p] = math::Masked(row[p], taken);
     used_ = taken != 0u;
     estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f, prior_->gate_sigma);
@@ -86,8 +87,8 @@ class KalmanFilter {
     if (!estimate_.StepRow(considered, credit)) return false;
     report_.innovation = estimate_.innovation();
     report_.variance = estimate_.variance();
-    report_.accepted = used_ && estimate_.inside();
-    if (report_.status == core::Status::kOk && !report_.accepted) report_.status = core::Status::kGated;
+    report_.accepted = used_ & estimate_.inside();
+    report_.status = Answer(report_.status, report_.accepted);
     return true;
   }
   const UpdateReport& report() const { return report_; }

@@ -44,9 +44,9 @@ struct UpdateReport {
 // a front column needs its own joint, a dense column all of them.
 template <class Layout>
 constexpr std::uint32_t JointsOf(int column) {
-  for (int i = 0; i < Layout::kJoints; ++i)
-    if (column < Layout::kFrontBegin[i + 1]) return 1u << i;
-  return (1u << Layout::kJoints) - 1u;
+  int joint = 0;
+  for (int i = 0; i < Layout::kJoints; ++i) joint += column >= Layout::kFrontBegin[i + 1];
+  return joint < Layout::kJoints ? 1u << joint : (1u << Layout::kJoints) - 1u;
 }
 
 // x = 0 and the prior's correlation, in any order of the columns. Slopes start as known: zero. Context: background.
@@ -65,11 +65,18 @@ void SetPrior(const Prior<Layout>& prior, Estimate& estimate) {
     for (int k = Layout::kColumns; k < Columns::kSize; ++k) estimate.d(at[k]) = math::Masked(1.0f, prior.active[k]);
 }
 
-// A row is judged by its largest element in magnitude: kOk, kNotFinite or kOutOfRange. Context: background.
+// A row is judged by its largest element in magnitude: kOk, kNotFinite or kOutOfRange; a good one that is not accepted
+// is kGated. No branch: a bad row costs what a good one does. Context: background.
 inline std::uint32_t MagnitudeBits(float x) { return math::BitsOf(x) & 0x7FFFFFFFu; }
 inline core::Status Judge(std::uint32_t largest_magnitude_bits) {
-  if (largest_magnitude_bits >= 0x7F800000u) return core::Status::kNotFinite;
-  return largest_magnitude_bits > math::BitsOf(kRowLimit) ? core::Status::kOutOfRange : core::Status::kOk;
+  static constexpr core::Status kBy[] = {core::Status::kOk, core::Status::kOutOfRange, core::Status::kNotFinite};
+  return kBy[(largest_magnitude_bits > math::BitsOf(kRowLimit)) + (largest_magnitude_bits >= 0x7F800000u)];
+}
+inline core::Status Answer(core::Status judged, bool accepted) {
+  static_assert(static_cast<int>(core::Status::kOk) == 0);
+  const std::uint32_t gated = math::MaskOf((judged == core::Status::kOk) & !accepted);
+  return static_cast<core::Status>(static_cast<std::uint32_t>(judged) |
+                                   (gated & static_cast<std::uint32_t>(core::Status::kGated)));
 }
 
 }  // namespace armcal::filter

@@ -183,8 +183,8 @@ class UdEstimate {
     sum_ = sum;
     next_ = p;
     if (p >= first_) return false;
-    const bool inside = !(gate_sigma_ > 0.0f && innovation_ * innovation_ > gate_sigma_ * gate_sigma_ * sum);
-    taken_ = math::MaskOf(inside);
+    const bool outside = (gate_sigma_ > 0.0f) & (innovation_ * innovation_ > gate_sigma_ * gate_sigma_ * sum);
+    taken_ = ~math::MaskOf(outside);
     next_ = first_;
     stage_ = Stage::kMeasure;
     return true;

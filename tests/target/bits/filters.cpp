@@ -10,7 +10,8 @@ namespace {
 
 void PrintReadOut(const FilterCalls& filter) {
   filter.begin_read_out();
-  while (!filter.step_read_out()) {
+  int credit = armcal::filter::kNoSlices;
+  while (!filter.step_read_out(credit)) {
   }
   for (int k = 0; k < filter.columns; ++k)
     Line("column").Decimal(k).Hex(ResultBits(filter.value[k])).Hex(ResultBits(filter.sd[k])).End();
@@ -22,18 +23,27 @@ void Run(const FilterCalls& filter) {
   filter.restart();
   Rows rows(filter);
   Digest digest;
+  const int slice = filter.slice_credit();
+  int credit = slice;
   for (int sample = 1; sample <= kSamples; ++sample) {
     for (int joint = 0; joint < 6; ++joint) {
-      Row row = rows.Next(joint, rows.Draw());
-      filter.update(row);
-      digest.Add(row.report.innovation);
-      digest.Add(row.report.variance);
-      digest.Add(static_cast<std::uint32_t>(row.report.status) << 1 | row.report.accepted);
+      filter.begin_row(rows.Next(joint, rows.Draw()));
+      while (!filter.step_row(credit)) credit += slice;
+      const auto& report = filter.report();
+      digest.Add(report.innovation);
+      digest.Add(report.variance);
+      digest.Add(static_cast<std::uint32_t>(report.status) << 1 | report.accepted);
     }
-    filter.end_sample(sample % 7 == 0 ? 21u : 63u);
+    filter.begin_end(sample % 7 == 0 ? 21u : 63u);
+    while (!filter.step_end(credit)) credit += slice;
     if (sample % kPrinted == 0) Line("sample").Decimal(sample).Hex(digest.value()).End();
   }
   PrintReadOut(filter);
+  if (filter.solve == nullptr) return;
+  filter.solve();
+  Digest solution;
+  solution.Add(filter.value, filter.columns);
+  Line("solution").Hex(solution.value()).End();
 }
 
 }  // namespace

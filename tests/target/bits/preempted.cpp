@@ -27,12 +27,7 @@ std::uint32_t next = 0;
 void Tick() {
   model::RawSample<6> raw;
   raw.tick = next;
-  for (int i = 0; i < 6; ++i) {
-    raw.counts[i] = trace[next].counts[i];
-    raw.current[i] = trace[next].current[i];
-    raw.flags[i] = trace[next].flags[i];
-    raw.temperature_degC[i] = 25.0f;
-  }
+  Unpack(trace[next], raw);
   ++next;
   (void)arm.Push(raw);  // a refusal is counted and printed below
 }

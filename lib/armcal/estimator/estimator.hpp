@@ -9,6 +9,7 @@
 #include "armcal/estimator/image.hpp"
 #include "armcal/estimator/live_model.hpp"
 #include "armcal/filter/slices.hpp"
+#include "armcal/monitor/consistency.hpp"
 #include "armcal/monitor/monitor.hpp"
 #include "armcal/monitor/residual_statistics.hpp"
 #include "armcal/signal/signal_path.hpp"
@@ -34,6 +35,7 @@ struct Estimates {
   std::uint32_t rows_refused[Model::kJoints] = {};  // not finite or beyond filter::kRowLimit
   float nis[Model::kJoints] = {};                   // see monitor::JointMonitor
   float residual_rms_Nm[Model::kJoints] = {};       // measured minus committed model, used rows
+  bool inconsistent = false;                        // the deviations are too small: see monitor::Consistency
 };
 
 // Filter: filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>, filter::ExtendedKalmanFilter<Model>,
@@ -77,6 +79,7 @@ class Estimator {
     estimates_ = Estimates<Model>{};
     estimates_.generation = image.committed.generation;
     for (monitor::JointMonitor& m : monitors_) m = monitor::JointMonitor{};
+    consistency_ = monitor::Consistency{};
     if (residuals_ != nullptr) residuals_->Restart(adopted_tick);
     memory_.running = false;
     live_.Restart();
@@ -255,7 +258,10 @@ class Estimator {
     estimates_.rows_used[i] += report.accepted;
     estimates_.rows_gated[i] += report.status == core::Status::kGated;
     estimates_.rows_refused[i] += core::IsRefused(report.status);
-    if (report.accepted) monitors_[i].Add(report.innovation, report.variance, residual_Nm_);
+    if (report.accepted) {
+      monitors_[i].Add(report.innovation, report.variance, residual_Nm_);
+      consistency_.Add(report.innovation, report.variance);
+    }
     // Rows that the filter's gate keeps out count as well: they are what a changed arm looks like.
     const model::Sample<n>& s = item_.sample;
     if (residuals_ != nullptr)
@@ -298,6 +304,7 @@ class Estimator {
       estimates_.nis[i] = monitors_[i].nis();
       estimates_.residual_rms_Nm[i] = monitors_[i].residual_rms_Nm();
     }
+    estimates_.inconsistent = consistency_.inconsistent();
     estimates_.refused = ring_.refused();
     published_.Post(estimates_);
     stands_ = true;
@@ -316,6 +323,7 @@ class Estimator {
   feedforward::Memory<Model> memory_ = {};
   std::conditional_t<Filter::kExtended, LiveModel<Model>, NoLiveModel> live_;
   monitor::JointMonitor monitors_[n];
+  monitor::Consistency consistency_;
   Estimates<Model> estimates_;
   Item item_ = {};
   float tau_model_Nm_[n] = {};

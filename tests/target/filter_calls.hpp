@@ -5,6 +5,7 @@
 #include <new>
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/row.hpp"
 #include "armcal/filter/slices.hpp"
 
 namespace armcal::target {

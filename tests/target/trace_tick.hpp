@@ -1,7 +1,7 @@
 // tests - one control tick in a recorded trace, as bytes in a file; knows no arm.
 #pragma once
 
-#include <cstdint>
+#include "armcal/model/sample.hpp"
 
 namespace armcal::target {
 
@@ -13,5 +13,15 @@ struct TraceTick {
   std::uint8_t flags[8];              // of six joints; two spare
 };
 static_assert(sizeof(TraceTick) == 56);
+
+// All but the tick's number.
+inline void Unpack(const TraceTick& tick, model::RawSample<6>& raw) {
+  for (int i = 0; i < 6; ++i) {
+    raw.counts[i] = tick.counts[i];
+    raw.current[i] = tick.current[i];
+    raw.flags[i] = tick.flags[i];
+    raw.temperature_degC[i] = 0.01f * static_cast<float>(tick.temperature_cdegC[i]);
+  }
+}
 
 }  // namespace armcal::target

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
 #include "armcal/math/givens.hpp"
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
 
 namespace armcal::filter {
@@ -65,18 +66,8 @@ class KalmanFilter {
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
     const int first = Columns::kAt.first[joint];
     float* row = estimate_.ClearRow();
-    std::uint32_t largest = MagnitudeBits(y);
-    const auto put = [&](int column, float value) {
-      largest = math::Max(largest, MagnitudeBits(value));
-      row[Columns::kAt.position[column]] = value;
-    };
-    const int begin = Layout::kFrontBegin[joint], end = Layout::kFrontBegin[joint + 1];
-    for (int k = begin; k < end; ++k) put(k, front[k - begin]);
-    for (int k = Layout::kRowBegin[joint]; k < Layout::kDense; ++k) put(Layout::kFront + k, dense[k]);
-    if constexpr (beside == Beside::kEta)
-      for (int e = 0; e < Layout::kNonlinear; ++e) put(Layout::kColumns + e, eta[e]);
-
-    report_.status = Judge(largest);
+    const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, eta, row);
+    report_.status = Judge(math::Max(largest, MagnitudeBits(y)));
     const std::uint32_t taken = math::MaskOf(use & (report_.status == core::Status::kOk));
     for (int p = first; p < kSize; ++p) row[p] = math::Masked(row[p], taken);
     used_ = taken != 0u;
@@ -108,12 +99,7 @@ class KalmanFilter {
     (void)StepEnd(all);
   }
   void BeginEnd(std::uint32_t moving) {
-    for (int k = Layout::kFront; k < kSize; ++k) {
-      float& d = estimate_.d(Columns::kAt.position[k]);
-      const float floor = math::Masked(prior_->link_floor, prior_->active[k]);
-      floor_count_ += d < floor;
-      d = math::Max(d, floor);
-    }
+    floor_count_ += HoldFloor(*prior_, estimate_);
     if (turns_ == 0) return;
     const int p = turn_[next_turn_], k = Columns::kAt.column[p];
     const std::uint32_t needed = JointsOf<Layout>(k), mask = math::MaskOf((moving & needed) == needed);

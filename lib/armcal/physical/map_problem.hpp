@@ -1,5 +1,4 @@
-// physical - what a read-out is asked: a filter's result in prior units, and the table it started from; what the data
-// alone said. Knows no filter.
+// physical - what a read-out is asked and answers, and what the data alone said; knows columns, no filter.
 #pragma once
 
 #include "armcal/math/ud.hpp"
@@ -16,6 +15,27 @@ struct MapPrior {
   const float* column;    // [kColumns] b0
   const float* scale;     // [kColumns] s; 0: held
   const float* dense_ud;  // [UdSize(kDense)] the filter's prior of the dense columns, in prior units
+};
+
+// What comes out.
+template <class Layout, class T>
+struct MapResult {
+  T body[Layout::kBodyParameters] = {};     // about the link origins, the table's order
+  T body_sd[Layout::kBodyParameters] = {};  // of m, c, I about the centre, rotor
+  T column[Layout::kColumns] = {};          // filter coordinates that belong to these bodies, own units
+  T column_sd[Layout::kColumns] = {};       // deviations: inverse curvature of data and prior, without the barrier
+  T moved = T(0);    // sum over all parameters of (change / prior deviation)^2: with a true prior, no more than ...
+  T learned = T(0);  // ... chi^2 of so many degrees, their sum of 1 - (deviation / prior deviation)^2
+  int steps = 0;     // of Newton's method
+  T barrier = T(0);  // the last eps
+  bool converged = false;  // less than 1e-4 of chi^2 is left to gain; the bodies can exist in any case
+
+  // Of one parameter, held if before = 0.
+  void Learn(T change, T after, T before) {
+    const T left = math::Divide(after, before);
+    moved += change * change;
+    learned += math::Select(before > T(0), T(1) - left * left, T(0));
+  }
 };
 
 // v [n] = b U^-1 for the unit upper triangle of the n columns from `offset` on, in place; b is zero before `first`.

@@ -31,15 +31,7 @@ class MapReadOut {
   static constexpr T kBarrier[] = {T(1), T(0.1), T(0.01)};  // eps, in units of chi^2
   static constexpr int kMostSteps = 100;
 
-  struct Result {
-    T body[kBodies] = {};        // about the link origins, the table's order
-    T body_sd[kBodies] = {};     // of m, c, I about the centre, rotor
-    T column[kColumns] = {};     // filter coordinates that belong to these bodies, own units
-    T column_sd[kColumns] = {};  // standard deviations: inverse curvature of data and prior, without the barrier
-    int steps = 0;               // of Newton's method
-    T barrier = T(0);            // the last eps
-    bool converged = false;      // less than 1e-4 of chi^2 is left to gain; the bodies can exist in any case
-  };
+  using Result = MapResult<Layout, T>;
 
   // x [kColumns]: the filter's mean in prior units, its prior inside. warm: start at the last solution and the last
   // eps; the prior is the same. kUnphysical: a body of the prior cannot exist, or hardly (MapArm::kMargin). kNotFinite:
@@ -218,6 +210,7 @@ class MapReadOut {
     change_[k] = arm_.sd(k);
     result_.body[k] = point_.body[k];
     result_.body_sd[k] = Deviation(change_);
+    result_.Learn(point_.u[k], result_.body_sd[k], arm_.sd(k));
   }
 
   void ReadColumn(int k) {
@@ -231,6 +224,7 @@ class MapReadOut {
     const T sd = Deviation(change_), scale = T(arm_.prior().scale[k]);
     result_.column[k] = T(arm_.prior().column[k]) + scale * value;
     result_.column_sd[k] = scale * math::Sqrt(variance + sd * sd);
+    if (k < kFront || k >= kFront + Layout::kRigid) result_.Learn(value, result_.column_sd[k], scale);
   }
 
   Arm arm_;

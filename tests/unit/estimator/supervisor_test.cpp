@@ -8,6 +8,7 @@
 
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
+#include "armcal/filter/model_bank.hpp"
 #include "tests/unit/estimator/motion.hpp"
 
 namespace armcal::estimator {
@@ -43,7 +44,7 @@ class Supervised : public testing::Test {
 };
 
 using Filters = testing::Types<filter::KalmanFilter<TwoLink>, filter::KalmanFilter<TwoLink, filter::Form::kBlock>,
-                               filter::ForgettingFilter<TwoLink>>;
+                               filter::ForgettingFilter<TwoLink>, filter::ModelBank<TwoLink>>;
 TYPED_TEST_SUITE(Supervised, Filters);
 
 TYPED_TEST(Supervised, Hold_KeepsEveryBitOfTheEstimate_AndCountsTheRows) {

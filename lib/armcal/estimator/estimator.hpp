@@ -5,6 +5,7 @@
 #include "armcal/core/sample_ring.hpp"
 #include "armcal/estimator/axes.hpp"
 #include "armcal/estimator/image.hpp"
+#include "armcal/filter/slices.hpp"
 #include "armcal/monitor/monitor.hpp"
 #include "armcal/monitor/residual_statistics.hpp"
 #include "armcal/signal/signal_path.hpp"
@@ -28,7 +29,7 @@ struct Estimates {
   float residual_rms_Nm[Model::kJoints] = {};       // measured minus committed model, used rows
 };
 
-// Filter: filter::ForgettingFilter<Model> or filter::KalmanFilter<Model>.
+// Filter: filter::ForgettingFilter<Model>, filter::KalmanFilter<Model> or its block form.
 // Push and PushSample belong to the tick (use one of the two), everything else to the background.
 template <class Model, class Filter>
 class Estimator {
@@ -55,9 +56,12 @@ class Estimator {
     return ring_.Push({sample, path_.generation()});
   }
 
-  // Restarts filter, statistics and signal path from `image`, which must stay as it is until the next Adopt; its
-  // generation must differ from the one before and from 0. Samples made before are dropped. adopted_tick: zero of the
-  // model's time. Context: background.
+  // False: the filter's form cannot hold what the table asks for (see filter::Form); a table transaction refuses it.
+  static bool Suits(const Image<Model>& image) { return Filter::Suits(image.prior); }
+
+  // Restarts filter, statistics and signal path from `image`, which must suit and stay as it is until the next Adopt;
+  // its generation must differ from the one before and from 0. Samples made before are dropped. adopted_tick: zero of
+  // the model's time. Context: background.
   void Adopt(const Image<Model>& image, std::uint32_t adopted_tick) {
     image_ = &image;
     adopted_tick_ = adopted_tick;
@@ -68,6 +72,8 @@ class Estimator {
     if (residuals_ != nullptr) residuals_->Restart(adopted_tick);
     memory_.running = false;
     stage_ = Stage::kIdle;
+    credit_ = 0;
+    slice_ = filter::EqualSlices(filter_.SampleCost() + kSampleCost + n * kRowCost);
     read_out_due_ = true;
     signal::Settings<n> settings = {};
     for (int i = 0; i < n; ++i) {
@@ -78,26 +84,23 @@ class Estimator {
     settings_.Post(settings);
   }
 
-  // One bounded slice: a sample's regressor, one row, the end of a sample, or a slice of the read-out.
-  // False: nothing to do. Context: background.
-  bool Step() {
-    switch (stage_) {
-      case Stage::kIdle:
-        return StartSample();
-      case Stage::kRow:
-        RowSlice();
-        return true;
-      case Stage::kEnd:
-        EndSample();
-        return true;
-      case Stage::kReadOut:
-        if (!filter_.StepReadOut(read_out_)) return true;
-        Publish();
-        stage_ = Stage::kIdle;
-        return true;
+  // Works until `budget` is spent, in elements of a filter's columns: eight instructions each on a Cortex-M4F. A column
+  // or a regressor is not cut; what it takes too much is taken off the next call. False: nothing to do.
+  // May be interrupted anywhere. Context: background.
+  bool Step(int budget) {
+    credit_ += budget;
+    bool worked = false;
+    while (credit_ > 0) {
+      if (!Advance()) {
+        credit_ = 0;  // no saving up
+        return worked;
+      }
+      worked = true;
     }
-    return false;
+    return true;
   }
+  // One slice: a sample's work is cut into equal ones, whichever rows they hold.
+  bool Step() { return Step(slice_); }
 
   // Latest published estimates; false: nothing new since the last call. Context: one reader, any.
   bool Take(Estimates<Model>& out) { return published_.Take(out); }
@@ -120,7 +123,9 @@ class Estimator {
   const Filter& filter() const { return filter_; }
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kRow, kEnd, kReadOut };
+  enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReadOut };
+  // What a sample's regressor and a row's whitening and statistics are worth, from counts of six-axis models.
+  static constexpr int kSampleCost = n * Model::kDense, kRowCost = 3 * Model::kDense;
   struct Item {
     model::Sample<n> sample;
     std::uint32_t generation;
@@ -128,6 +133,27 @@ class Estimator {
 
   void TakeSettings() {
     if (settings_.Refresh()) path_.SetSettings(settings_.latest());
+  }
+
+  // The next indivisible piece of work; false: there is none.
+  bool Advance() {
+    switch (stage_) {
+      case Stage::kIdle:
+        return StartSample();
+      case Stage::kRow:
+        BeginRow();
+        return true;
+      case Stage::kUpdate:
+        if (filter_.StepRow(credit_)) FinishRow();
+        return true;
+      case Stage::kEnd:
+        if (filter_.StepEnd(credit_)) FinishSample();
+        return true;
+      case Stage::kReadOut:
+        if (filter_.StepReadOut(read_out_, credit_)) Publish();
+        return true;
+    }
+    return false;
   }
 
   bool StartSample() {
@@ -138,6 +164,7 @@ class Estimator {
       return true;
     }
     if (!core::IsOk(ring_.Pop(item_))) return false;
+    credit_ -= kSampleCost;
     if (image_ == nullptr || item_.generation != image_->committed.generation) {
       ++estimates_.stale;
       return true;
@@ -168,7 +195,7 @@ class Estimator {
   }
 
   // Whitens the row of joint_ into prior units and hands it to the filter.
-  void RowSlice() {
+  void BeginRow() {
     const int i = joint_, first = Model::kFrontBegin[i];
     const float whiten = 1.0f / image_->sigma_Nm[i];
     const auto scaled = [&](float value, int column) {
@@ -177,26 +204,32 @@ class Estimator {
     float front[Model::kFront > 0 ? Model::kFront : 1], dense[Model::kDense];
     for (int k = first; k < Model::kFrontBegin[i + 1]; ++k) front[k - first] = scaled(rows_.front[k], k);
     for (int k = 0; k < Model::kDense; ++k) dense[k] = scaled(rows_.dense[i * Model::kDense + k], Model::kFront + k);
-    const float load_Nm = feedforward::LoadTorque(image_->committed.p, rows_, i);
-    tau_model_Nm_[i] = feedforward::RowTorque(image_->committed.p, rows_, i, load_Nm);
-    const float residual_Nm = item_.sample.tau[i] - tau_model_Nm_[i];
+    load_Nm_ = feedforward::LoadTorque(image_->committed.p, rows_, i);
+    tau_model_Nm_[i] = feedforward::RowTorque(image_->committed.p, rows_, i, load_Nm_);
+    residual_Nm_ = item_.sample.tau[i] - tau_model_Nm_[i];
+    filter_.BeginRow(i, front, dense, residual_Nm_ * whiten, ((moving_ >> i) & 1u) != 0u);
+    credit_ -= kRowCost;
+    stage_ = Stage::kUpdate;
+  }
 
-    const bool use = ((moving_ >> i) & 1u) != 0u;
-    const filter::UpdateReport report = filter_.Update(i, front, dense, residual_Nm * whiten, use);
+  void FinishRow() {
+    const int i = joint_;
+    const filter::UpdateReport& report = filter_.report();
     item_.sample.flags[i] =
         static_cast<std::uint8_t>((item_.sample.flags[i] & ~model::kUsed) | (report.accepted ? model::kUsed : 0));
     estimates_.rows_used[i] += report.accepted;
     estimates_.rows_gated[i] += report.status == core::Status::kGated;
     estimates_.rows_refused[i] += core::IsRefused(report.status);
-    if (report.accepted) monitors_[i].Add(report.innovation, report.variance, residual_Nm);
+    if (report.accepted) monitors_[i].Add(report.innovation, report.variance, residual_Nm_);
     // Rows that the filter's gate keeps out count as well: they are what a changed arm looks like.
     const model::Sample<n>& s = item_.sample;
-    if (residuals_ != nullptr) residuals_->Add(i, {residual_Nm, s.qd[i], s.q[i], load_Nm, s.temperature_degC[i]}, use);
-    if (++joint_ == n) stage_ = Stage::kEnd;
+    if (residuals_ != nullptr)
+      residuals_->Add(i, {residual_Nm_, s.qd[i], s.q[i], load_Nm_, s.temperature_degC[i]}, ((moving_ >> i) & 1u) != 0u);
+    stage_ = ++joint_ == n ? Stage::kEnd : Stage::kRow;
+    if (stage_ == Stage::kEnd) filter_.BeginEnd(moving_);
   }
 
-  void EndSample() {
-    filter_.EndSample(moving_);
+  void FinishSample() {
     if (residuals_ != nullptr)
       residuals_->EndSample(item_.sample.tick, static_cast<std::uint32_t>(Model::kTickRate_Hz));
     estimates_.tick = item_.sample.tick;
@@ -216,6 +249,7 @@ class Estimator {
     }
     estimates_.refused = ring_.refused();
     published_.Post(estimates_);
+    stage_ = Stage::kIdle;
   }
 
   signal::SignalPath<n, Model::kSampleTicks> path_;  // the tick's
@@ -232,6 +266,8 @@ class Estimator {
   Estimates<Model> estimates_;
   Item item_ = {};
   float tau_model_Nm_[n] = {};
+  float residual_Nm_ = 0.0f, load_Nm_ = 0.0f;  // of joint_
+  int credit_ = 0, slice_ = filter::kSliceCredit;
   std::uint32_t adopted_tick_ = 0, last_tick_ = 0;
   std::uint32_t moving_ = 0;
   std::uint32_t publish_every_ = 125;

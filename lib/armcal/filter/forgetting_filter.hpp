@@ -2,6 +2,7 @@
 #pragma once
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/ud_estimate.hpp"
 #include "armcal/math/givens.hpp"
 
 namespace armcal::filter {
@@ -17,83 +18,9 @@ class ForgettingFilter {
  public:
   static constexpr int kColumns = Layout::kColumns;
   static constexpr float kFloor = 1e-6f;
+  using Columns = Order<Layout, Form::kBlock, Beside::kNothing>;
 
-  // Work space and result. x, sd [kColumns] in prior units.
-  struct ReadOut {
-    float x[kColumns] = {};
-    float sd[kColumns] = {};
-    float ud[math::UdSize(kColumns)] = {};
-    int next = 0;
-  };
-
-  // Starts without data. The prior must outlive the filter's use of it.
-  void Restart(const Prior<Layout>& prior) {
-    prior_ = &prior;
-    for (float& d : d_) d = kFloor;
-    for (float& r : rows_) r = 0.0f;
-  }
-
-  // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense], zero before kRowBegin[joint].
-  // With use = false, or when the report is not kOk, every bit of the filter stays; the instructions are the same.
-  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use) {
-    const int first = Layout::kFrontBegin[joint], width = Layout::kFrontBegin[joint + 1] - first;
-    const int begin = Layout::kRowBegin[joint];
-    const int length = width + Layout::kDense - begin + 1;
-    float x[kColumns + 1];
-    for (int k = 0; k < width; ++k) x[k] = front[k];
-    for (int k = begin; k < Layout::kDense; ++k) x[width + k - begin] = dense[k];
-    x[length - 1] = y;
-
-    UpdateReport report;
-    report.status = JudgeRow(x, length);
-    report.accepted = use && report.status == core::Status::kOk;
-    if (report.status == core::Status::kOk && !use) report.status = core::Status::kGated;
-    const std::uint32_t mask = math::MaskOf(report.accepted);
-    for (int k = 0; k < length; ++k) x[k] = math::Masked(x[k], mask);
-
-    float weight = 1.0f;
-    for (int k = 0; k < length - 1; ++k) {
-      const int column = k < width ? first + k : Layout::kFront + begin + k - width;
-      weight = math::GivensRow(d_[column], rows_ + kOffsets.at[column], x[k], x + k + 1, length - 1 - k, weight);
-    }
-    report.innovation = x[length - 1];
-    report.variance = 1.0f / math::Max(weight, 1e-30f);
-    return report;
-  }
-
-  // Once after the rows of a sample: a front column forgets if its joint moves (bit i of `moving`), a dense column if
-  // all move. What stands still keeps all it knows.
-  void EndSample(std::uint32_t moving) {
-    for (int k = 0; k < kColumns; ++k) {
-      const std::uint32_t needed = JointsOf<Layout>(k);
-      const float lambda = math::Select((moving & needed) == needed, prior_->lambda[k], 1.0f);
-      d_[k] = math::Max(d_[k] * lambda, kFloor);
-    }
-  }
-
-  // Read-out in kColumns + 1 slices: the prior's factor takes the triangle's rows as measurements of variance 1 / d.
-  // Begin, then Step until it answers true. No update between.
-  void BeginReadOut(ReadOut& out) const {
-    ExpandPrior(*prior_, out.ud);
-    for (int k = 0; k < kColumns; ++k) {
-      out.ud[math::UdIndex(k, k)] *= 1.0f / (1.0f - kFloor);
-      out.x[k] = 0.0f;
-    }
-    out.next = 0;
-  }
-  bool StepReadOut(ReadOut& out) const {
-    if (out.next < kColumns) {
-      TakeRow(out.next++, out);
-      return false;
-    }
-    math::UdDiagonal<kColumns>(out.ud, out.sd);
-    for (float& sd : out.sd) sd = math::Sqrt(sd);
-    return true;
-  }
-
-  const float* weights() const { return d_; }  // [kColumns] d of each row
-
- private:
+  // Where the stored rows begin.
   static constexpr int JointOf(int column) {  // of a front column
     int i = 0;
     while (column >= Layout::kFrontBegin[i + 1]) ++i;
@@ -111,29 +38,197 @@ class ForgettingFilter {
     }
   };
   static constexpr Offsets kOffsets{};
+  static constexpr int kTriangle = kOffsets.at[kColumns];
 
-  void TakeRow(int column, ReadOut& out) const {
-    const float* row = rows_ + kOffsets.at[column];
-    float h[kColumns] = {};
-    h[column] = 1.0f;
-    int k = column + 1;
+  // What the rows and the end of a sample spend (slices.hpp).
+  int SampleCost() const {
+    int cost = kEndCost;
+    for (int i = 0; i < Layout::kJoints; ++i) {
+      const int length = Layout::kFrontBegin[i + 1] - Layout::kFrontBegin[i] + Layout::kDense - Layout::kRowBegin[i];
+      cost += kRowCost + length * kColumnCost + length * (length + 1) / 2;
+    }
+    return cost;
+  }
+
+  // Any prior: noise and considered columns are the Kalman forms'.
+  static bool Suits(const Prior<Layout>&) { return true; }
+
+  // Estimate in prior units and its standard deviation, by column; the rest is work space.
+  struct ReadOut {
+    float x[kColumns] = {};
+    float sd[kColumns] = {};
+    float variance[kColumns] = {};
+    UdEstimate<Columns> estimate;
+    int next = 0;
+    bool inside_row = false;
+  };
+
+  // Starts without data. The prior must outlive the filter's use of it.
+  void Restart(const Prior<Layout>& prior) {
+    prior_ = &prior;
+    for (float& d : d_) d = kFloor;
+    for (float& r : rows_) r = 0.0f;
+  }
+
+  // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense], zero before kRowBegin[joint].
+  // With use = false, or when the report is not kOk, every bit of the triangle stays; the instructions are the same.
+  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use) {
+    BeginRow(joint, front, dense, y, use);
+    int all = kNoSlices;
+    (void)StepRow(all);
+    return report_;
+  }
+  // The same in slices: StepRow, which spends credit (slices.hpp), until it answers true; then report().
+  void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
+    const int begin = Layout::kRowBegin[joint];
+    first_ = Layout::kFrontBegin[joint];
+    width_ = Layout::kFrontBegin[joint + 1] - first_;
+    length_ = width_ + Layout::kDense - begin;
+    dense_first_ = Layout::kFront + begin;
+    std::uint32_t largest = 0;
+    const auto put = [&](int k, float value) {
+      largest = math::Max(largest, MagnitudeBits(value));
+      row_[k] = value;
+    };
+    for (int k = 0; k < width_; ++k) put(k, front[k]);
+    for (int k = begin; k < Layout::kDense; ++k) put(width_ + k - begin, dense[k]);
+    put(length_, y);
+
+    report_.status = Judge(largest);
+    report_.accepted = use && report_.status == core::Status::kOk;
+    if (report_.status == core::Status::kOk && !use) report_.status = core::Status::kGated;
+    const std::uint32_t mask = math::MaskOf(report_.accepted);
+    for (int k = 0; k <= length_; ++k) row_[k] = math::Masked(row_[k], mask);
+    weight_ = 1.0f;
+    next_ = 0;
+  }
+  bool StepRow(int& credit) {
+    int k = next_, left = credit;
+    float weight = weight_;
+    float* const row = row_;
+    for (; k < length_ && left > 0; ++k) {
+      const int column = ColumnAt(k), rest = length_ - k;
+      left -= kColumnCost + rest;
+      if (rest > 1) {
+        const int after = ColumnAt(++k);
+        weight = math::GivensRows(d_[column], rows_ + kOffsets.at[column], d_[after], rows_ + kOffsets.at[after],
+                                  row[k - 1], row + k, rest - 1, weight);
+        left -= kColumnCost + rest - 1;
+      } else {
+        weight = math::GivensRow(d_[column], rows_ + kOffsets.at[column], row[k], row + k + 1, rest, weight);
+      }
+    }
+    credit = left;
+    next_ = k;
+    weight_ = weight;
+    if (k < length_) return false;
+    credit -= kRowCost;
+    report_.innovation = row_[length_];
+    report_.variance = 1.0f / math::Max(weight, 1e-30f);
+    return true;
+  }
+  const UpdateReport& report() const { return report_; }
+
+  // Once after the rows of a sample: a front column forgets if its joint moves (bit i of `moving`), a dense column if
+  // all move. What stands still keeps all it knows.
+  void EndSample(std::uint32_t moving) { BeginEnd(moving); }
+  void BeginEnd(std::uint32_t moving) {
+    for (int i = 0; i < Layout::kJoints; ++i)
+      Forget(Layout::kFrontBegin[i], Layout::kFrontBegin[i + 1], (moving >> i & 1u) != 0u);
+    constexpr std::uint32_t kAll = (1u << Layout::kJoints) - 1u;
+    Forget(Layout::kFront, kColumns, (moving & kAll) == kAll);
+  }
+  bool StepEnd(int& credit) {
+    credit -= kEndCost;
+    return true;
+  }
+
+  // Shape: x [kColumns], prior units. What the data alone say, by back substitution; zero where they say nothing. No
+  // prior, no standard deviation: a hundredth of the read-out's work.
+  void Solve(float* x) const {
+    for (int k = kColumns - 1; k >= Layout::kFront; --k) {
+      const float* row = rows_ + kOffsets.at[k];
+      const int length = kColumns - 1 - k;
+      x[k] = row[length] - math::Dot(row, x + k + 1, length);
+    }
+    for (int i = Layout::kJoints - 1; i >= 0; --i) {
+      const float* seen = x + Layout::kFront + Layout::kRowBegin[i];
+      const int end = Layout::kFrontBegin[i + 1], dense = Layout::kDense - Layout::kRowBegin[i];
+      for (int k = end - 1; k >= Layout::kFrontBegin[i]; --k) {
+        const float* row = rows_ + kOffsets.at[k];
+        const float* coupling = row + (end - 1 - k);
+        x[k] = coupling[dense] - math::Dot(row, x + k + 1, end - 1 - k) - math::Dot(coupling, seen, dense);
+      }
+    }
+  }
+
+  // Read-out in slices: the prior's factor takes the triangle's rows as measurements of variance 1 / d.
+  // Begin, then Step until it answers true. No update between.
+  void BeginReadOut(ReadOut& out) const {
+    SetPrior(*prior_, out.estimate);
+    for (int p = 0; p < kColumns; ++p) out.estimate.d(p) *= 1.0f / (1.0f - kFloor);
+    for (float& v : out.variance) v = 0.0f;
+    out.next = 0;
+    out.inside_row = false;
+  }
+  bool StepReadOut(ReadOut& out, int& credit) const {
+    for (; out.next < kColumns && credit > 0; ++out.next) {
+      if (!out.inside_row) BeginTake(out.next, out.estimate);
+      out.inside_row = !out.estimate.StepRow(nullptr, credit);
+      if (out.inside_row) return false;
+    }
+    for (; out.next < 2 * kColumns && credit > 0; ++out.next) {
+      out.estimate.AddDiagonal(out.next - kColumns, out.variance);
+      credit -= out.estimate.DiagonalCost(out.next - kColumns);
+    }
+    if (out.next < 2 * kColumns) return false;
+    for (int k = 0; k < kColumns; ++k) {
+      const int p = Columns::kAt.position[k];
+      out.x[k] = out.estimate.x(p);
+      out.sd[k] = math::Sqrt(out.variance[p]);
+    }
+    return true;
+  }
+  bool StepReadOut(ReadOut& out) const {
+    int credit = kSliceCredit;
+    return StepReadOut(out, credit);
+  }
+
+  const float* weights() const { return d_; }      // [kColumns] d of each row
+  const float* triangle() const { return rows_; }  // [kTriangle] R and z, row by row
+
+ private:
+  int ColumnAt(int k) const { return k < width_ ? first_ + k : dense_first_ + k - width_; }  // of the row in work
+
+  static constexpr int kColumnCost = 6, kRowCost = 24, kEndCost = 2 * kColumns;
+
+  void Forget(int begin, int end, bool moves) {
+    for (int k = begin; k < end; ++k) d_[k] = math::Max(d_[k] * math::Select(moves, prior_->lambda[k], 1.0f), kFloor);
+  }
+
+  // Row `column` of the triangle as a measurement of the read-out's estimate.
+  void BeginTake(int column, UdEstimate<Columns>& estimate) const {
+    const float* stored = rows_ + kOffsets.at[column];
+    const auto& at = Columns::kAt.position;
+    float* row = estimate.ClearRow();
+    row[at[column]] = 1.0f;
+    int joint = -1, k = column + 1;
     if (column < Layout::kFront) {
-      const int joint = JointOf(column);
-      for (; k < Layout::kFrontBegin[joint + 1]; ++k) h[k] = *row++;
+      joint = JointOf(column);
+      for (; k < Layout::kFrontBegin[joint + 1]; ++k) row[at[k]] = *stored++;
       k = Layout::kFront + Layout::kRowBegin[joint];
     }
-    for (; k < kColumns; ++k) h[k] = *row++;
-
-    float f[kColumns], gain[kColumns], innovation = *row;
-    for (int i = 0; i < kColumns; ++i) innovation -= h[i] * out.x[i];
-    math::UdProject<kColumns>(out.ud, h, f);
-    math::UdMeasure<kColumns>(out.ud, f, 1.0f / d_[column], gain);
-    for (int i = 0; i < kColumns; ++i) out.x[i] += gain[i] * innovation;
+    for (; k < kColumns; ++k) row[at[k]] = *stored++;
+    estimate.BeginRow(at[column], joint, *stored, 1.0f / d_[column], 0.0f);
   }
 
   const Prior<Layout>* prior_ = nullptr;
+  UpdateReport report_;
   float d_[kColumns] = {};
-  float rows_[kOffsets.at[kColumns]] = {};
+  float rows_[kTriangle] = {};
+  float row_[kColumns + 1] = {};  // the row in work, and what remains of it
+  float weight_ = 1.0f;
+  int first_ = 0, width_ = 0, length_ = 0, dense_first_ = 0, next_ = 0;
 };
 
 }  // namespace armcal::filter

@@ -1,127 +1,179 @@
-// filter - the Kalman filter of a constant state with process noise, as U D U'; knows columns, not what they mean.
+// filter - the Kalman filter of a constant state with process noise; knows columns, not what they mean.
 #pragma once
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/ud_estimate.hpp"
 
 namespace armcal::filter {
 
-// Scalar rows in sequence (Bierman); process noise by rank-one additions, one state a sample in turn; `considered`
-// columns by Schmidt's form. An instance belongs to the background; no call allocates, each is bounded.
-template <class Layout>
+// Scalar rows in sequence; process noise by rank-one sums; `considered` columns by Schmidt's form. An instance belongs
+// to the background; no call allocates, each is bounded.
+// Noise goes to one column a sample in turn, as much at once as is due until its next turn.
+// The state is [front, dense], and kEta columns after it in an extended filter.
+template <class Layout, Form form = Form::kDense, Beside beside = Beside::kNothing>
 class KalmanFilter {
  public:
-  static constexpr int kColumns = Layout::kColumns;
+  using Columns = Order<Layout, form, beside>;
+  using Estimate = UdEstimate<Columns>;
+  static constexpr int kSize = Columns::kSize;
 
-  // Estimate in prior units and its standard deviation. Shape: [kColumns].
+  // Estimate in prior units and its standard deviation, by column. `variance`, `next`: work space.
   struct ReadOut {
-    float x[kColumns] = {};
-    float sd[kColumns] = {};
+    float x[kSize] = {};
+    float sd[kSize] = {};
+    float variance[kSize] = {};
+    int next = 0;
   };
 
-  // Starts at the prior, which must outlive the filter's use of it.
+  // True if the form can hold what the prior asks for. The dense form always can.
+  static bool Suits(const Prior<Layout>& prior) {
+    if (form == Form::kDense) return true;
+    bool suits = true;
+    for (int k = 0; k < kSize; ++k) suits &= !prior.considered[k] && (k < Layout::kFront || !(prior.noise[k] > 0.0f));
+    return suits;
+  }
+
+  // Starts at the prior, which must suit and outlive the filter's use of it.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
-    ExpandPrior(prior, ud_);
-    noisy_ = 0;
-    for (int k = 0; k < kColumns; ++k) {
-      x_[k] = 0.0f;
-      noisy_ += prior.noise[k] > 0.0f;
+    SetPrior(prior, estimate_);
+    turns_ = 0;
+    last_noise_ = 0;
+    for (std::uint32_t& word : considered_) word = 0;
+    for (int p = 0; p < kSize; ++p) {
+      const int k = Columns::kAt.column[p];
+      if (prior.noise[k] > 0.0f) turn_[turns_++] = static_cast<std::uint8_t>(p), last_noise_ = p;
+      considered_[p / 32] |= static_cast<std::uint32_t>(prior.considered[k]) << (p % 32);
     }
-    next_noise_ = 0;
+    next_turn_ = 0;
     floor_count_ = 0;
+    clamp_count_ = 0;
   }
 
-  // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense]. With use = false, or when the
-  // report is not kOk, every bit of the filter stays as it was; the instructions spent are the same.
-  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use) {
-    float h[kColumns + 1] = {};
-    const int first = Layout::kFrontBegin[joint], last = Layout::kFrontBegin[joint + 1];
-    for (int k = first; k < last; ++k) h[k] = front[k - first];
-    for (int k = 0; k < Layout::kDense; ++k) h[Layout::kFront + k] = dense[k];
-    h[kColumns] = y;
+  // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense], zero before kRowBegin[joint];
+  // eta [kNonlinear] in an extended filter. With use = false, or when the report is not kOk, every bit of the estimate
+  // stays as it was; the instructions spent are the same.
+  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use,
+                      const float* eta = nullptr) {
+    BeginRow(joint, front, dense, y, use, eta);
+    int all = kNoSlices;
+    (void)StepRow(all);
+    return report_;
+  }
+  // The same in slices: StepRow, which spends credit (slices.hpp), until it answers true; then report().
+  void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
+    const int first = Columns::kAt.first[joint];
+    float* row = estimate_.ClearRow();
+    std::uint32_t largest = MagnitudeBits(y);
+    const auto put = [&](int column, float value) {
+      largest = math::Max(largest, MagnitudeBits(value));
+      row[Columns::kAt.position[column]] = value;
+    };
+    const int begin = Layout::kFrontBegin[joint], end = Layout::kFrontBegin[joint + 1];
+    for (int k = begin; k < end; ++k) put(k, front[k - begin]);
+    for (int k = Layout::kRowBegin[joint]; k < Layout::kDense; ++k) put(Layout::kFront + k, dense[k]);
+    if constexpr (beside == Beside::kEta)
+      for (int e = 0; e < Layout::kNonlinear; ++e) put(Layout::kColumns + e, eta[e]);
 
-    UpdateReport report;
-    report.status = JudgeRow(h, kColumns + 1);
-    const std::uint32_t taken = math::MaskOf(use && report.status == core::Status::kOk);
-    for (int k = 0; k <= kColumns; ++k) h[k] = math::Masked(h[k], taken);
+    report_.status = Judge(largest);
+    const std::uint32_t taken = math::MaskOf(use && report_.status == core::Status::kOk);
+    for (int p = first; p < kSize; ++p) row[p] = math::Masked(row[p], taken);
+    used_ = taken != 0u;
+    estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f, prior_->gate_sigma);
+  }
+  bool StepRow(int& credit) {
+    const std::uint32_t* considered = AnyConsidered() ? considered_ : nullptr;
+    if (!estimate_.StepRow(considered, credit)) return false;
+    report_.innovation = estimate_.innovation();
+    report_.variance = estimate_.variance();
+    report_.accepted = used_ && estimate_.inside();
+    if (report_.status == core::Status::kOk && !report_.accepted) report_.status = core::Status::kGated;
+    return true;
+  }
+  const UpdateReport& report() const { return report_; }
 
-    float f[kColumns], gain[kColumns];
-    math::UdProject<kColumns>(ud_, h, f);
-    float innovation = h[kColumns];
-    for (int k = 0; k < kColumns; ++k) innovation -= h[k] * x_[k];
-    report.innovation = innovation;
-    report.variance = 1.0f + math::UdQuadratic<kColumns>(ud_, f);
-
-    const float gate = prior_->gate_sigma;
-    const bool inside = !(gate > 0.0f && innovation * innovation > gate * gate * report.variance);
-    report.accepted = taken != 0u && inside;
-    if (report.status == core::Status::kOk && !report.accepted) report.status = core::Status::kGated;
-    const std::uint32_t mask = math::MaskOf(report.accepted);
-    for (int k = 0; k < kColumns; ++k) f[k] = math::Masked(f[k], mask);
-    innovation = math::Masked(innovation, mask);
-
-    const float variance = math::UdMeasure<kColumns>(ud_, f, 1.0f, gain);
-    if (prior_->any_considered) KeepConsidered(variance, gain);
-    for (int k = 0; k < kColumns; ++k) x_[k] += gain[k] * innovation;
-    return report;
+  // What the rows and the end of a sample spend (slices.hpp). A considered column makes it more.
+  int SampleCost() const {
+    int cost = kEndCost + (turns_ > 0 ? Estimate::SumCost(last_noise_) : 0);
+    for (int i = 0; i < Layout::kJoints; ++i) cost += Estimate::RowCost(Columns::kAt.first[i], i) + ConsideredCost();
+    return cost;
   }
 
-  // Once after the rows of a sample: process noise on the next noisy state in turn, if its joints move (bit i of
-  // `moving`: joint i), and the floor under the dense D.
+  // Once after the rows of a sample: process noise, for columns whose joints move (bit i of `moving`: joint i), and the
+  // floor under the dense D.
   void EndSample(std::uint32_t moving) {
-    if (noisy_ > 0) AddNoise(moving);
-    for (int k = Layout::kFront; k < kColumns; ++k) {
-      float& d = ud_[math::UdIndex(k, k)];
+    BeginEnd(moving);
+    int all = kNoSlices;
+    (void)StepEnd(all);
+  }
+  void BeginEnd(std::uint32_t moving) {
+    for (int k = Layout::kFront; k < kSize; ++k) {
+      float& d = estimate_.d(Columns::kAt.position[k]);
       const float floor = math::Masked(prior_->link_floor, prior_->active[k]);
       floor_count_ += d < floor;
       d = math::Max(d, floor);
     }
+    if (turns_ == 0) return;
+    const int p = turn_[next_turn_], k = Columns::kAt.column[p];
+    const std::uint32_t needed = JointsOf<Layout>(k), mask = math::MaskOf((moving & needed) == needed);
+    estimate_.BeginUnitSum(p, math::Masked(prior_->noise[k] * static_cast<float>(turns_), mask), LastOf(p));
+    const int following = next_turn_ + 1 < turns_ ? next_turn_ + 1 : 0;
+    next_turn_ = moving != 0u ? following : next_turn_;  // at rest the turn does not pass, however long it lasts
   }
+  bool StepEnd(int& credit) { return turns_ == 0 || estimate_.StepSum(credit); }
 
   // Read-out in slices, interface shared by all filters: Begin, then Step until it answers true. No update between.
-  void BeginReadOut(ReadOut&) const {}
-  bool StepReadOut(ReadOut& out) const {
-    math::UdDiagonal<kColumns>(ud_, out.sd);
-    for (int k = 0; k < kColumns; ++k) {
-      out.x[k] = x_[k];
-      out.sd[k] = math::Sqrt(out.sd[k]);
+  void BeginReadOut(ReadOut& out) const {
+    for (float& v : out.variance) v = 0.0f;
+    out.next = 0;
+  }
+  bool StepReadOut(ReadOut& out, int& credit) const {
+    for (; out.next < kSize && credit > 0; ++out.next) {
+      estimate_.AddDiagonal(out.next, out.variance);
+      credit -= estimate_.DiagonalCost(out.next);
+    }
+    if (out.next < kSize) return false;
+    for (int p = 0; p < kSize; ++p) {
+      out.x[Columns::kAt.column[p]] = estimate_.x(p);
+      out.sd[Columns::kAt.column[p]] = math::Sqrt(out.variance[p]);
     }
     return true;
   }
-
-  std::uint32_t floor_count() const { return floor_count_; }  // how often the floor held a D
-  const float* factor() const { return ud_; }                 // packed U D U', prior units
-
- private:
-  // Schmidt: the optimal update minus what it took from the considered columns, P + S k k', and no gain for them.
-  void KeepConsidered(float variance, float* gain) {
-    float kept[kColumns];
-    for (int k = 0; k < kColumns; ++k) {
-      const std::uint32_t considered = math::MaskOf(prior_->considered[k]);
-      kept[k] = math::Masked(gain[k], considered);
-      gain[k] = math::Masked(gain[k], ~considered);
-    }
-    math::UdAdd<kColumns>(ud_, variance, kept);
+  bool StepReadOut(ReadOut& out) const {
+    int credit = kSliceCredit;
+    return StepReadOut(out, credit);
   }
 
-  void AddNoise(std::uint32_t moving) {
-    int next = next_noise_;
-    do next = next + 1 < kColumns ? next + 1 : 0;
-    while (!(prior_->noise[next] > 0.0f));
-    if (moving != 0u) next_noise_ = next;  // at rest nothing changes, however long it lasts
-    const std::uint32_t needed = JointsOf<Layout>(next);
-    float a[kColumns] = {};
-    a[next] = 1.0f;
-    const float variance = prior_->noise[next] * static_cast<float>(noisy_);  // its turn comes every noisy_-th
-    math::UdAdd<kColumns>(ud_, math::Masked(variance, math::MaskOf((moving & needed) == needed)), a);
+  float x(int column) const { return estimate_.x(Columns::kAt.position[column]); }
+  // Keeps x of a column within [low, high] and counts when it had to. Between samples.
+  void Clamp(int column, float low, float high) {
+    float& x = estimate_.x(Columns::kAt.position[column]);
+    clamp_count_ += !(x >= low && x <= high);
+    x = math::Max(low, math::Min(high, x));
+  }
+  std::uint32_t clamp_count() const { return clamp_count_; }
+  std::uint32_t floor_count() const { return floor_count_; }  // how often the floor held a D
+  const Estimate& estimate() const { return estimate_; }
+
+ private:
+  static constexpr int kEndCost = 80;
+
+  bool AnyConsidered() const { return form == Form::kDense && prior_->any_considered; }
+  int ConsideredCost() const { return AnyConsidered() ? Estimate::SumCost(kSize - 1) : 0; }
+
+  // A sum starts at the last column that may have a turn, whoever's turn it is: the same instructions each time.
+  int LastOf(int p) const {
+    return form == Form::kBlock ? Columns::kAt.front_end[static_cast<int>(Columns::kAt.joint[p])] - 1 : last_noise_;
   }
 
   const Prior<Layout>* prior_ = nullptr;
-  float ud_[math::UdSize(kColumns)] = {};
-  float x_[kColumns] = {};
-  int noisy_ = 0;
-  int next_noise_ = 0;
-  std::uint32_t floor_count_ = 0;
+  Estimate estimate_;
+  UpdateReport report_;
+  std::uint32_t considered_[(kSize + 31) / 32] = {};
+  std::uint8_t turn_[kSize] = {};  // positions with noise
+  int turns_ = 0, next_turn_ = 0, last_noise_ = 0;
+  std::uint32_t floor_count_ = 0, clamp_count_ = 0;
+  bool used_ = false;
 };
 
 }  // namespace armcal::filter

@@ -5,12 +5,14 @@
 // Front columns are independent of all others in the prior; dense columns are correlated.
 //
 // Layout is a struct of constants (a generated model is one): kJoints, kFront, kFrontBegin[kJoints + 1], kDense,
-// kRowBegin[kJoints], kColumns = kFront + kDense. See model/contract.hpp.
+// kRowBegin[kJoints], kColumns = kFront + kDense, kNonlinear. See model/contract.hpp. The nonlinear parameters eta are
+// columns of the extended filter alone, numbered from kColumns on, independent of all others in the prior.
 #pragma once
 
 #include <cstdint>
 
 #include "armcal/core/status.hpp"
+#include "armcal/filter/order.hpp"
 #include "armcal/math/ud.hpp"
 
 namespace armcal::filter {
@@ -19,14 +21,15 @@ inline constexpr float kRowLimit = 1e6f;  // a larger element of a row means a b
 
 template <class Layout>
 struct Prior {
+  static constexpr int kStates = Layout::kColumns + Layout::kNonlinear;
   float dense_ud[math::UdSize(Layout::kDense)] = {};  // correlation of the dense columns as U D U'
-  std::uint32_t active[Layout::kColumns] = {};        // all ones: the column has uncertainty; 0: fixed or standby
-  bool considered[Layout::kColumns] = {};             // counted, not updated (Kalman form)
+  std::uint32_t active[kStates] = {};                 // all ones: the column has uncertainty; 0: fixed or standby
+  bool considered[kStates] = {};                      // counted, not updated (Kalman form)
   bool any_considered = false;
-  float lambda[Layout::kColumns] = {};  // forgetting per sample, in (0, 1] (forgetting form)
-  float noise[Layout::kColumns] = {};   // variance per sample, prior units (Kalman form)
-  float link_floor = 0.0f;              // D of dense columns never falls below (Kalman form)
-  float gate_sigma = 0.0f;              // innovations beyond are not used; 0: no gate (Kalman form)
+  float lambda[kStates] = {};  // forgetting per sample, in (0, 1] (forgetting form)
+  float noise[kStates] = {};   // variance per sample, prior units (Kalman form)
+  float link_floor = 0.0f;     // D of dense columns never falls below (Kalman form)
+  float gate_sigma = 0.0f;     // innovations beyond are not used; 0: no gate (Kalman form)
 };
 
 // What one row did. Whitened units.
@@ -46,25 +49,27 @@ constexpr std::uint32_t JointsOf(int column) {
   return (1u << Layout::kJoints) - 1u;
 }
 
-// Full packed factor [front, dense] of the prior's correlation. Shape: ud [UdSize(kColumns)]. Context: background.
-template <class Layout>
-void ExpandPrior(const Prior<Layout>& prior, float* ud) {
-  using math::UdIndex;
-  for (int k = 0; k < math::UdSize(Layout::kColumns); ++k) ud[k] = 0.0f;
-  for (int k = 0; k < Layout::kFront; ++k) ud[UdIndex(k, k)] = math::Masked(1.0f, prior.active[k]);
-  for (int j = 0; j < Layout::kDense; ++j)
-    for (int i = 0; i <= j; ++i) ud[UdIndex(Layout::kFront + i, Layout::kFront + j)] = prior.dense_ud[UdIndex(i, j)];
+// x = 0 and the prior's correlation, in any order of the columns. Slopes start as known: zero. Context: background.
+template <class Layout, class Estimate>
+void SetPrior(const Prior<Layout>& prior, Estimate& estimate) {
+  using Columns = typename Estimate::Columns;
+  const auto& at = Columns::kAt.position;
+  estimate.Clear();
+  for (int k = 0; k < Layout::kFront; ++k) estimate.d(at[k]) = math::Masked(1.0f, prior.active[k]);
+  for (int j = 0; j < Layout::kDense; ++j) {
+    const int p = at[Layout::kFront + j];
+    for (int i = 0; i < j; ++i) estimate.u(at[Layout::kFront + i], p) = prior.dense_ud[math::UdIndex(i, j)];
+    estimate.d(p) = prior.dense_ud[math::UdIndex(j, j)];
+  }
+  if constexpr (Columns::kBeside == Beside::kEta)
+    for (int k = Layout::kColumns; k < Columns::kSize; ++k) estimate.d(at[k]) = math::Masked(1.0f, prior.active[k]);
 }
 
-// kOk, kNotFinite or kOutOfRange for `length` elements. Context: background.
-inline core::Status JudgeRow(const float* x, int length) {
-  std::uint32_t largest = 0;
-  for (int k = 0; k < length; ++k) {
-    const std::uint32_t bits = math::BitsOf(x[k]) & 0x7FFFFFFFu;
-    largest = bits > largest ? bits : largest;
-  }
-  if (largest >= 0x7F800000u) return core::Status::kNotFinite;
-  return largest > math::BitsOf(kRowLimit) ? core::Status::kOutOfRange : core::Status::kOk;
+// A row is judged by its largest element in magnitude: kOk, kNotFinite or kOutOfRange. Context: background.
+inline std::uint32_t MagnitudeBits(float x) { return math::BitsOf(x) & 0x7FFFFFFFu; }
+inline core::Status Judge(std::uint32_t largest_magnitude_bits) {
+  if (largest_magnitude_bits >= 0x7F800000u) return core::Status::kNotFinite;
+  return largest_magnitude_bits > math::BitsOf(kRowLimit) ? core::Status::kOutOfRange : core::Status::kOk;
 }
 
 }  // namespace armcal::filter

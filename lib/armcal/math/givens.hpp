@@ -4,25 +4,43 @@
 // transformations without square roots, 1973. A row of zeros leaves every bit as it was. Context: any.
 #pragma once
 
+#include "armcal/math/columns.hpp"
+
 namespace armcal::math {
 
-// Eliminates x0 of the row (x0, x) of the given weight against the stored row (1, r) with d > 0.
-// Shapes: x, r [length]; x0 is read before, x is what remains of the row. Returns the weight of what remains.
-// The stored row moves by a correction, so that its increments are not lost beside its value.
+// d takes x0 of the given weight; s: what the stored row takes of the remainder. Returns the remainder's weight.
 template <class T>
-T GivensRow(T& d, T* __restrict r, T x0, T* __restrict x, int length, T weight) {
+T GivensPivot(T& d, T x0, T weight, T& s) {
   const T wx = weight * x0;
   const T next = d + wx * x0;
   const T inverse = T(1) / next;
-  const T s = wx * inverse;
   const T remaining = weight * (d * inverse);
-  for (int k = 0; k < length; ++k) {
-    const T rest = x[k] - x0 * r[k];
-    r[k] += s * rest;
-    x[k] = rest;
-  }
+  s = wx * inverse;
   d = next;
   return remaining;
+}
+
+// Eliminates x0 of the row (x0, x) of the given weight against the stored row (1, r) with d > 0.
+// Shapes: x, r [length]; x0 is read before, x is what remains of the row. Returns the weight of what remains.
+template <class T>
+T GivensRow(T& d, T* __restrict r, T x0, T* __restrict x, int length, T weight) {
+  T s;
+  const T remaining = GivensPivot(d, x0, weight, s);
+  Fold(x, r, x0, s, length);
+  return remaining;
+}
+
+// The same against two stored rows, (1, r1[0..length]) and after it (1, r2[0..length - 1]), at once.
+// Shapes: x, r1 [length + 1], r2 [length].
+template <class T>
+T GivensRows(T& d1, T* __restrict r1, T& d2, T* __restrict r2, T x0, T* __restrict x, int length, T weight) {
+  T s1, s2;
+  weight = GivensPivot(d1, x0, weight, s1);
+  Fold(x, r1, x0, s1, 1);
+  const T x1 = x[0];
+  weight = GivensPivot(d2, x1, weight, s2);
+  Fold(x + 1, r1 + 1, r2, x0, s1, x1, s2, length);
+  return weight;
 }
 
 }  // namespace armcal::math

@@ -42,7 +42,7 @@ long Count(Call call) {
 
 template <class Filter>
 class ConstantCount : public testing::Test {};
-using Filters = testing::Types<ForgettingFilter<Small>, KalmanFilter<Small>>;
+using Filters = testing::Types<ForgettingFilter<Small>, KalmanFilter<Small>, KalmanFilter<Small, Form::kBlock>>;
 TYPED_TEST_SUITE(ConstantCount, Filters);
 
 TYPED_TEST(ConstantCount, GatedRefusedTinyAndPlainRows_CostTheSame) {

@@ -14,7 +14,13 @@ using namespace test;  // NOLINT: the bench of these tests
 constexpr std::uint32_t kAll = 7;
 using Filter = KalmanFilter<Small>;
 
-void Feed(Filter& filter, const std::vector<Row>& rows) {
+template <class Any>
+class EitherForm : public testing::Test {};
+using Forms = testing::Types<KalmanFilter<Small>, KalmanFilter<Small, Form::kBlock>>;
+TYPED_TEST_SUITE(EitherForm, Forms);
+
+template <class Any>
+void Feed(Any& filter, const std::vector<Row>& rows) {
   for (const Row& r : rows) {
     EXPECT_TRUE(filter.Update(r.joint, r.front, r.dense, r.y, true).accepted);
     if (r.joint == Small::kJoints - 1) filter.EndSample(kAll);
@@ -36,22 +42,22 @@ struct Textbook {
   }
 };
 
-TEST(KalmanFilter, WithoutNoise_IsTheBatchSolution) {
+TYPED_TEST(EitherForm, WithoutNoise_IsTheBatchSolution) {
   Bench bench;
   bench.size = 3;
   const std::vector<Row> rows = bench.Rows(2000);
-  Filter filter;
+  TypeParam filter;
   filter.Restart(bench.prior);
   Feed(filter, rows);
   const Posterior oracle = SolveBatch(bench.prior, rows);
-  const Filter::ReadOut out = Read(filter);
+  const typename TypeParam::ReadOut out = Read(filter);
   EXPECT_LT(Distance<Small>(out.x, oracle), 0.01);  // float32: 6e-8 of 1, sd about 5e-3
   for (int k = 0; k < Small::kColumns; ++k) EXPECT_NEAR(out.sd[k] / oracle.sd(k), 1, 1e-3);
 }
 
-TEST(KalmanFilter, EachReport_IsTheTextbookInnovationAndVariance) {
+TYPED_TEST(EitherForm, EachReport_IsTheTextbookInnovationAndVariance) {
   Bench bench;
-  Filter filter;
+  TypeParam filter;
   filter.Restart(bench.prior);
   Textbook textbook(bench.prior);
   for (const Row& r : bench.Rows(40)) {
@@ -110,51 +116,52 @@ TEST(KalmanFilter, ProcessNoise_HasTheStatedMeanRate_AndWaitsForMotion) {
   EXPECT_NEAR(out.sd[8], 1.0f, 1e-6f);
 }
 
-TEST(KalmanFilter, LinkFloor_HoldsDAndCountsItself) {
+TYPED_TEST(EitherForm, LinkFloor_HoldsDAndCountsItself) {
   Bench bench;
   bench.prior.link_floor = 1e-3f;
-  Filter filter;
+  TypeParam filter;
   filter.Restart(bench.prior);
   Feed(filter, bench.Rows(3000));
   EXPECT_GT(filter.floor_count(), 0u);
-  for (int k = Small::kFront; k < Small::kColumns; ++k) EXPECT_GE(filter.factor()[math::UdIndex(k, k)], 1e-3f);
+  for (int k = Small::kFront; k < Small::kColumns; ++k)
+    EXPECT_GE(filter.estimate().d(TypeParam::Columns::kAt.position[k]), 1e-3f);
 }
 
-TEST(KalmanFilter, GatedOrRefusedRow_LeavesEveryBit) {
+TYPED_TEST(EitherForm, GatedOrRefusedRow_LeavesEveryBit) {
   Bench bench;
   bench.prior.gate_sigma = 5.0f;
-  Filter filter;
+  TypeParam filter;
   filter.Restart(bench.prior);
   for (const Row& r : bench.Rows(50)) filter.Update(r.joint, r.front, r.dense, r.y, true);
-  const std::vector<unsigned char> before = Bytes(filter);
+  const std::vector<unsigned char> before = EstimateBytes(filter.estimate());
 
   Row row = bench.Next(2);
   EXPECT_EQ(filter.Update(2, row.front, row.dense, row.y, false).status, core::Status::kGated);
-  EXPECT_EQ(Bytes(filter), before);
+  EXPECT_EQ(EstimateBytes(filter.estimate()), before);
   const UpdateReport far = filter.Update(2, row.front, row.dense, row.y + 1000, true);
   EXPECT_EQ(far.status, core::Status::kGated);
   EXPECT_FALSE(far.accepted);
   EXPECT_GT(far.innovation, 900.0f);
-  EXPECT_EQ(Bytes(filter), before);
+  EXPECT_EQ(EstimateBytes(filter.estimate()), before);
   row.dense[5] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(filter.Update(2, row.front, row.dense, row.y, true).status, core::Status::kNotFinite);
-  EXPECT_EQ(Bytes(filter), before);
+  EXPECT_EQ(EstimateBytes(filter.estimate()), before);
   row.dense[5] = 1e9f;
   EXPECT_EQ(filter.Update(2, row.front, row.dense, row.y, true).status, core::Status::kOutOfRange);
-  EXPECT_EQ(Bytes(filter), before);
+  EXPECT_EQ(EstimateBytes(filter.estimate()), before);
   row.dense[5] = 0.5f;
   EXPECT_EQ(filter.Update(2, row.front, row.dense, std::numeric_limits<float>::infinity(), true).status,
             core::Status::kNotFinite);
-  EXPECT_EQ(Bytes(filter), before);
+  EXPECT_EQ(EstimateBytes(filter.estimate()), before);
   row.y = static_cast<float>(Full<Small>(row).dot(bench.truth));
   EXPECT_TRUE(filter.Update(2, row.front, row.dense, row.y, true).accepted);
-  EXPECT_NE(Bytes(filter), before);
+  EXPECT_NE(EstimateBytes(filter.estimate()), before);
 }
 
-TEST(KalmanFilter, InactiveColumn_StaysKnown) {
+TYPED_TEST(EitherForm, InactiveColumn_StaysKnown) {
   Bench bench;
   bench.prior.active[4] = 0;
-  Filter filter;
+  TypeParam filter;
   filter.Restart(bench.prior);
   for (Row r : bench.Rows(100)) {
     if (r.joint == 2) r.front[2] = 0;
@@ -162,6 +169,81 @@ TEST(KalmanFilter, InactiveColumn_StaysKnown) {
   }
   EXPECT_EQ(Read(filter).x[4], 0.0f);
   EXPECT_EQ(Read(filter).sd[4], 0.0f);
+}
+
+TYPED_TEST(EitherForm, FrontNoise_IsTheTextbooksInTurn) {
+  Bench bench;
+  const int noisy[3] = {0, 1, 4};
+  for (const int k : noisy) bench.prior.noise[k] = 1e-3f * static_cast<float>(k + 1);
+  TypeParam filter;
+  filter.Restart(bench.prior);
+  Textbook textbook(bench.prior);
+  int turn = 0;
+  for (const Row& r : bench.Rows(300)) {
+    const UpdateReport got = filter.Update(r.joint, r.front, r.dense, r.y, true);
+    const UpdateReport expected = textbook.Update(Full<Small>(r), r.y, Vector::Zero(Small::kColumns));
+    EXPECT_NEAR(got.innovation, expected.innovation, 1e-4);
+    EXPECT_NEAR(got.variance / expected.variance, 1, 1e-4);
+    if (r.joint < Small::kJoints - 1) continue;
+    // In the order of the factor: joint 0's columns, then joint 2's.
+    const int k = noisy[turn++ % 3];
+    textbook.p(k, k) += 3.0 * bench.prior.noise[k];
+    filter.EndSample(kAll);
+  }
+}
+
+TYPED_TEST(EitherForm, AnySlices_GiveTheSameBits) {
+  for (const bool considered : {false, true}) {
+    Bench bench;
+    for (int k = 0; k < Small::kFront; ++k) bench.prior.noise[k] = 1e-4f;
+    bench.prior.considered[2] = bench.prior.any_considered = considered;
+    if (!TypeParam::Suits(bench.prior)) continue;
+    TypeParam whole, sliced;
+    whole.Restart(bench.prior);
+    sliced.Restart(bench.prior);
+    int slices = 0;
+    for (const Row& r : bench.Rows(100)) {
+      const UpdateReport expected = whole.Update(r.joint, r.front, r.dense, r.y, true);
+      sliced.BeginRow(r.joint, r.front, r.dense, r.y, true);
+      for (int credit = 0; (credit += 17, !sliced.StepRow(credit));) ++slices;
+      EXPECT_EQ(sliced.report().innovation, expected.innovation);
+      EXPECT_EQ(sliced.report().accepted, expected.accepted);
+      whole.EndSample(kAll);
+      sliced.BeginEnd(kAll);
+      for (int credit = 0; (credit += 17, !sliced.StepEnd(credit));) ++slices;
+    }
+    EXPECT_GT(slices, 1000);
+    EXPECT_EQ(EstimateBytes(whole.estimate()), EstimateBytes(sliced.estimate()));
+  }
+}
+
+TEST(KalmanFilter, BlockForm_IsTheDenseOneInLessRoom_AndSaysWhatItCannotHold) {
+  using Block = KalmanFilter<Small, Form::kBlock>;
+  Bench bench;
+  for (int k = 0; k < Small::kFront; ++k) bench.prior.noise[k] = 1e-4f;
+  Filter dense;
+  Block block;
+  dense.Restart(bench.prior);
+  block.Restart(bench.prior);
+  for (const Row& r : bench.Rows(1000)) {
+    dense.Update(r.joint, r.front, r.dense, r.y, true);
+    block.Update(r.joint, r.front, r.dense, r.y, true);
+    if (r.joint == Small::kJoints - 1) dense.EndSample(kAll), block.EndSample(kAll);
+  }
+  const auto a = Read(dense);
+  const auto b = Read(block);
+  for (int k = 0; k < Small::kColumns; ++k) {
+    EXPECT_NEAR((a.x[k] - b.x[k]) / a.sd[k], 0, 0.01) << k;  // sums in another order
+    EXPECT_NEAR(a.sd[k] / b.sd[k], 1, 1e-4) << k;
+  }
+  EXPECT_LT(sizeof block, sizeof dense);
+  EXPECT_TRUE(Block::Suits(bench.prior));
+  bench.prior.noise[Small::kFront] = 1e-6f;
+  EXPECT_FALSE(Block::Suits(bench.prior));
+  EXPECT_TRUE(Filter::Suits(bench.prior));
+  bench.prior.noise[Small::kFront] = 0;
+  bench.prior.considered[1] = true;
+  EXPECT_FALSE(Block::Suits(bench.prior));
 }
 
 }  // namespace

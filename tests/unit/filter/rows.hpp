@@ -12,7 +12,7 @@ namespace armcal::filter::test {
 
 // Three joints with 2, 0 and 3 front columns and seven dense ones.
 struct Small {
-  static constexpr int kJoints = 3, kFront = 5, kDense = 7, kColumns = 12;
+  static constexpr int kJoints = 3, kFront = 5, kDense = 7, kColumns = 12, kNonlinear = 0;
   static constexpr int kFrontBegin[4] = {0, 2, 2, 5};
   static constexpr int kRowBegin[3] = {0, 2, 4};
 };
@@ -78,13 +78,12 @@ struct Bench {
 // Prior covariance (prior units) of the full state.
 template <class Layout>
 Matrix PriorCovariance(const Prior<Layout>& prior) {
-  std::vector<float> ud(math::UdSize(Layout::kColumns));
-  ExpandPrior(prior, ud.data());
   constexpr int n = Layout::kColumns;
   Matrix u = Matrix::Identity(n, n), d = Matrix::Zero(n, n);
-  for (int j = 0; j < n; ++j) {
-    d(j, j) = ud[math::UdIndex(j, j)];
-    for (int i = 0; i < j; ++i) u(i, j) = ud[math::UdIndex(i, j)];
+  for (int k = 0; k < Layout::kFront; ++k) d(k, k) = prior.active[k] != 0 ? 1 : 0;
+  for (int j = 0; j < Layout::kDense; ++j) {
+    d(Layout::kFront + j, Layout::kFront + j) = prior.dense_ud[math::UdIndex(j, j)];
+    for (int i = 0; i < j; ++i) u(Layout::kFront + i, Layout::kFront + j) = prior.dense_ud[math::UdIndex(i, j)];
   }
   return u * d * u.transpose();
 }
@@ -136,11 +135,14 @@ typename Filter::ReadOut Read(const Filter& filter) {
   return out;
 }
 
-// Every bit of an object, padding included: the object never leaves its place in these tests.
-template <class T>
-std::vector<unsigned char> Bytes(const T& object) {
-  std::vector<unsigned char> bytes(sizeof object);
-  std::memcpy(bytes.data(), &object, sizeof object);
+// Every bit that a filter keeps from row to row. What one row leaves in the work space has no say in the next: the
+// rows after must come out the same, too, which the tests of a refused row let them.
+template <class Estimate>
+std::vector<unsigned char> EstimateBytes(const Estimate& e) {
+  std::vector<float> all(e.elements(), e.elements() + Estimate::Columns::kElements);
+  for (int p = 0; p < Estimate::kSize; ++p) all.push_back(e.x(p));
+  std::vector<unsigned char> bytes(all.size() * sizeof(float));
+  std::memcpy(bytes.data(), all.data(), bytes.size());
   return bytes;
 }
 

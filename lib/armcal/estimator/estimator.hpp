@@ -1,10 +1,13 @@
 // estimator - where model and filter meet: samples in, estimates out; knows no register and no storage.
 #pragma once
 
+#include <type_traits>
+
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/sample_ring.hpp"
 #include "armcal/estimator/axes.hpp"
 #include "armcal/estimator/image.hpp"
+#include "armcal/estimator/live_model.hpp"
 #include "armcal/filter/slices.hpp"
 #include "armcal/monitor/monitor.hpp"
 #include "armcal/monitor/residual_statistics.hpp"
@@ -22,6 +25,10 @@ struct Estimates {
   std::uint32_t refused = 0;     // samples lost because the ring was full, since power-up
   float value[Model::kColumns] = {};
   float sd[Model::kColumns] = {};
+  // Nonlinear parameters; the committed ones and zero unless the filter is extended.
+  float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
+  float eta_sd[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
+  std::uint32_t clamps = 0;  // how often an eta was cut to its bound
   std::uint32_t rows_used[Model::kJoints] = {};
   std::uint32_t rows_gated[Model::kJoints] = {};    // not valid, not moving, or outside the innovation gate
   std::uint32_t rows_refused[Model::kJoints] = {};  // not finite or beyond filter::kRowLimit
@@ -29,7 +36,8 @@ struct Estimates {
   float residual_rms_Nm[Model::kJoints] = {};       // measured minus committed model, used rows
 };
 
-// Filter: filter::ForgettingFilter<Model>, filter::KalmanFilter<Model> or its block form.
+// Filter: filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>, filter::ExtendedKalmanFilter<Model>,
+// the last two in either form.
 // Push and PushSample belong to the tick (use one of the two), everything else to the background.
 template <class Model, class Filter>
 class Estimator {
@@ -71,6 +79,7 @@ class Estimator {
     for (monitor::JointMonitor& m : monitors_) m = monitor::JointMonitor{};
     if (residuals_ != nullptr) residuals_->Restart(adopted_tick);
     memory_.running = false;
+    live_.Restart();
     stage_ = Stage::kIdle;
     credit_ = 0;
     slice_ = filter::EqualSlices(filter_.SampleCost() + kSampleCost + n * kRowCost);
@@ -184,9 +193,14 @@ class Estimator {
     // Effects with memory run from sample to sample; after a gap they start anew and their rows wait until it is
     // forgotten.
     state.dt = static_cast<float>(Model::kSampleTicks) / static_cast<float>(Model::kTickRate_Hz);
-    memory_.running = memory_.running && s.tick - last_tick_ == static_cast<std::uint32_t>(Model::kSampleTicks);
+    const bool gap = s.tick - last_tick_ != static_cast<std::uint32_t>(Model::kSampleTicks);
+    memory_.running = memory_.running && !gap;
     last_tick_ = s.tick;
     feedforward::EvaluateRows(image_->committed, state, memory_, rows_);
+    if constexpr (Filter::kExtended) {
+      live_.Linearise(*image_, filter_, state, gap);
+      credit_ -= kSampleCost;
+    }
     for (int i = 0; i < n; ++i)
       if (Model::kReadyState[i] >= 0 && !(memory_.now[Model::kReadyState[i]] > 0.5f)) moving_ &= ~(1u << i);
     joint_ = 0;
@@ -194,20 +208,37 @@ class Estimator {
     return true;
   }
 
+  const feedforward::Rows<Model>& FilterRows() const {
+    if constexpr (Filter::kExtended) return live_.rows();
+    else return rows_;
+  }
+
   // Whitens the row of joint_ into prior units and hands it to the filter.
   void BeginRow() {
     const int i = joint_, first = Model::kFrontBegin[i];
     const float whiten = 1.0f / image_->sigma_Nm[i];
+    const feedforward::Rows<Model>& rows = FilterRows();
     const auto scaled = [&](float value, int column) {
       return math::Masked(value * (image_->scale[column] * whiten), image_->prior.active[column]);
     };
     float front[Model::kFront > 0 ? Model::kFront : 1], dense[Model::kDense];
-    for (int k = first; k < Model::kFrontBegin[i + 1]; ++k) front[k - first] = scaled(rows_.front[k], k);
-    for (int k = 0; k < Model::kDense; ++k) dense[k] = scaled(rows_.dense[i * Model::kDense + k], Model::kFront + k);
+    for (int k = first; k < Model::kFrontBegin[i + 1]; ++k) front[k - first] = scaled(rows.front[k], k);
+    for (int k = 0; k < Model::kDense; ++k) dense[k] = scaled(rows.dense[i * Model::kDense + k], Model::kFront + k);
     load_Nm_ = feedforward::LoadTorque(image_->committed.p, rows_, i);
     tau_model_Nm_[i] = feedforward::RowTorque(image_->committed.p, rows_, i, load_Nm_);
     residual_Nm_ = item_.sample.tau[i] - tau_model_Nm_[i];
-    filter_.BeginRow(i, front, dense, residual_Nm_ * whiten, ((moving_ >> i) & 1u) != 0u);
+    const bool use = ((moving_ >> i) & 1u) != 0u;
+    if constexpr (Filter::kExtended) {
+      float eta[Model::kNonlinear];
+      live_.EtaRow(*image_, i, eta);
+      float y = (item_.sample.tau[i] - live_.Torque(i)) * whiten;
+      for (int k = first; k < Model::kFrontBegin[i + 1]; ++k) y += front[k - first] * live_.x0(k);
+      for (int k = 0; k < Model::kDense; ++k) y += dense[k] * live_.x0(Model::kFront + k);
+      for (int e = 0; e < Model::kNonlinear; ++e) y += (eta[e] *= whiten) * live_.x0(Model::kColumns + e);
+      filter_.BeginRow(i, front, dense, y, use, eta);
+    } else {
+      filter_.BeginRow(i, front, dense, residual_Nm_ * whiten, use);
+    }
     credit_ -= kRowCost;
     stage_ = Stage::kUpdate;
   }
@@ -226,7 +257,14 @@ class Estimator {
     if (residuals_ != nullptr)
       residuals_->Add(i, {residual_Nm_, s.qd[i], s.q[i], load_Nm_, s.temperature_degC[i]}, ((moving_ >> i) & 1u) != 0u);
     stage_ = ++joint_ == n ? Stage::kEnd : Stage::kRow;
-    if (stage_ == Stage::kEnd) filter_.BeginEnd(moving_);
+    if (stage_ == Stage::kEnd) EndRows();
+  }
+
+  void EndRows() {
+    if constexpr (Filter::kExtended)
+      for (int e = 0; e < Model::kNonlinear; ++e)
+        filter_.Clamp(Model::kColumns + e, image_->eta_low[e], image_->eta_high[e]);
+    filter_.BeginEnd(moving_);
   }
 
   void FinishSample() {
@@ -242,6 +280,15 @@ class Estimator {
     for (int k = 0; k < Model::kColumns; ++k) {
       estimates_.value[k] = image_->committed.p[k] + image_->scale[k] * read_out_.x[k];
       estimates_.sd[k] = image_->scale[k] * read_out_.sd[k];
+    }
+    for (int e = 0; e < Model::kNonlinear; ++e) estimates_.eta[e] = image_->committed.eta[e];
+    if constexpr (Filter::kExtended) {
+      for (int e = 0; e < Model::kNonlinear; ++e) {
+        const int k = Model::kColumns + e;
+        estimates_.eta[e] = EtaAt(*image_, e, read_out_.x[k]);
+        estimates_.eta_sd[e] = EtaSlope(*image_, e, estimates_.eta[e]) * read_out_.sd[k];
+      }
+      estimates_.clamps = filter_.clamp_count();
     }
     for (int i = 0; i < n; ++i) {
       estimates_.nis[i] = monitors_[i].nis();
@@ -262,6 +309,7 @@ class Estimator {
   typename Filter::ReadOut read_out_;
   feedforward::Rows<Model> rows_ = {};
   feedforward::Memory<Model> memory_ = {};
+  std::conditional_t<Filter::kExtended, LiveModel<Model>, NoLiveModel> live_;
   monitor::JointMonitor monitors_[n];
   Estimates<Model> estimates_;
   Item item_ = {};

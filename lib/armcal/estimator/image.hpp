@@ -22,7 +22,10 @@ template <class Model>
 struct Image {
   feedforward::Committed<Model> committed;  // b0 and all that the tick needs
   filter::Prior<Model> prior;
-  float scale[Model::kColumns] = {};  // s: estimate b = b0 + s x
+  // s: estimate b = b0 + s x; of a logarithmic eta ln b = ln b0 + s x
+  float scale[Model::kColumns + Model::kNonlinear] = {};
+  float eta_low[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // bounds of x
+  float eta_high[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
   float sigma_Nm[Model::kJoints] = {};
 };
 
@@ -31,6 +34,12 @@ template <class Model>
 struct ImageWork {
   RigidPrior<Model, float> rigid;
 };
+
+// A nonlinear parameter whose range excludes zero is positive, and estimated as its logarithm.
+template <class Model>
+constexpr bool IsLogarithmic(int e) {
+  return Model::kInfo[Model::kParameters - Model::kNonlinear + e].lower > 0.0f;
+}
 
 namespace internal {
 inline bool Uncertain(model::ParameterState s) {
@@ -66,6 +75,31 @@ void ScaleCorrelation(const RigidPrior<Model, float>& rigid, Image<Model>& image
   float inverse[kRigid];
   for (int r = 0; r < kRigid; ++r) inverse[r] = math::Divide(1.0f, scale[r]);
   math::UdScale<kRigid>(prior.dense_ud, inverse, scale);
+}
+
+// Columns of the extended filter, and the range of x that keeps eta in its own.
+template <class Model>
+void PriorOfEta(const Table<Model>& table, Image<Model>& image) {
+  for (int e = 0; e < Model::kNonlinear; ++e) {
+    const int k = Model::kColumns + e, entry = Model::kParameters - Model::kNonlinear + e;
+    const model::ParameterEntry& given = table.parameter[entry];
+    const model::ParameterInfo& info = Model::kInfo[entry];
+    const bool log = IsLogarithmic<Model>(e);
+    image.committed.eta[e] = given.mean;
+    const float scale = log ? math::Divide(Spread(given), given.mean) : Spread(given);
+    const bool active = scale > kSmallestSd && given.mean >= info.lower && given.mean <= info.upper;
+    image.scale[k] = active ? scale : 0.0f;
+    image.prior.active[k] = math::MaskOf(active);
+    image.prior.considered[k] = active && given.state == model::ParameterState::kConsidered;
+    image.prior.any_considered |= image.prior.considered[k];
+    image.prior.lambda[k] = 1.0f;
+    const bool noisy = active && given.state == model::ParameterState::kEstimated;
+    image.prior.noise[k] = noisy ? given.process_noise / given.sd / given.sd : 0.0f;
+    const float low = log ? math::Log(info.lower / given.mean) : info.lower - given.mean;
+    const float high = log ? math::Log(info.upper / given.mean) : info.upper - given.mean;
+    image.eta_low[e] = active ? low / scale : 0.0f;
+    image.eta_high[e] = active ? high / scale : 0.0f;
+  }
 }
 }  // namespace internal
 
@@ -127,6 +161,7 @@ core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, Ima
     const bool noisy = active && !body && entry(k).state == model::ParameterState::kEstimated;
     prior.noise[k] = noisy ? entry(k).process_noise / sd / sd : 0.0f;
   }
+  internal::PriorOfEta<Model>(table, image);
   prior.link_floor = kLinkFloor;
   prior.gate_sigma = 0.0f;
   internal::ScaleCorrelation(rigid, image);
@@ -135,8 +170,6 @@ core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, Ima
   c.generation = generation;
   c.bumpless = (table.flags & model::kFlagBumpless) != 0;
   c.blend_ticks = static_cast<std::uint32_t>(static_cast<float>(table.blend_ms) * (Model::kTickRate_Hz / 1000.0f));
-  for (int e = 0; e < Model::kNonlinear; ++e)
-    c.eta[e] = table.parameter[Model::kParameters - Model::kNonlinear + e].mean;
   for (int i = 0; i < Model::kJoints; ++i) {
     c.limit_Nm[i] = table.joint[i].torque_limit_Nm;
     c.v_min_radps[i] = table.joint[i].v_min_radps;
@@ -151,7 +184,6 @@ template <class Model>
 Table<Model> DefaultTable() {
   Table<Model> table;
   table.schema = Model::kSchema;
-  for (int g = 0; g < model::kForgettingGroups; ++g) table.forgetting[g] = Model::kForgetting[g];
   for (int g = 0; g < model::kForgettingGroups; ++g) table.forgetting[g] = Model::kForgetting[g];
   for (int i = 0; i < Model::kJoints; ++i) {
     const model::AxisInfo& a = Model::kAxes[i];

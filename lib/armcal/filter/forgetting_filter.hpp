@@ -17,6 +17,7 @@ template <class Layout>
 class ForgettingFilter {
  public:
   static constexpr int kColumns = Layout::kColumns;
+  static constexpr bool kExtended = false;
   static constexpr float kFloor = 1e-6f;
   using Columns = Order<Layout, Form::kBlock, Beside::kNothing>;
 

@@ -13,6 +13,7 @@ namespace armcal::filter {
 template <class Layout, Form form = Form::kDense, Beside beside = Beside::kNothing>
 class KalmanFilter {
  public:
+  static constexpr bool kExtended = beside == Beside::kEta;  // rows carry d tau / d eta after the columns
   using Columns = Order<Layout, form, beside>;
   using Estimate = UdEstimate<Columns>;
   static constexpr int kSize = Columns::kSize;

@@ -108,6 +108,15 @@ struct TwoLink {
     front[5] = T(1);
     front[6] = front[3] * math::Exp(-ratio * ratio);
   }
+
+  // d tau2 / d vs2 by hand; p = parameters in filter coordinates.
+  template <class T>
+  static void Jacobian(const model::ModelInput<T, 2>& x, const T*, const T* eta, const T* p, const T*, T*,
+                       T* jacobian) {
+    const T ratio = x.qd[1] / eta[0];
+    jacobian[0] = T(0);
+    jacobian[1] = p[6] * math::Sign(x.qd[1]) * math::Exp(-ratio * ratio) * T(2) * ratio * ratio / eta[0];
+  }
 };
 
 }  // namespace armcal::test

@@ -1,0 +1,22 @@
+// filter - a million samples of collinear rows, float32 against the same recursions in double; knows no model.
+#include "tests/unit/filter/stress.hpp"
+
+namespace armcal::filter {
+namespace {
+
+class LongCondition : public testing::TestWithParam<double> {};
+
+TEST_P(LongCondition, AMillionSamples_StayBesideTheRecursionsInDouble) {
+  test::Stress stress(GetParam(), 0.999f, 1e-6f, 1e-9f);
+  for (int s = 1; s <= 1000000; ++s) {
+    stress.Sample();
+    if (s % 100000 != 0) continue;
+    EXPECT_LT(stress.KalmanDistance(), 0.2) << s;
+    EXPECT_LT(stress.ForgettingDistance(), 0.05) << s;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, LongCondition, testing::Values(1e3, 1e4, 1e5));
+
+}  // namespace
+}  // namespace armcal::filter

@@ -6,6 +6,8 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 
+#include "host_sim/calibration/self_product.hpp"
+
 namespace armcal::calibration {
 
 using Eigen::MatrixXd;
@@ -22,12 +24,6 @@ constexpr double kTold = 0.1;         // share of such a direction that must lie
 constexpr double kExact = 1e-8;       // share of the torque: a residual this small is rounding, no error
 constexpr double kRowsPerColumn = 3;
 
-MatrixXd Gram(const MatrixXd& M) {
-  MatrixXd lower = MatrixXd::Zero(M.cols(), M.cols());
-  lower.selfadjointView<Eigen::Lower>().rankUpdate(M.transpose());
-  return lower.selfadjointView<Eigen::Lower>();
-}
-
 MatrixXd UnitColumns(const MatrixXd& M) {
   const VectorXd norm = M.colwise().norm().transpose().cwiseMax(1e-300);
   return M * norm.cwiseInverse().asDiagonal();
@@ -35,7 +31,7 @@ MatrixXd UnitColumns(const MatrixXd& M) {
 
 // The directions of M (columns of unit norm) that are longer than `floor`, as orthonormal columns.
 MatrixXd Directions(const MatrixXd& M, double floor) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(Gram(M));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(SelfProduct(M));
   const auto keep = (eigen.eigenvalues().array() > floor * floor).count();
   return M * (eigen.eigenvectors().rightCols(keep) *
               eigen.eigenvalues().tail(keep).cwiseSqrt().cwiseInverse().asDiagonal());
@@ -114,13 +110,13 @@ JointExogeneity AugmentedRegression(const JointRows& rows) {
   for (int round = 0; round < kRounds; ++round) {
     const MatrixXd white = Whiten(plain_part, a, rows.pieces);
     if (white.rows() <= k) return out;
-    const LeastSquares fit(Gram(white), k);
+    const LeastSquares fit(SelfProduct(white), k);
     a = Autoregression(residual - X * fit.x, rows.pieces);
   }
   const MatrixXd white = Whiten(all, a, rows.pieces);
   out.rows = static_cast<int>(white.rows());
   if (q == 0 || static_cast<double>(out.rows) < kRowsPerColumn * static_cast<double>(k + q)) return out;
-  const MatrixXd gram = Gram(white);
+  const MatrixXd gram = SelfProduct(white);
   const LeastSquares plain(gram.bottomRightCorner(k + 1, k + 1), k), augmented(gram, q + k);
   if (augmented.rank <= plain.rank) return out;
   const auto free = static_cast<double>(white.rows() - augmented.rank);

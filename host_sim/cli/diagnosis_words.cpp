@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "host_sim/cli/verdict_file.hpp"
 #include "host_sim/excitation/target.hpp"
 
 namespace armcal::cli {
@@ -16,17 +17,6 @@ namespace {
 
 std::string Value(const std::string& name, double value, double sd, const std::string& unit) {
   return fmt::format("{} = {:.4g}{} {}", name, value, sd > 0 ? fmt::format(" +- {:.2g}", sd) : "", unit);
-}
-
-std::string Numbers(const std::vector<int>& joints) {
-  std::string out;
-  for (const int j : joints) out += fmt::format("{}{}", out.empty() ? "" : "-", j + 1);
-  return out;
-}
-
-// "stribeck:2", "wrist_coupling:5-6", "base_tilt": as armcal excite --separate takes it.
-std::string Asked(const codegen::EffectRecord& record, const std::vector<int>& joints) {
-  return record.name + (joints.empty() ? "" : ":") + Numbers(joints);
 }
 
 bool Apart(const std::vector<int>& a, const std::vector<int>& b) {
@@ -57,7 +47,7 @@ std::string Remark(const Term& t) {
 
 std::string JointName(const Term& t) {
   if (t.joints.size() == 1 || IsUnknown(t)) return std::to_string(t.joints[0] + 1);
-  return t.joints.empty() ? t.record->place : Numbers(t.joints);
+  return t.joints.empty() ? t.record->place : JointNumbers(t.joints);
 }
 
 std::string Parameters(const Term& t) {
@@ -83,7 +73,7 @@ std::string FoldText(const Term& t) {
 }
 
 std::string RivalName(const Rival& rival) {
-  return rival.record->name + ", joint " + (rival.joints.empty() ? rival.record->place : Numbers(rival.joints));
+  return rival.record->name + ", joint " + (rival.joints.empty() ? rival.record->place : JointNumbers(rival.joints));
 }
 
 std::string RunnerUp(const Term& t) {
@@ -118,7 +108,8 @@ std::vector<Separation> Separations(const Term& t, const diagnosis::Finding& fin
     const std::string& other = rival.record->separate;
     if (other != s.how && !other.empty()) s.how += (s.how.empty() ? "" : "; ") + other;
     if (s.how.empty()) s.how = "motion in which what they depend on does not go together";
-    const std::string one = Asked(*t.record, t.joints), another = Asked(*rival.record, rival.joints);
+    const std::string one = EffectWord(t.record->name, t.joints),
+                      another = EffectWord(rival.record->name, rival.joints);
     if (excitation::CanSeparate(model.robot(), records, {one, another}, found)) {
       s.command = fmt::format("armcal excite --separate {},{}", one, another);
       if (is_found(*t.record, t.joints) || is_found(*rival.record, rival.joints)) s.command += " --from " + verdict;

@@ -14,13 +14,22 @@ namespace armcal::cli {
 namespace {
 
 bool IsAmong(const codegen::EffectUse& use, const std::vector<std::string>& effects) {
-  std::string joints;
-  for (const int j : use.joints) joints += fmt::format("{}{}", joints.empty() ? ":" : "-", j + 1);
+  const std::string word = EffectWord(use.effect, use.joints);
   return std::any_of(effects.begin(), effects.end(),
-                     [&](const std::string& e) { return e == use.effect || e == use.effect + joints; });
+                     [&](const std::string& e) { return e == use.effect || e == word; });
 }
 
 }  // namespace
+
+std::string JointNumbers(const std::vector<int>& joints) {
+  std::string out;
+  for (const int j : joints) out += fmt::format("{}{}", out.empty() ? "" : "-", j + 1);
+  return out;
+}
+
+std::string EffectWord(const std::string& record, const std::vector<int>& joints) {
+  return record + (joints.empty() ? "" : ":") + JointNumbers(joints);
+}
 
 std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::vector<std::string>& effects) {
   std::vector<codegen::EffectUse> out;

@@ -105,7 +105,7 @@ VectorXd Diagnosis::Work::SlopeOverModelTorque(const std::vector<const Chosen*>&
 
 void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   const int active = static_cast<int>(declared.active.size());
-  const auto follows = [](const Chosen* t) { return t->candidate->follows_estimate(); };
+  const auto follows = [](const Chosen* t) { return t->candidate->record().depends_on_estimate; };
   if (evidence.logs.empty() || std::any_of(terms.begin(), terms.end(), follows)) FollowEstimate();
   if (model.depends_on_estimate() || regressor.empty()) StartRows();
   rows.mean.resize(active);

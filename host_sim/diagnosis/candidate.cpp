@@ -32,12 +32,6 @@ bool Candidate::reads(const std::string& input) const {
   return std::find(inputs.begin(), inputs.end(), input) != inputs.end();
 }
 
-bool Candidate::follows_estimate() const {
-  for (const char* of_model : {"tau_model", "tau_delayed", "tau_rigid", "tau_gravity", "M[:,j]", "dY/dgravity"})
-    if (reads(of_model)) return true;
-  return false;
-}
-
 std::string Candidate::name() const {
   std::string s = record().name;
   for (std::size_t k = 0; k < joints().size(); ++k) s += (k ? "-" : ", joint ") + std::to_string(joints()[k] + 1);

@@ -41,7 +41,6 @@ class Candidate {
   const codegen::EffectColumn& column(int c) const { return instance_.columns[c % instance_.columns.size()]; }
   const std::vector<int>& rows() const { return rows_; }  // joints whose torque it touches
   bool reads(const std::string& input) const;
-  bool follows_estimate() const;                                  // reads the model's torque or a part of it
   bool is_curve() const { return record().generic_penalty > 0; }  // fits a form, names no cause
   // At a time of the training log: what one part of a log shows of it says nothing about another part, or another log.
   bool is_event() const { return record().search.how == "window"; }

@@ -44,11 +44,4 @@ MatrixXd WhitenAll(const NoiseModel& noise, const RowIndex& rows, const MatrixXd
   return out;
 }
 
-MatrixXd SelfProduct(const Eigen::Ref<const MatrixXd>& m) {
-  MatrixXd out = MatrixXd::Zero(m.cols(), m.cols());
-  out.selfadjointView<Eigen::Lower>().rankUpdate(m.transpose());
-  out.triangularView<Eigen::StrictlyUpper>() = out.transpose();
-  return out;
-}
-
 }  // namespace armcal::diagnosis

@@ -1,6 +1,7 @@
 // diagnosis - small pieces that every part of a metric uses.
 #pragma once
 
+#include "host_sim/calibration/self_product.hpp"
 #include "host_sim/diagnosis/metric.hpp"
 
 namespace armcal::diagnosis {
@@ -9,6 +10,6 @@ namespace armcal::diagnosis {
 Gain SolveGain(const Eigen::LLT<Eigen::MatrixXd>& base, const Projection& p);
 
 Eigen::MatrixXd WhitenAll(const NoiseModel& noise, const RowIndex& rows, const Eigen::MatrixXd& m);
-Eigen::MatrixXd SelfProduct(const Eigen::Ref<const Eigen::MatrixXd>& m);  // m' m
+using calibration::SelfProduct;
 
 }  // namespace armcal::diagnosis

@@ -14,7 +14,6 @@ using Eigen::VectorXd;
 namespace {
 constexpr int kSweeps = 4;                           // of a pattern search at one step size
 constexpr double kWorthAStep = 0.3;                  // of chi^2: less is below what noise moves it by
-constexpr double kOnsetStep = 1 / 768.0;             // of the log's time
 constexpr int kClimbs = 12;                          // along a valley, at most
 constexpr double kLongest = 0.2, kSlopeStep = 1e-3;  // of an unknown's range
 constexpr int kFewRows = 200;                        // of a joint: too few for terms beside the base
@@ -72,7 +71,7 @@ Found Searcher::Finish(const Found& rough) {
   best_.rough = false, best_.gain = Gain{};
   Consider(rough.eta);
   const std::string& how = c_.record().search.how;
-  if (how == "onset") RefineBest(kOnsetStep, 2);
+  if (how == "onset") RefineBest(0.5 / kOnsetGrid / (1 << kOnsetHalvings), 2);
   else if (how == "profile" && !c_.unknowns().empty() && Promising()) RefineBest(GridStep() / 16, 1);
   return Scored();
 }

@@ -48,28 +48,27 @@ void Searcher::Onset() {
   const double begin = t[0], end = t[t.size() - 1], minimum = c_.record().search.minimum_s;
   if (e_.logs.size() != 1 || end - begin < 2 * minimum) return;  // times of several logs have no common origin
   for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
-  constexpr int kGrid = 12;
   best_.searched = 2;
-  best_.tried = 0.5 * kGrid * kGrid;
+  best_.tried = 0.5 * kOnsetGrid * kOnsetGrid;
   // Each cell of time once; a window is the sum of its cells.
   std::vector<double> edge{begin - 1};
-  for (int k = 1; k < kGrid; ++k) edge.push_back(begin + (end - begin) * k / kGrid);
+  for (int k = 1; k < kOnsetGrid; ++k) edge.push_back(begin + (end - begin) * k / kOnsetGrid);
   edge.push_back(end + 1);
   std::vector<Projection> cell;
-  for (int k = 0; k < kGrid; ++k) cell.push_back(metric().Project(Gather({edge[k], edge[k + 1]})));
+  for (int k = 0; k < kOnsetGrid; ++k) cell.push_back(metric().Project(Gather({edge[k], edge[k + 1]})));
   double most = 0;
   std::vector<double> window;
-  for (int i = 0; i < kGrid; ++i) {
+  for (int i = 0; i < kOnsetGrid; ++i) {
     Projection sum = cell[i];
-    for (int k = i; k < kGrid; ++k) {
+    for (int k = i; k < kOnsetGrid; ++k) {
       if (k > i) sum += cell[k];
-      if (edge[k + 1] - edge[i] < minimum || k - i + 1 == kGrid) continue;  // on all the time is no step
+      if (edge[k + 1] - edge[i] < minimum || k - i + 1 == kOnsetGrid) continue;  // on all the time is no step
       const double value = Value(sum).gain;
       if (value > most) most = value, window = {edge[i], edge[k + 1]};
     }
   }
   if (most > 0) Consider(window);
-  if (Promising()) RefineBest(0.5 / kGrid, 5);
+  if (Promising()) RefineBest(0.5 / kOnsetGrid, kOnsetHalvings);
   if (best_.eta[1] - best_.eta[0] < minimum) best_.gain = Gain{};
 }
 

@@ -44,6 +44,8 @@ class Searcher {
   void RefineBest(double step, int rounds);
   // Gauss-Newton, unknowns in unit coordinates: a pattern search would creep along a valley.
   std::vector<double> Climb(std::vector<double> eta) const;
+  static constexpr int kOnsetGrid = 12;     // cells of the log's time
+  static constexpr int kOnsetHalvings = 5;  // of half a cell, in the rough search
   double GridStep() const { return 0.5 / (c_.record().search.grid - 1); }
 
   void Profile();   // search.cpp

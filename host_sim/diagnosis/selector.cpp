@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_sim/calibration/exogeneity.hpp"
+
 namespace armcal::diagnosis {
 
 using Eigen::VectorXd;
@@ -95,6 +97,7 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
   });
   if (ranked.size() > kRescored) ranked.resize(kRescored);
   for (Found& f : ranked) f = Finish(f, grounds.ground());
+  std::erase_if(ranked, [](const Found& f) { return f.gain.gain <= 0; });  // out of bounds on all rows
   std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
   return ranked;
 }
@@ -152,7 +155,19 @@ bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Cho
   const Columns c = GatherColumns(*f.candidate, narrow.evidence, f.eta);
   const double left = metric.Try(c).gain;
   if (left > kStays * gain.gain) return true;
-  return Score(f, left) > kAccept && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second;
+  return Score(f, left) > kAccept && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second &&
+         MotionIsClean(f.candidate->rows());
+}
+
+// Noise that derivation made is in the logs at every bandwidth, and what smooths it looks like elasticity: where it
+// biases the rows of these joints, a term cannot be told from it.
+bool Selector::MotionIsClean(const std::vector<int>& joints) const {
+  VectorXd z(w_.model.columns() + w_.model.nonlinear());
+  z << w_.estimate.x.head(w_.model.columns()), VectorXd::Map(w_.declared.eta.data(), w_.model.nonlinear());
+  const calibration::Exogeneity e =
+      calibration::TestExogeneity(w_.model, w_.train, calibration::SmoothedInstruments(w_.train), z);
+  return std::all_of(joints.begin(), joints.end(),
+                     [&](int j) { return e.joint[static_cast<std::size_t>(j)].exogenous; });
 }
 
 bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,

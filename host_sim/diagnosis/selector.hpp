@@ -32,6 +32,7 @@ class Selector {
   void Sort(std::vector<Found>& ranked) const;
   bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
                              const std::vector<NoiseModel>& noise);
+  bool MotionIsClean(const std::vector<int>& joints) const;
   bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
               std::size_t k, Chosen& out);
 

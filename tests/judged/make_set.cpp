@@ -284,7 +284,8 @@ int main(int argc, char** argv) try {
     Random random(1000003ULL * std::stoull(argv[2]) + 7919ULL * static_cast<unsigned>(k) +
                   std::hash<std::string>{}(what));
     for (bool made = false; !made;) {
-      const Arm arm = DrawArm(random, 0.15);
+      Arm arm = DrawArm(random, 0.15);
+      arm.name += fmt::format("_{}_{}", what, k);  // numbers repeat
       made = MakeCase(argv[1], DrawCase(what, k, arm, random), arm, random);
     }
   }

@@ -84,6 +84,13 @@ TEST_F(ImageTest, States_DecideAmplitudeAndActivity) {
   EXPECT_NEAR(p.noise[4], 1e-6 / 1.0, 1e-12);  // Fv2: in prior units
 }
 
+TEST_F(ImageTest, ProcessNoise_IsTheTablesVarianceInPriorUnits) {
+  table.parameter[kFrontEntry].sd = 4.0f;  // Fc1
+  table.parameter[kFrontEntry].process_noise = 0.32f;
+  ASSERT_EQ(Build(), Status::kOk);
+  EXPECT_FLOAT_EQ(image->prior.noise[0], 0.02f);  // 0.32 / 4^2
+}
+
 TEST_F(ImageTest, RigidColumn_IsConsideredOnlyIfAllBehindItAre) {
   table.parameter[21].state = ParameterState::kConsidered;  // rotor2 is a column of its own
   table.parameter[12].state = ParameterState::kConsidered;  // c2x alone is not: m2 moves MX2, too

@@ -133,6 +133,29 @@ TEST_F(FeedForwardTest, FirstBumplessTable_FadesInFromZero) {
   EXPECT_NEAR(tau[0], 0.25 * Exact(c, 0), 1e-4);
 }
 
+TEST_F(FeedForwardTest, EachColumn_AddsItsOwnTorque) {
+  for (int k = 0; k < TwoLink::kColumns; ++k) {
+    Set c = Example(static_cast<std::uint32_t>(k) + 1);
+    for (float& p : c.p) p = 0.0f;
+    c.p[k] = 1.0f;
+    c.eta[0] = 2.0f;  // so wide that the Stribeck column counts at this speed
+    ASSERT_EQ(ff->Offer(c, false), Status::kOk);
+    ASSERT_EQ(Evaluate(), Status::kOk);
+    for (int i = 0; i < 2; ++i) EXPECT_NEAR(tau[i], Exact(c, i), 1e-5) << k;
+    EXPECT_NE(std::abs(tau[0]) + std::abs(tau[1]), 0.0f) << k;
+  }
+}
+
+TEST_F(FeedForwardTest, NextTable_BringsItsLimitsInTheSameTick) {
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  Set c = Example(2);
+  c.limit_Nm[0] = 10.0f;
+  ASSERT_EQ(ff->Offer(c, false), Status::kOk);
+  EXPECT_EQ(Evaluate(), Status::kClamped);
+  EXPECT_EQ(tau[0], 10.0f);
+}
+
 TEST_F(FeedForwardTest, ModelTorque_IsTheSameSumUnclamped) {
   Set c = Example(1);
   c.limit_Nm[0] = 1.0f;

@@ -1,0 +1,74 @@
+// faults - copies lib/armcal with a switch at the place of every fault; knows text, not what it means.
+//   plant_faults FAULTS LIB COPY: folders of <room>.toml, of armcal/ and of its copy
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+#include "tests/faults/fault_list.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using armcal::faults::Fault;
+
+std::string Read(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+// A file that is as it should be keeps its time, so that only what changed is compiled again.
+void Write(const fs::path& path, const std::string& text) {
+  if (fs::exists(path) && Read(path) == text) return;
+  fs::create_directories(path.parent_path());
+  std::ofstream(path) << text;
+}
+
+// A text that ends like a statement is one; any other is an expression.
+std::string Switch(const Fault& fault, std::size_t number) {
+  const std::string planted = "::armcal::Planted(" + std::to_string(number) + ")";
+  if (fault.right.back() == ';') return "if (" + planted + ") { " + fault.wrong + " } else { " + fault.right + " }";
+  return "(" + planted + " ? (" + fault.wrong + ") : (" + fault.right + "))";
+}
+
+// Places are looked up before anything is replaced: a fault never hits the text of another.
+std::string Plant(const std::string& source, const std::string& file, const std::vector<Fault>& faults) {
+  std::map<std::size_t, std::size_t> at;  // place -> fault
+  for (std::size_t k = 0; k < faults.size(); ++k) {
+    if (faults[k].file != file) continue;
+    const std::size_t place = source.find(faults[k].right);
+    if (place == source.npos || source.find(faults[k].right, place + 1) != source.npos)
+      throw std::runtime_error("fault \"" + faults[k].name + "\": its text is not found exactly once in " + file);
+    if (!at.emplace(place, k).second)
+      throw std::runtime_error("fault \"" + faults[k].name + "\": another one has the same place in " + file);
+  }
+  if (at.empty()) return source;
+  std::string copy = "#include \"tests/faults/planted.hpp\"\n";
+  std::size_t done = 0;
+  for (const auto& [place, k] : at) {
+    if (place < done) throw std::runtime_error("fault \"" + faults[k].name + "\": lies inside another in " + file);
+    copy += source.substr(done, place - done) + Switch(faults[k], k + 1);
+    done = place + faults[k].right.size();
+  }
+  return copy + source.substr(done);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc != 4) throw std::runtime_error("usage: plant_faults FAULTS LIB COPY");
+  const std::vector<Fault> faults = armcal::faults::ReadFaults(argv[1]);
+  const fs::path lib = fs::path(argv[2]) / "armcal", copy = fs::path(argv[3]) / "armcal";
+  for (const Fault& fault : faults)
+    if (!fs::exists(lib / fault.file)) throw std::runtime_error("fault \"" + fault.name + "\": no file " + fault.file);
+  for (const auto& entry : fs::recursive_directory_iterator(lib)) {
+    if (!entry.is_regular_file()) continue;
+    const std::string file = fs::relative(entry.path(), lib).string();
+    Write(copy / file, Plant(Read(entry.path()), file, faults));
+  }
+  return 0;
+} catch (const std::exception& e) {
+  std::cerr << "plant_faults: " << e.what() << "\n";
+  return 1;
+}

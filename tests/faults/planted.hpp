@@ -1,0 +1,16 @@
+// faults - which planted fault this process runs with; knows a number.
+#pragma once
+
+#include <cstdlib>
+
+namespace armcal {
+
+// From the environment, so that one executable serves all faults; 0: none.
+inline const int planted_fault = [] {
+  const char* number = std::getenv("ARMCAL_FAULT");
+  return number == nullptr ? 0 : std::atoi(number);
+}();
+
+inline bool Planted(int number) { return number == planted_fault; }
+
+}  // namespace armcal

@@ -1,0 +1,81 @@
+// faults - runs the tests of a fault's room with the fault switched on; knows names and exit codes only.
+//   run_faults FAULTS TESTS [NUMBER]: folders of <room>.toml and of the programs faults_<room>. Prints which test
+//   caught which fault; fails if a fault survives, or if a test fails without any.
+#include <fmt/core.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <set>
+#include <thread>
+
+#include "tests/faults/fault_list.hpp"
+
+namespace {
+
+using armcal::faults::Fault;
+
+constexpr int kTimeout_s = 60;  // a fault may never end; sound tests of a room take some seconds
+
+// The first test that fails, and how else the run ended badly; empty: all passed.
+std::string FailingTest(const std::string& tests, const std::string& room, std::size_t number) {
+  const std::string command =
+      fmt::format("ARMCAL_FAULT={} timeout {} {}/faults_{} --gtest_brief=1 --gtest_fail_fast 2>&1", number, kTimeout_s,
+                  tests, room);
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) throw std::runtime_error("cannot run " + command);
+  std::string output;
+  char part[4096];
+  while (const std::size_t count = std::fread(part, 1, sizeof part, pipe)) output.append(part, count);
+  const int status = pclose(pipe);
+  if (status == 0) return "";
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 124) return fmt::format("no end within {} s", kTimeout_s);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 127) throw std::runtime_error("not found: " + command);
+  const std::string mark = "[  FAILED  ] ";
+  const std::size_t at = output.find(mark);
+  if (at == output.npos) return "crash";
+  const std::size_t from = at + mark.size();
+  return output.substr(from, output.find_first_of(" ,\n", from) - from);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc != 3 && argc != 4) throw std::runtime_error("usage: run_faults FAULTS TESTS [NUMBER]");
+  const std::vector<Fault> faults = armcal::faults::ReadFaults(argv[1]);
+  const std::string tests = argv[2];
+  const std::size_t only = argc == 4 ? std::stoul(argv[3]) : 0;
+
+  std::set<std::string> rooms;
+  for (const Fault& fault : faults) rooms.insert(fault.room);
+  int bad = 0;
+  for (const std::string& room : rooms) {
+    const std::string failing = FailingTest(tests, room, 0);
+    if (failing.empty()) continue;
+    fmt::print("without a fault {} fails: {}\n", room, failing);
+    ++bad;
+  }
+
+  std::vector<std::string> caught(faults.size());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t k; (k = next++) < faults.size();)
+      if (only == 0 || only == k + 1) caught[k] = FailingTest(tests, faults[k].room, k + 1);
+  };
+  std::vector<std::thread> workers;
+  for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i) workers.emplace_back(work);
+  for (std::thread& worker : workers) worker.join();
+
+  for (std::size_t k = 0; k < faults.size(); ++k) {
+    if (only != 0 && only != k + 1) continue;
+    bad += caught[k].empty();
+    fmt::print("{:3} {:11} {:66} {}\n", k + 1, faults[k].room, faults[k].name,
+               caught[k].empty() ? "SURVIVES" : caught[k]);
+  }
+  fmt::print("{} faults, {}\n", only == 0 ? faults.size() : 1, bad == 0 ? "all caught" : "NOT all caught");
+  return bad != 0;
+} catch (const std::exception& e) {
+  fmt::print(stderr, "run_faults: {}\n", e.what());
+  return 1;
+}

@@ -13,7 +13,6 @@ class ModeWeights {
   void Restart() {
     for (int i = 0; i < kJoints; ++i)
       for (int m = 0; m < kMembers; ++m) weight_[i][m] = 1.0f / kMembers, log_likelihood_[i][m] = 0.0f;
-    for (float& w : dense_) w = 1.0f / kMembers;
   }
 
   // A row of the joint, whitened; one that is not used says nothing.
@@ -25,7 +24,6 @@ class ModeWeights {
   // Bayes' rule over the rows of a sample, for joints that move (bit i: joint i); a member that is wrong keeps kLeast,
   // so that it can come back.
   void EndSample(std::uint32_t moving) {
-    for (float& w : dense_) w = 0.0f;
     for (int i = 0; i < kJoints; ++i) {
       float best = log_likelihood_[i][0], sum = 0.0f;
       for (const float l : log_likelihood_[i]) best = math::Max(best, l);
@@ -35,10 +33,8 @@ class ModeWeights {
         log_likelihood_[i][m] = 0.0f;
         sum += next[m];
       }
-      for (int m = 0; m < kMembers; ++m) {
+      for (int m = 0; m < kMembers; ++m)
         weight_[i][m] = math::Select((moving >> i & 1u) != 0u, next[m] / sum, weight_[i][m]);
-        dense_[m] += weight_[i][m] / kJoints;
-      }
     }
   }
 
@@ -50,11 +46,17 @@ class ModeWeights {
   }
   // The same for what all joints see.
   void DenseShares(float (&share)[kMembers][kMembers]) const {
-    for (int to = 0; to < kMembers; ++to) (void)Shares(dense_, to, share[to]);
+    float weight[kMembers];
+    for (int m = 0; m < kMembers; ++m) weight[m] = dense(m);
+    for (int to = 0; to < kMembers; ++to) (void)Shares(weight, to, share[to]);
   }
 
   float at(int joint, int member) const { return weight_[joint][member]; }
-  float dense(int member) const { return dense_[member]; }  // mean over the joints
+  float dense(int member) const {  // mean over the joints
+    float sum = 0.0f;
+    for (const auto& joint : weight_) sum += joint[member];
+    return sum / kJoints;
+  }
 
  private:
   static constexpr float kStay = 0.995f;  // probability that a mode lasts from one exchange to the next
@@ -70,7 +72,7 @@ class ModeWeights {
     return sum;
   }
 
-  float weight_[kJoints][kMembers] = {}, log_likelihood_[kJoints][kMembers] = {}, dense_[kMembers] = {};
+  float weight_[kJoints][kMembers] = {}, log_likelihood_[kJoints][kMembers] = {};
 };
 
 }  // namespace armcal::filter

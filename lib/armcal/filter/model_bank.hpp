@@ -65,13 +65,12 @@ class ModelBank {
   }
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     joint_ = joint;
-    for (float& h : row_) h = 0.0f;
     const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, nullptr, row_);
-    const core::Status judged = Judge(math::Max(largest, MagnitudeBits(y)));
-    report_.accepted = use & (judged == core::Status::kOk);
-    report_.status = Answer(judged, report_.accepted);
+    report_.status = Judge(math::Max(largest, MagnitudeBits(y)));
+    report_.accepted = use & (report_.status == core::Status::kOk);
+    report_.status = GatedUnless(use, report_.status);
     const std::uint32_t taken = math::MaskOf(report_.accepted);
-    for (float& h : row_) h = math::Masked(h, taken);
+    for (int p = Columns::kAt.first[joint]; p < Columns::kSize; ++p) row_[p] = math::Masked(row_[p], taken);
     y_ = math::Masked(y, taken);
     at_ = 0;
     begun_ = false;
@@ -81,7 +80,7 @@ class ModelBank {
     for (; at_ < kMembers && credit > 0; ++at_) {
       Estimate& e = member_[at_];
       if (!begun_) {
-        float* row = e.ClearRow();
+        float* row = e.row();
         for (int p = first; p < Columns::kSize; ++p) row[p] = row_[p];
         e.BeginRow(first, joint_, y_, 1.0f, 0.0f);
       }

@@ -38,11 +38,12 @@ class ModeWeights {
     }
   }
 
-  // A mode may have changed: share[to][from] of what member `to` goes on with. The joint's weights move with it.
-  void Exchange(int joint, float (&share)[kMembers][kMembers]) {
+  // A mode may have changed: share[to][from] of what member `to` goes on with. The joint's weights move with it unless
+  // `due` is zero.
+  void Exchange(int joint, float (&share)[kMembers][kMembers], std::uint32_t due) {
     float next[kMembers];
     for (int to = 0; to < kMembers; ++to) next[to] = Shares(weight_[joint], to, share[to]);
-    for (int m = 0; m < kMembers; ++m) weight_[joint][m] = next[m];
+    for (int m = 0; m < kMembers; ++m) weight_[joint][m] = math::Select(due != 0u, next[m], weight_[joint][m]);
   }
   // The same for what all joints see.
   void DenseShares(float (&share)[kMembers][kMembers]) const {

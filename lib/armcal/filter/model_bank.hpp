@@ -65,13 +65,12 @@ class ModelBank {
   }
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     joint_ = joint;
-    for (float& h : row_) h = 0.0f;
     const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, nullptr, row_);
-    const core::Status judged = Judge(math::Max(largest, MagnitudeBits(y)));
-    report_.accepted = use & (judged == core::Status::kOk);
-    report_.status = Answer(judged, report_.accepted);
+    report_.status = Judge(math::Max(largest, MagnitudeBits(y)));
+    report_.accepted = use & (report_.status == core::Status::kOk);
+    report_.status = GatedUnless(use, report_.status);
     const std::uint32_t taken = math::MaskOf(report_.accepted);
-    for (float& h : row_) h = math::Masked(h, taken);
+    for (int p = Columns::kAt.first[joint]; p < Columns::kSize; ++p) row_[p] = math::Masked(row_[p], taken);
     y_ = math::Masked(y, taken);
     at_ = 0;
     begun_ = false;
@@ -81,7 +80,7 @@ class ModelBank {
     for (; at_ < kMembers && credit > 0; ++at_) {
       Estimate& e = member_[at_];
       if (!begun_) {
-        float* row = e.ClearRow();
+        float* row = e.row();
         for (int p = first; p < Columns::kSize; ++p) row[p] = row_[p];
         e.BeginRow(first, joint_, y_, 1.0f, 0.0f);
       }
@@ -110,7 +109,7 @@ class ModelBank {
   bool StepEnd(int& credit) {
     for (; at_ < kJoints && credit > 0; ++at_, credit -= kPredictCost) Predict(at_);
     if (at_ < kJoints) return false;
-    if (moving_ != 0u && samples_ % kMixEvery == 0) Mix();
+    Mix(math::MaskOf((moving_ != 0u) & (samples_ % kMixEvery == 0u)));
     return true;
   }
   int SampleCost() const {
@@ -209,6 +208,8 @@ class ModelBank {
     const int first = Columns::kAt.first[i], slope = Columns::kAt.front_end[i] - 1, width = slope + 1 - first;
     const std::uint32_t moves = math::MaskOf((moving_ >> i & 1u) != 0u);
     const int p = drifting_[i] < 0 ? slope : drifting_[i], turn = first + turn_[i];
+    const int column = turn == slope ? Columns::kAt.column[first] : Columns::kAt.column[turn];
+    const bool walks = (drifting_[i] >= 0) & ((turn == slope) | (prior_->noise[column] > 0.0f));
     for (int m = 0; m < kMembers; ++m) {
       Estimate& e = member_[m];
       if (p != slope) {
@@ -217,31 +218,34 @@ class ModelBank {
         for (int later = slope + 1; later < Columns::kSize; ++later)
           if (Columns::kAt.begin[later] <= p) e.u(p, later) += math::Masked(e.u(slope, later), moves);
       }
-      const float step = turn == slope ? kModes[m].slope : turn == p ? kModes[m].walk : kOthers * kModes[m].walk;
-      const bool walks = drifting_[i] >= 0 && (turn == slope || prior_->noise[Columns::kAt.column[turn]] > 0.0f);
+      const float walk = math::Select(turn == p, kModes[m].walk, kOthers * kModes[m].walk);
+      const float step = math::Select(turn == slope, kModes[m].slope, walk);
       e.BeginUnitSum(turn, math::Masked(step * step * static_cast<float>(width), moves & math::MaskOf(walks)), slope);
       int all = kNoSlices;
       (void)e.StepSum(all);
     }
-    turn_[i] = static_cast<std::uint8_t>(moves == 0u ? turn_[i] : turn_[i] + 1 < width ? turn_[i] + 1 : 0);
+    const auto following = static_cast<std::uint32_t>(turn_[i] + 1) & math::MaskOf(turn_[i] + 1 < width);
+    turn_[i] = static_cast<std::uint8_t>((following & moves) | (turn_[i] & ~moves));
   }
 
-  // x at positions [first, end), by weights of the members before.
-  void MixMeans(int first, int end, const float (&share)[kMembers][kMembers], bool dense) {
+  // x at positions [first, end), by weights of the members before; where `due` is zero it stays.
+  void MixMeans(int first, int end, const float (&share)[kMembers][kMembers], bool dense, std::uint32_t due) {
     for (int p = first; p < end; ++p) {
       if (dense && Columns::kAt.joint[p] >= 0) continue;
       float before[kMembers];
       for (int m = 0; m < kMembers; ++m) before[m] = member_[m].x(p);
-      for (int to = 0; to < kMembers; ++to) member_[to].x(p) = math::Dot(share[to], before, kMembers);
+      for (int to = 0; to < kMembers; ++to)
+        member_[to].x(p) = math::Select(due != 0u, math::Dot(share[to], before, kMembers), before[to]);
     }
   }
-  void Mix() {
+  // Computed with every sample, so that all cost the same; zero `due` changes nothing.
+  void Mix(std::uint32_t due) {
     float share[kMembers][kMembers];
     weights_.DenseShares(share);
-    MixMeans(0, Columns::kSize, share, true);
+    MixMeans(0, Columns::kSize, share, true, due);
     for (int i = 0; i < kJoints; ++i) {
-      weights_.Exchange(i, share);
-      MixMeans(Columns::kAt.first[i], Columns::kAt.front_end[i], share, false);
+      weights_.Exchange(i, share, due);
+      MixMeans(Columns::kAt.first[i], Columns::kAt.front_end[i], share, false, due);
     }
   }
 

@@ -19,34 +19,34 @@ struct UpdateReport {
   core::Status status = core::Status::kGated;  // kOk, kGated, kNotFinite, kOutOfRange (element beyond kRowLimit)
 };
 
-// A row is judged by its largest element in magnitude: kOk, kNotFinite or kOutOfRange; a good one that is not accepted
-// is kGated. No branch: a bad row costs what a good one does. Context: background.
+// A row is judged by its largest element in magnitude: kOk, kNotFinite or kOutOfRange. Context: background.
 inline std::uint32_t MagnitudeBits(float x) { return math::BitsOf(x) & 0x7FFFFFFFu; }
 inline core::Status Judge(std::uint32_t largest_magnitude_bits) {
-  static constexpr core::Status kBy[] = {core::Status::kOk, core::Status::kOutOfRange, core::Status::kNotFinite};
-  return kBy[(largest_magnitude_bits > math::BitsOf(kRowLimit)) + (largest_magnitude_bits >= 0x7F800000u)];
+  const unsigned over = largest_magnitude_bits > math::BitsOf(kRowLimit), wild = largest_magnitude_bits >= 0x7F800000u;
+  static_assert(static_cast<int>(core::Status::kNotFinite) == 1 && static_cast<int>(core::Status::kOutOfRange) == 2);
+  return static_cast<core::Status>(2u * over - wild);  // what is not finite is over any limit; no branch
 }
-inline core::Status Answer(core::Status judged, bool accepted) {
-  static_assert(static_cast<int>(core::Status::kOk) == 0);
-  const std::uint32_t gated = math::MaskOf((judged == core::Status::kOk) & !accepted);
-  return static_cast<core::Status>(static_cast<std::uint32_t>(judged) |
-                                   (gated & static_cast<std::uint32_t>(core::Status::kGated)));
+// kOk becomes kGated unless the row was taken.
+inline core::Status GatedUnless(bool taken, core::Status judged) {
+  const unsigned gated = !taken & (judged == core::Status::kOk);
+  return static_cast<core::Status>(static_cast<unsigned>(judged) | gated * static_cast<unsigned>(core::Status::kGated));
 }
 
-// h [kSize] by positions, all zero before; eta [kNonlinear] where the order has it. Returns the largest magnitude's
-// bits.
+// h at positions [first, kSize) of a row of `joint` that begins there; eta [kNonlinear] where the order has it. Returns
+// the largest magnitude's bits.
 template <class Layout, class Columns>
 std::uint32_t FillRow(int joint, const float* front, const float* dense, [[maybe_unused]] const float* eta, float* h) {
   std::uint32_t largest = 0;
-  const auto put = [&](int column, float value) {
-    largest = math::Max(largest, MagnitudeBits(value));
-    h[Columns::kAt.position[column]] = value;
+  for (int p = Columns::kAt.first[joint]; p < Columns::kSize; ++p) h[p] = 0.0f;
+  const auto put = [&](const float* value, int from, int to) {
+    for (int k = from; k < to; ++k) {
+      largest = math::Max(largest, MagnitudeBits(value[k - from]));
+      h[Columns::kAt.position[k]] = value[k - from];
+    }
   };
-  const int begin = Layout::kFrontBegin[joint], end = Layout::kFrontBegin[joint + 1];
-  for (int k = begin; k < end; ++k) put(k, front[k - begin]);
-  for (int k = Layout::kRowBegin[joint]; k < Layout::kDense; ++k) put(Layout::kFront + k, dense[k]);
-  if constexpr (Columns::kBeside == Beside::kEta)
-    for (int e = 0; e < Layout::kNonlinear; ++e) put(Layout::kColumns + e, eta[e]);
+  put(front, Layout::kFrontBegin[joint], Layout::kFrontBegin[joint + 1]);
+  put(dense + Layout::kRowBegin[joint], Layout::kFront + Layout::kRowBegin[joint], Layout::kColumns);
+  if constexpr (Columns::kBeside == Beside::kEta) put(eta, Layout::kColumns, Columns::kSize);
   return largest;
 }
 

@@ -40,14 +40,12 @@ class MapReadOut {
     bool good = true;
     for (int k = 0; k < kColumns; ++k) good &= math::IsFinite(x[k]);
     if (!good) return core::Status::kNotFinite;
-    for (int at = 0; at < kBodies; at += Arm::kBlock)
-      if (!IsPhysical(prior.body + at)) return core::Status::kUnphysical;
     Arm arm;
-    arm.Start(prior);
-    for (T& u : trial_.u) u = T(0);
-    if (!arm.Place(trial_)) return core::Status::kUnphysical;
+    if (!arm.Start(prior)) return core::Status::kUnphysical;
 
     arm_ = arm;
+    for (T& u : trial_.u) u = T(0);
+    arm_.Place(trial_);
     warm_ = warm && result_.converged;
     for (int k = 0; k < kColumns; ++k) x_[k] = T(x[k]);
     for (T& u : ud_) u = T(0);

@@ -44,6 +44,13 @@ class UdEstimate {
   float& x(int p) { return x_[p]; }
   float x(int p) const { return x_[p]; }
   const float* elements() const { return element_; }  // [Order::kElements]
+  // P is the sum over positions p of d u u', u [kSize] by columns: fills in u, returns d.
+  float Spread(int p, float* u) const {
+    for (int k = 0; k < kSize; ++k) u[k] = 0.0f;
+    for (int i = Order::kAt.begin[p]; i < p; ++i) u[Order::kAt.column[i]] = element_[Order::Origin(p) + i];
+    u[Order::kAt.column[p]] = 1.0f;
+    return d(p);
+  }
 
   float* row() { return row_; }  // room for a row h, by positions
 

@@ -43,7 +43,15 @@ class UdEstimate {
   float& x(int p) { return x_[p]; }
   float x(int p) const { return x_[p]; }
   const float* elements() const { return element_; }  // [Order::kElements]
-  float* row() { return row_; }                       // room for a row h, by positions
+  // P is the sum over positions p of d u u', u [kSize] by columns: fills in u, returns d.
+  float Spread(int p, float* u) const {
+    for (int k = 0; k < kSize; ++k) u[k] = 0.0f;
+    for (int i = Order::kAt.begin[p]; i < p; ++i) u[Order::kAt.column[i]] = element_[Order::Origin(p) + i];
+    u[Order::kAt.column[p]] = 1.0f;
+    return d(p);
+  }
+
+  float* row() { return row_; }  // room for a row h, by positions
 
   // The row y = h' x + noise of `variance` > 0; h as filled in from `first` on, zero before. In the block form `joint`
   // is the one whose front columns it touches (kJoints: none). gate_sigma > 0: an innovation beyond changes no bit.

@@ -2,7 +2,7 @@
 //
 // Packed by columns: element (i, j), i <= j, at j (j + 1) / 2 + i; the diagonal holds D. Size n (n + 1) / 2.
 // Every kernel takes the same instructions whatever the numbers are, allocates nothing and calls nothing. What rows and
-// noise do to a factor is filter/ud_estimate.hpp's. Context: any.
+// noise do to a filter's factor is filter/ud_estimate.hpp's. Context: any.
 #pragma once
 
 #include "armcal/math/elementary.hpp"
@@ -11,6 +11,25 @@ namespace armcal::math {
 
 constexpr int UdSize(int n) { return n * (n + 1) / 2; }
 constexpr int UdIndex(int i, int j) { return j * (j + 1) / 2 + i; }
+
+// P + c a a', c >= 0 (W. S. Agee, R. H. Turner, 1972). Shapes: a [n], overwritten.
+template <int n, class T>
+void UdAdd(T* __restrict ud, T c, T* __restrict a) {
+  for (int j = n - 1; j >= 0; --j) {
+    T* column = ud + UdIndex(0, j);
+    const T old = column[j];
+    const T now = old + c * a[j] * a[j];
+    const bool tiny = !(now > T(1e-30f));
+    const T inverse = T(1) / Select(tiny, T(1), now);
+    const T step = Select(tiny, T(0), c * a[j] * inverse);
+    for (int i = 0; i < j; ++i) {
+      a[i] -= a[j] * column[i];
+      column[i] += step * a[i];
+    }
+    column[j] = now;
+    c *= Select(tiny, T(1), old * inverse);
+  }
+}
 
 // P = W W' by modified weighted Gram-Schmidt (Thornton). Shapes: w [n x m] row-major, overwritten by rows w~ with
 // W = U w~, w~ w~' = D; ud [UdSize(n)]. A row that depends on those below it (to 1e-10 of its square) gets D = 0.

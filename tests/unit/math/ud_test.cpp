@@ -58,6 +58,22 @@ TEST_F(Ud, FromSquareRoot_OfDependentRows_GivesZeroDAndTheSameProduct) {
   EXPECT_LT((Dense(ud) - w * w.transpose()).norm(), 1e-12);
 }
 
+TEST_F(Ud, Add_IsTheRankOneSum) {
+  const Matrix p = Start();
+  Vector a = Random(n);
+  a(4) = 0;
+  Vector copy = a;
+  UdAdd<n>(ud, 0.7, copy.data());
+  EXPECT_LT((Dense(ud) - (p + 0.7 * a * a.transpose())).norm(), 1e-11);
+}
+
+TEST_F(Ud, Add_ToAZeroMatrix_GivesTheVectorsSquare) {
+  for (double& u : ud) u = 0;
+  Vector a = Random(n), copy = a;
+  UdAdd<n>(ud, 2.0, copy.data());
+  EXPECT_LT((Dense(ud) - 2 * a * a.transpose()).norm(), 1e-12);
+}
+
 TEST_F(Ud, DiagonalScaleAndSolve_AgreeWithDenseAlgebra) {
   const Matrix p = Start();
   double diagonal[n];

@@ -3,10 +3,10 @@
 
   stack.py --root REGEX [--root ...] --limit BYTES [--indirect FILE] OBJECT ...
 
-OBJECT: compiled with that option, so that a .ci file lies beside it. Prints each root's bound and the path that needs it. Fails on recursion, on a frame whose size depends on data, on a call
-through a pointer whose targets nobody listed, on a function whose stack is unknown, and on a bound above the limit.
-FILE lists calls through pointers, a line each: "source file that makes the call -> REGEX of what it may call", or "none".
-Regular expressions search the function's C++ name.
+OBJECT: compiled with that option, so that a .ci file lies beside it. Prints each root's bound and the path that needs it.
+Fails on recursion, on a frame whose size depends on data, on a call through a pointer whose targets nobody listed, on a
+function whose stack is unknown, and on a bound above the limit. FILE lists calls through pointers, a line each: "source
+file that makes the call -> REGEX of what it may call", or "none". Regular expressions search the function's C++ name.
 """
 import argparse
 import re

@@ -89,7 +89,7 @@ void Application() {
   Exit(static_cast<std::uint32_t>(Program()));
 }
 
-// A fault ends the run with 99 and says why: the configurable fault status register, and what was being executed.
+// A fault ends the run with 99 and says why: the configurable fault status register.
 void Fault() {
   armcal::port::runner::Line("fault: CFSR").Hex(*reinterpret_cast<volatile std::uint32_t*>(0xE000ED28u)).End();
   Exit(99);

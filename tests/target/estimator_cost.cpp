@@ -15,8 +15,7 @@ using Model = generated::Er20Like;
 estimator::ImageWork<Model> work;
 estimator::Image<Model> image;
 
-// Push: the tick's share, of a tick that completes a sample and of the others. Sample: all slices of one. Slice: the
-// longest of them.
+// Push: the tick's share, of a tick that completes a sample and of the others. Sample: all slices of one.
 template <class Filter>
 void Measure(const char* name) {
   static estimator::Estimator<Model, Filter> arm;
@@ -46,6 +45,7 @@ void Measure(const char* name) {
       .Value("push_max", completing.most)
       .Value("sample", sample.most)
       .Value("slice_max", slice.most)
+      .Value("slice_min", slice.least)
       .Value("state_bytes", sizeof arm)
       .End();
 }

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <new>
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/row.hpp"
 #include "armcal/filter/slices.hpp"
 
 namespace armcal::target {
@@ -66,31 +68,45 @@ void MakePrior(filter::Prior<Layout>& prior) {
   prior.gate_sigma = 4.0f;
 }
 
-// The one instance of a filter type, and the calls to it. What they need of code and stack is the filter's.
+// One filter at a time lives here, with its prior and its read-out, so that a small board has room for the bench.
+alignas(8) inline unsigned char room[48 * 1024];
+
+// A filter type, and the calls to it. What they need of code and stack is the filter's.
 template <class Filter, class Layout, bool kSolves>
 struct Instance {
-  static inline filter::Prior<Layout> prior;
-  static inline Filter filter;
-  static inline typename Filter::ReadOut read_out;
+  struct Parts {
+    filter::Prior<Layout> prior;
+    Filter filter;
+    typename Filter::ReadOut read_out;
+  };
+  static_assert(sizeof(Parts) <= sizeof room);
+  static Parts& parts() { return *reinterpret_cast<Parts*>(room); }
 
-  static void Restart() { filter.Restart(prior); }
-  static int SliceCredit() { return filter::EqualSlices(filter.SampleCost()); }
-  static void BeginRow(const Row& row) {
-    if constexpr (Layout::kNonlinear > 0) filter.BeginRow(row.joint, row.front, row.dense, row.y, row.use, row.eta);
-    else filter.BeginRow(row.joint, row.front, row.dense, row.y, row.use);
+  [[gnu::noinline]] static void MakeParts() {
+    new (room) Parts;
+    MakePrior(parts().prior);
   }
-  static bool StepRow(int& credit) { return filter.StepRow(credit); }
-  static const filter::UpdateReport& Report() { return filter.report(); }
-  static void BeginEnd(std::uint32_t moving) { filter.BeginEnd(moving); }
-  static bool StepEnd(int& credit) { return filter.StepEnd(credit); }
-  static void BeginReadOut() { filter.BeginReadOut(read_out); }
-  static bool StepReadOut(int& credit) { return filter.StepReadOut(read_out, credit); }
+  static void Restart() {
+    MakeParts();
+    parts().filter.Restart(parts().prior);
+  }
+  static int SliceCredit() { return filter::EqualSlices(parts().filter.SampleCost()); }
+  static void BeginRow(const Row& row) {
+    if constexpr (Layout::kNonlinear > 0)
+      parts().filter.BeginRow(row.joint, row.front, row.dense, row.y, row.use, row.eta);
+    else parts().filter.BeginRow(row.joint, row.front, row.dense, row.y, row.use);
+  }
+  static bool StepRow(int& credit) { return parts().filter.StepRow(credit); }
+  static const filter::UpdateReport& Report() { return parts().filter.report(); }
+  static void BeginEnd(std::uint32_t moving) { parts().filter.BeginEnd(moving); }
+  static bool StepEnd(int& credit) { return parts().filter.StepEnd(credit); }
+  static void BeginReadOut() { parts().filter.BeginReadOut(parts().read_out); }
+  static bool StepReadOut(int& credit) { return parts().filter.StepReadOut(parts().read_out, credit); }
   static void Solve() {
-    if constexpr (kSolves) filter.Solve(read_out.x);
+    if constexpr (kSolves) parts().filter.Solve(parts().read_out.x);
   }
 
   static FilterCalls Calls(const char* name) {
-    MakePrior(prior);
     return {name,
             Layout::kColumns + Layout::kNonlinear,
             Layout::kFront,
@@ -107,8 +123,8 @@ struct Instance {
             BeginReadOut,
             StepReadOut,
             kSolves ? Solve : nullptr,
-            read_out.x,
-            read_out.sd};
+            parts().read_out.x,
+            parts().read_out.sd};
   }
 };
 

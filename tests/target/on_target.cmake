@@ -52,7 +52,7 @@ set(budgets ${PROJECT_SOURCE_DIR}/toolchains/budgets.py --core ${core} --budgets
 add_custom_target(budgets VERBATIM
   COMMAND bash -c "\"$0\" \"$1\" \"$2\" >\"$3\"" ${run} ${ARMCAL_BOARD} $<TARGET_FILE:target_bench> ${bench}
   COMMAND ${budgets} --bench ${bench} --json ${CMAKE_BINARY_DIR}/budgets.json
-  DEPENDS target_bench)
+  DEPENDS target_bench COMMENT "running the bench on ${ARMCAL_BOARD}")
 add_test(NAME budgets COMMAND ${CMAKE_COMMAND} --build ${CMAKE_BINARY_DIR} --target budgets)
 set_tests_properties(budgets PROPERTIES FIXTURES_SETUP bench LABELS target)
 set_tests_properties(Stack_OfEveryContextOfTheFirmware_IsBounded PROPERTIES LABELS target)

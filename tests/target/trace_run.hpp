@@ -46,6 +46,12 @@ struct Run {
           .Hex(ResultBits(estimates.value[k]))
           .Hex(ResultBits(estimates.sd[k]))
           .End();
+    for (int e = 0; e < Model::kNonlinear; ++e)
+      port::runner::Line("eta")
+          .Decimal(e)
+          .Hex(ResultBits(estimates.eta[e]))
+          .Hex(ResultBits(estimates.eta_sd[e]))
+          .End();
     for (int i = 0; i < 6; ++i)
       port::runner::Line("joint")
           .Decimal(i + 1)

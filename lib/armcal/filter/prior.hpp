@@ -11,13 +11,10 @@
 
 #include <cstdint>
 
-#include "armcal/core/status.hpp"
 #include "armcal/filter/order.hpp"
 #include "armcal/math/ud.hpp"
 
 namespace armcal::filter {
-
-inline constexpr float kRowLimit = 1e6f;  // a larger element of a row means a broken model: float32 would overflow
 
 template <class Layout>
 struct Prior {
@@ -30,14 +27,6 @@ struct Prior {
   float noise[kStates] = {};   // variance per sample, prior units (Kalman form)
   float link_floor = 0.0f;     // D of dense columns never falls below (Kalman form)
   float gate_sigma = 0.0f;     // innovations beyond are not used; 0: no gate (Kalman form)
-};
-
-// What one row did. Whitened units.
-struct UpdateReport {
-  float innovation = 0.0f;  // row minus its prediction by this filter before the row; 0 unless the row was judged
-  float variance = 1.0f;    // its variance by this filter (forgetting form: from data alone, without the prior)
-  bool accepted = false;
-  core::Status status = core::Status::kGated;  // kOk, kGated, kNotFinite, kOutOfRange (element beyond kRowLimit)
 };
 
 // Joint of a front column, and the mask of joints that must move before a column may change by itself:
@@ -65,18 +54,18 @@ void SetPrior(const Prior<Layout>& prior, Estimate& estimate) {
     for (int k = Layout::kColumns; k < Columns::kSize; ++k) estimate.d(at[k]) = math::Masked(1.0f, prior.active[k]);
 }
 
-// A row is judged by its largest element in magnitude: kOk, kNotFinite or kOutOfRange; a good one that is not accepted
-// is kGated. No branch: a bad row costs what a good one does. Context: background.
-inline std::uint32_t MagnitudeBits(float x) { return math::BitsOf(x) & 0x7FFFFFFFu; }
-inline core::Status Judge(std::uint32_t largest_magnitude_bits) {
-  static constexpr core::Status kBy[] = {core::Status::kOk, core::Status::kOutOfRange, core::Status::kNotFinite};
-  return kBy[(largest_magnitude_bits > math::BitsOf(kRowLimit)) + (largest_magnitude_bits >= 0x7F800000u)];
-}
-inline core::Status Answer(core::Status judged, bool accepted) {
-  static_assert(static_cast<int>(core::Status::kOk) == 0);
-  const std::uint32_t gated = math::MaskOf((judged == core::Status::kOk) & !accepted);
-  return static_cast<core::Status>(static_cast<std::uint32_t>(judged) |
-                                   (gated & static_cast<std::uint32_t>(core::Status::kGated)));
+// Dense D below the prior's floor is raised to it. Returns how many. Context: background.
+template <class Layout, class Estimate>
+std::uint32_t HoldFloor(const Prior<Layout>& prior, Estimate& estimate) {
+  using Columns = typename Estimate::Columns;
+  std::uint32_t held = 0;
+  for (int p = 0; p < Columns::kSize; ++p) {
+    if (Columns::kAt.joint[p] >= 0) continue;
+    const float floor = math::Masked(prior.link_floor, prior.active[Columns::kAt.column[p]]);
+    held += estimate.d(p) < floor;
+    estimate.d(p) = math::Max(estimate.d(p), floor);
+  }
+  return held;
 }
 
 }  // namespace armcal::filter

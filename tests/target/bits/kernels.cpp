@@ -12,7 +12,7 @@ using armcal::port::runner::Line;
 namespace {
 
 constexpr int n = 36, m = 40;
-float w[n * m], ud[math::UdSize(n)], h[n], f[n], gain[n];
+float w[n * m], ud[math::UdSize(n)], h[n], f[n];
 
 void Fill(Numbers& numbers, float* x, int count) {
   for (int k = 0; k < count; ++k) x[k] = numbers.Signed();
@@ -30,14 +30,8 @@ void Ud(Numbers& numbers, int round) {
   Print("from_square_root", round, ud, math::UdSize(n));
   for (int k = 0; k < 5; ++k) {
     Fill(numbers, h, n);
-    math::UdProject<n>(ud, h, f);
-    gain[0] = math::UdQuadratic<n>(ud, f);
-    Print("quadratic", round, gain, 1);
-    math::UdMeasure<n>(ud, f, 0.3f, gain);
-    Print("measure_gain", round, gain, n);
-    Fill(numbers, h, n);
     math::UdAdd<n>(ud, numbers.Between(0.0f, 0.1f), h);
-    Print("measure_add", round, ud, math::UdSize(n));
+    Print("add", round, ud, math::UdSize(n));
   }
   for (int k = 0; k < n; ++k) f[k] = 1.0f / (h[k] = numbers.Between(0.1f, 4.0f));
   math::UdScale<n>(ud, h, f);

@@ -48,19 +48,30 @@ struct Case {
         whole[math::UdIndex(Model::kFront + i, Model::kFront + j)] = image->prior.dense_ud[math::UdIndex(i, j)];
     return whole;
   }
-  // Rows h' x = y of variance 1 in prior units, as the filters take them.
+  // Rows h' x = y of variance 1 in prior units, by Bierman's update in double.
   void Take(const Matrix& h, const Vector& y) {
-    std::vector<double> factor(ud.begin(), ud.end()), mean(x.begin(), x.end()), f(kColumns), gain(kColumns);
+    std::vector<double> factor(ud.begin(), ud.end());
+    Vector mean = Eigen::Map<Eigen::VectorXf>(x.data(), kColumns).cast<double>();
     for (int r = 0; r < h.rows(); ++r) {
       const Vector row = h.row(r);
-      math::UdProject<kColumns>(factor.data(), row.data(), f.data());
-      double innovation = y(r);
-      for (int k = 0; k < kColumns; ++k) innovation -= row(k) * mean[k];
-      math::UdMeasure<kColumns>(factor.data(), f.data(), 1.0, gain.data());
-      for (int k = 0; k < kColumns; ++k) mean[k] += gain[k] * innovation;
+      Vector gain = Vector::Zero(kColumns);
+      double alpha = 1;
+      for (int j = 0; j < kColumns; ++j) {
+        double* u = factor.data() + math::UdIndex(0, j);
+        const double d = u[j];
+        u[j] = 1;
+        Eigen::Map<Vector> column(u, j + 1);
+        const double f = column.dot(row.head(j + 1)), next = alpha + d * f * f;
+        const Vector before = column;
+        column.head(j) -= f / alpha * gain.head(j);
+        gain.head(j + 1) += d * f * before;
+        u[j] = d * alpha / next;
+        alpha = next;
+      }
+      mean += gain * ((y(r) - row.dot(mean)) / alpha);
     }
     for (std::size_t k = 0; k < ud.size(); ++k) ud[k] = static_cast<float>(factor[k]);
-    for (int k = 0; k < kColumns; ++k) x[k] = static_cast<float>(mean[k]);
+    for (int k = 0; k < kColumns; ++k) x[k] = static_cast<float>(mean(k));
   }
   MapPrior<Model> prior() const {
     return {work->rigid.mean, work->rigid.sd, image->committed.p, image->scale, image->prior.dense_ud};

@@ -24,7 +24,8 @@ class MapArm {
   using Point = MapPoint<Layout, T>;
   static_assert(kBlock == 11, "a link has ten parameters about its origin, and a rotor inertia");
 
-  // False: a body of the prior cannot exist. A body that stands near the border gets a smaller margin.
+  // False: a body of the prior cannot exist, or a rotor inertia is zero and uncertain. A body that stands near the
+  // border gets a smaller margin.
   bool Start(const MapPrior<Layout>& prior) {
     prior_ = prior;
     bool inside = true;
@@ -37,7 +38,8 @@ class MapArm {
       for (int halved = 0; halved < 10; ++halved)
         margin *= ConeDeterminant(central, T(2) * margin) > T(0) ? T(1) : T(0.5);
       margin_[link] = margin;
-      inside &= IsPhysical(body) && ConeDeterminant(central, margin) > T(0);
+      const bool turns = body[kRotor] > 0.0f || !(sd(link * kBlock + kRotor) > T(0));
+      inside &= turns && IsPhysical(body) && ConeDeterminant(central, margin) > T(0);
     }
     return inside;
   }

@@ -34,8 +34,7 @@ class MapReadOut {
   using Result = MapResult<Layout, T>;
 
   // x [kColumns]: the filter's mean in prior units, its prior inside. warm: start at the last solution and the last
-  // eps; the prior is the same. kUnphysical: a body of the prior cannot exist, or hardly (MapArm::kMargin). kNotFinite:
-  // x. When refused, the object is as before.
+  // eps; the prior is the same. kUnphysical: see MapArm::Start. kNotFinite: x. When refused, the object is as before.
   core::Status Begin(const MapPrior<Layout>& prior, const float* x, bool warm = false) {
     bool good = true;
     for (int k = 0; k < kColumns; ++k) good &= math::IsFinite(x[k]);

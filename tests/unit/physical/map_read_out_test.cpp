@@ -349,6 +349,10 @@ TEST(MapReadOut, RefusedInput_LeavesTheLastResult) {
   c->ud[math::UdIndex(30, 30)] = -1e-9f;
   EXPECT_EQ(c->HandOver(*read_out), core::Status::kNotFinite);
   c->ud[math::UdIndex(30, 30)] = 0.5f;
+  const float rotor = c->work->rigid.mean[10];
+  c->work->rigid.mean[10] = 0;  // and uncertain
+  EXPECT_EQ(c->HandOver(*read_out), core::Status::kUnphysical);
+  c->work->rigid.mean[10] = rotor;
   c->work->rigid.mean[0] = -1;
   EXPECT_EQ(c->HandOver(*read_out), core::Status::kUnphysical);
   EXPECT_TRUE(read_out->Step());

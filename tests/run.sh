@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # tests - builds armcal and runs its tests; sets up whatever it needs.
 #   tests/run.sh fast   host build, unit and property tests
-#   tests/run.sh [all]    + end-to-end tests, planted faults, firmware and wire tests under sanitizers, both Cortex-M images
+#   tests/run.sh [all]    + end-to-end tests, planted faults, firmware and wire tests under sanitizers, both Cortex-M images and their tests under QEMU
 #   tests/run.sh long     + the long tests, all fast tests under sanitizers
 # The last line is "N passed, M failed"; a CTest test, a build and a check count one each.
 set -uo pipefail
@@ -46,13 +46,16 @@ run_ctest() {
   rm -f "$results"
   ctest --test-dir "$2" -L "$3" -R "${4:-.}" -j "$jobs" --output-on-failure --no-tests=error --output-junit Testing/results.xml \
     --test-output-size-passed 1000000 >"$log" 2>&1
-  local status=$? total bad skipped
+  local status=$? total bad absent skipped
   count() { grep -om1 "\b$1=\"[0-9]*\"" "$results" 2>/dev/null | tr -dc 0-9; }
   total=$(count tests)
   bad=$(count failures)
+  absent=$(count skipped)
   if [[ -z $total || -z $bad ]] || ((status != 0 && bad == 0)); then total=1 bad=1; fi
-  passed=$((passed + total - bad))
+  passed=$((passed + total - bad - ${absent:-0}))
   failed=$((failed + bad))
+  skipped=$(sed -n 's/.*<testcase name="\([^"]*\)".*status="notrun".*/\1/p' "$results" 2>/dev/null | tr '\n' ' ')
+  [[ -z $skipped ]] || say "skipped tests: $skipped"
   skipped=$(sed -n 's/^\[  SKIPPED \] \([A-Za-z0-9_.\/]*\) (.*/\1/p' "$results" 2>/dev/null | sort -u | tr '\n' ' ')
   [[ -z $skipped ]] || say "skipped inside tests: $skipped"
   if ((bad > 0)); then
@@ -84,7 +87,10 @@ run_ctest "tests ($scope)" build/host "$labels"
 if [[ $scope != fast ]]; then
   step "cross packages" toolchains/install.sh cross
   for image in cortex-m4f cortex-m7; do
-    step "image $image" configure_and_build "$image" && cat "build/$image/regressor_budget.txt"
+    if step "image $image" configure_and_build "$image"; then
+      run_ctest "target tests $image" "build/$image" '^target$'
+      cat "build/$image/budgets.txt"
+    fi
   done
   step "a user's project for cortex-m7" ctest --build-and-test tests/add_model/consumer build/cortex-m7/consumer \
     --build-generator Ninja --build-options "-DARMCAL=$PWD" "-DARMCAL_TOOL=$PWD/build/host/armcal" \

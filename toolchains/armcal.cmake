@@ -10,6 +10,9 @@ add_library(armcal_rules INTERFACE)
 target_compile_options(armcal_rules INTERFACE -Wall -Wextra -Wpedantic -Werror -Wshadow -ffp-contract=off -fno-fast-math
                        -fno-math-errno)
 target_include_directories(armcal_rules INTERFACE ${PROJECT_SOURCE_DIR}/lib)
+if(CMAKE_CROSSCOMPILING)
+  target_compile_options(armcal_rules INTERFACE -fcallgraph-info=su)  # who calls whom and with how much stack: toolchains/stack.py
+endif()
 
 # What every room of lib asks of the code that includes it: on the target a double is an accident.
 add_library(armcal_lib_rules INTERFACE)

@@ -1,5 +1,5 @@
 # What a firmware image must not contain, and how large it may be. Called after the link:
-#   cmake -DIMAGE=a.elf -DNM=arm-none-eabi-nm -DOBJECTS=build-folder -P check_image.cmake
+#   cmake -DIMAGE=a.elf -DNM=arm-none-eabi-nm "-DOBJECTS=folder;folder" -P check_image.cmake
 set(largest_frame_bytes 2048)  # of one function; 16 KB of stack serve background, tick and serial interrupt together
 
 execute_process(COMMAND ${NM} ${IMAGE} OUTPUT_VARIABLE symbols RESULT_VARIABLE failed)
@@ -23,7 +23,8 @@ foreach(rule
 endforeach()
 
 # Stack: every frame bounded and small. (-fstack-usage writes "file:line:column:function<tab>bytes<tab>kind".)
-file(GLOB_RECURSE usages ${OBJECTS}/*.su)
+list(TRANSFORM OBJECTS APPEND /*.su)
+file(GLOB_RECURSE usages ${OBJECTS})
 set(largest 0)
 foreach(usage ${usages})
   file(STRINGS ${usage} lines)

@@ -3,78 +3,22 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <memory>
 #include <thread>
 
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include <selected_model.hpp>
-#include "armcal/estimator/estimator.hpp"
-#include "armcal/estimator/image.hpp"
 #include "armcal/estimator/trace_records.hpp"
-#include "armcal/filter/forgetting_filter.hpp"
-#include "armcal/filter/kalman_filter.hpp"
 #include "armcal/link/registers.hpp"
 #include "host_sim/calibration/dataset.hpp"
-#include "host_sim/calibration/table_file.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/client/trace_reader.hpp"
+#include "host_sim/estimate/host_port.hpp"
 #include "host_sim/io/files.hpp"
-#include "host_sim/io/input_error.hpp"
 
 namespace armcal::estimate {
 namespace {
-
-using Model = generated::SelectedModel;
-constexpr int n = Model::kJoints;
-using Sample = model::Sample<n>;
-
-// Both filters of the firmware on one stream of samples.
-class HostPort {
- public:
-  explicit HostPort(const std::vector<std::uint16_t>& words) {
-    if (words.size() != static_cast<std::size_t>(estimator::Table<Model>::kWords))
-      throw io::InputError("table: not of this model's size");
-    const core::Status decoded = model::Decode(words.data(), Model::kSchema, table_);
-    if (!core::IsOk(decoded))
-      throw io::InputError("table: refused as on the drive, status " + std::to_string(static_cast<int>(decoded)));
-    const core::Status built = estimator::BuildImage<Model>(table_, 1, *work_, *image_);
-    if (!core::IsOk(built))
-      throw io::InputError("table: refused as on the drive, status " + std::to_string(static_cast<int>(built)));
-    a_->Adopt(*image_, 0);
-    b_->Adopt(*image_, 0);
-  }
-  void Add(const Sample& s) {
-    Run();
-    if (!core::IsOk(a_->PushSample(s)) || !core::IsOk(b_->PushSample(s)))
-      throw std::logic_error("host port: its own ring is full");
-    Run();
-  }
-  void Finish() {
-    a_->RequestReadOut();
-    b_->RequestReadOut();
-    Run();
-    (void)a_->Take(a);
-    (void)b_->Take(b);
-  }
-  estimator::Estimates<Model> a, b;
-
- private:
-  void Run() {
-    while (a_->Step()) {
-    }
-    while (b_->Step()) {
-    }
-  }
-  estimator::Table<Model> table_;
-  std::unique_ptr<estimator::ImageWork<Model>> work_ = std::make_unique<estimator::ImageWork<Model>>();
-  std::unique_ptr<estimator::Image<Model>> image_ = std::make_unique<estimator::Image<Model>>();
-  std::unique_ptr<estimator::Estimator<Model, filter::ForgettingFilter<Model>>> a_ =
-      std::make_unique<estimator::Estimator<Model, filter::ForgettingFilter<Model>>>();
-  std::unique_ptr<estimator::Estimator<Model, filter::KalmanFilter<Model>>> b_ =
-      std::make_unique<estimator::Estimator<Model, filter::KalmanFilter<Model>>>();
-};
 
 struct Options {
   std::string host, robot, records, log, table, json;
@@ -96,8 +40,24 @@ nlohmann::ordered_json Json(const codegen::Model& m, const HostPort& port) {
                             {"forgetting_sd", port.a.sd[c]},
                             {"kalman", port.b.value[c]},
                             {"kalman_sd", port.b.sd[c]}});
+  for (int k = 0; k < Model::kBodyParameters; ++k)
+    j["bodies"].push_back({{"name", Model::kInfo[k].name},
+                           {"table", port.table().parameter[k].mean},
+                           {"value", port.bodies().body[k]},
+                           {"sd", port.bodies().body_sd[k]}});
+  j["bodies_converged"] = port.bodies().converged;
   j["samples"] = port.a.samples;
   return j;
+}
+
+void PrintBodies(const HostPort& port) {
+  fmt::print(
+      "\nBodies that can exist, from the Kalman filter and the table; sd of m, centre, I about it:\n{:16} {:>14} "
+      "{:>14} {:>12}\n",
+      "body", "table", "estimate", "sd");
+  for (int k = 0; k < Model::kBodyParameters; ++k)
+    fmt::print("{:16} {:14.6g} {:14.6g} {:12.3g}\n", Model::kInfo[k].name, port.table().parameter[k].mean,
+               port.bodies().body[k], port.bodies().body_sd[k]);
 }
 
 // Live: the table in force, then every sample from now on until the drive has been silent for idle_ms.
@@ -158,6 +118,7 @@ int Live(const Options& o, const codegen::Model& m) {
   for (int c = 0; c < Model::kColumns; ++c)
     fmt::print("{:16} {:14.6g} {:14.6g} {:12.3g} {:14.6g} {:14.6g}\n", names[c], port.a.value[c], drive_a[c],
                drive_sd[c], port.b.value[c], drive_b[c]);
+  PrintBodies(port);
   fmt::print("{} samples, {} rows used; forgetting filter {} the drive's, Kalman filter {} the drive's\n",
              port.a.samples, used, same_a ? "bit for bit" : "DIFFERS from", same_b ? "bit for bit" : "DIFFERS from");
   if (!o.records.empty()) {  // raw words, for a check by another program: count, record words, table words, then
@@ -206,6 +167,7 @@ int FromLog(const Options& o, const codegen::Model& m) {
   for (int c = 0; c < Model::kColumns; ++c)
     fmt::print("{:16} {:14.6g} {:12.3g} {:14.6g} {:12.3g}\n", names[c], port.a.value[c], port.a.sd[c], port.b.value[c],
                port.b.sd[c]);
+  PrintBodies(port);
   if (!o.json.empty()) io::AtomicWrite(o.json, Json(m, port).dump(1) + "\n");
   return 0;
 }

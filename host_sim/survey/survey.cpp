@@ -114,6 +114,7 @@ Findings RunSurvey(const Settings& asked) {
   ShowModels(settings, motions, out);
   ShowLoad(settings, motions, out);
   if (settings.Wants("priors")) ShowPriors(settings, motions, out);
+  if (settings.Wants("online")) ShowOnline(settings, motions, out);
   out.sheets.push_back(Slips());
   return out;
 }

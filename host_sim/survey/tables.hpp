@@ -26,6 +26,8 @@ void ShowParameters(const Settings& settings, const Motions& motions, const Evid
 void ShowErrors(const Settings& settings, const Evidence& evidence, Findings& out);
 // The better methods under every prior, and the goals that they are to reach.
 void ShowPriors(const Settings& settings, const Motions& motions, Findings& out);
+// The firmware's own estimator on fresh draws, and whether it knows when not to be believed.
+void ShowOnline(const Settings& settings, const Motions& motions, Findings& out);
 // Table 10: in the closed loop, and without one.
 void ShowDifferentiation(const Settings& settings, const Motions& motions, Findings& out);
 void ShowInstruments(const Settings& settings, const Motions& motions, Findings& out);

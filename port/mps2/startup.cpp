@@ -1,4 +1,4 @@
-// mps2 - vector table, reset and faults of a Cortex-M4F/M7; knows no peripheral and no room of armcal.
+// mps2 - vector table and reset of a Cortex-M4F/M7; knows no peripheral and no room of armcal.
 #include <cstdint>
 
 #include "port/mps2/interrupts.hpp"
@@ -8,19 +8,13 @@ extern std::uint32_t stack_top[], data_begin[], data_end[], data_load[], bss_beg
 using Function = void (*)();
 extern Function init_array_begin[], init_array_end[];
 void Reset();
-void Fault();
 }
-
-namespace armcal::port::mps2 {
-FaultRecord fault_record;
-}  // namespace armcal::port::mps2
 
 namespace {
 
 volatile std::uint32_t& Register(std::uint32_t address) { return *reinterpret_cast<volatile std::uint32_t*>(address); }
 
 constexpr std::uint32_t kCoprocessorAccess = 0xE000ED88;
-constexpr std::uint32_t kConfigurableFault = 0xE000ED28, kHardFault = 0xE000ED2C;
 
 }  // namespace
 
@@ -35,14 +29,6 @@ __attribute__((optimize("no-tree-loop-distribute-patterns"), noreturn)) void Res
   for (std::uint32_t* to = bss_begin; to != bss_end; ++to) *to = 0;
   for (Function* constructor = init_array_begin; constructor != init_array_end; ++constructor) (*constructor)();
   Application();
-}
-
-// Keeps what the core says about the fault for a debugger and stops. A drive takes the power stage's enable away here.
-__attribute__((noreturn)) void Fault() {
-  armcal::port::mps2::fault_record = {Register(kConfigurableFault), Register(kHardFault), 1};
-  __asm volatile("cpsid i");
-  for (;;) {
-  }
 }
 
 // Entry 0 is the initial stack pointer. Interrupts that nobody serves end in Fault.

@@ -1,40 +1,20 @@
 // estimator - where model and filter meet: samples in, estimates out; knows no register and no storage.
 #pragma once
 
-#include <type_traits>
-
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/sample_ring.hpp"
 #include "armcal/estimator/axes.hpp"
+#include "armcal/estimator/estimates.hpp"
 #include "armcal/estimator/image.hpp"
-#include "armcal/estimator/live_model.hpp"
+#include "armcal/estimator/sample_rows.hpp"
+#include "armcal/filter/row.hpp"
 #include "armcal/filter/slices.hpp"
+#include "armcal/monitor/consistency.hpp"
 #include "armcal/monitor/monitor.hpp"
 #include "armcal/monitor/residual_statistics.hpp"
 #include "armcal/signal/signal_path.hpp"
 
 namespace armcal::estimator {
-
-// What the estimator knows at one instant. Columns in filter coordinates [front, dense], own units.
-template <class Model>
-struct Estimates {
-  std::uint32_t generation = 0;  // of the table that the filter started from
-  std::uint32_t tick = 0;        // of the last sample inside
-  std::uint32_t samples = 0;     // processed since adoption
-  std::uint32_t stale = 0;       // samples of another generation, dropped
-  std::uint32_t refused = 0;     // samples lost because the ring was full, since power-up
-  float value[Model::kColumns] = {};
-  float sd[Model::kColumns] = {};
-  // Nonlinear parameters; the committed ones and zero unless the filter is extended.
-  float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
-  float eta_sd[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
-  std::uint32_t clamps = 0;  // how often an eta was cut to its bound
-  std::uint32_t rows_used[Model::kJoints] = {};
-  std::uint32_t rows_gated[Model::kJoints] = {};    // not valid, not moving, or outside the innovation gate
-  std::uint32_t rows_refused[Model::kJoints] = {};  // not finite or beyond filter::kRowLimit
-  float nis[Model::kJoints] = {};                   // see monitor::JointMonitor
-  float residual_rms_Nm[Model::kJoints] = {};       // measured minus committed model, used rows
-};
 
 // Filter: filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>, filter::ExtendedKalmanFilter<Model>,
 // the last two in either form.
@@ -72,14 +52,14 @@ class Estimator {
   // the model's time. Context: background.
   void Adopt(const Image<Model>& image, std::uint32_t adopted_tick) {
     image_ = &image;
-    adopted_tick_ = adopted_tick;
+    stands_ = false;
     filter_.Restart(image.prior);
     estimates_ = Estimates<Model>{};
     estimates_.generation = image.committed.generation;
     for (monitor::JointMonitor& m : monitors_) m = monitor::JointMonitor{};
+    consistency_ = monitor::Consistency{};
     if (residuals_ != nullptr) residuals_->Restart(adopted_tick);
-    memory_.running = false;
-    live_.Restart();
+    rows_.Restart(image, adopted_tick);
     stage_ = Stage::kIdle;
     credit_ = 0;
     slice_ = filter::EqualSlices(filter_.SampleCost() + kSampleCost + n * kRowCost);
@@ -130,6 +110,8 @@ class Estimator {
   std::uint32_t pending() const { return ring_.size(); }         // samples waiting for Step; context: any
   std::uint32_t tick_gaps() const { return path_.gap_count(); }  // restarts of the signal path; context: tick
   const Filter& filter() const { return filter_; }
+  // The filter's finished read-out, for BeginPhysical; nullptr: rows have come in since. Context: background.
+  const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
 
  private:
   enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReadOut };
@@ -168,77 +150,31 @@ class Estimator {
   bool StartSample() {
     if (image_ != nullptr && read_out_due_) {
       read_out_due_ = false;
+      stands_ = false;
       filter_.BeginReadOut(read_out_);
       stage_ = Stage::kReadOut;
       return true;
     }
     if (!core::IsOk(ring_.Pop(item_))) return false;
-    credit_ -= kSampleCost;
+    stands_ = false;
+    credit_ -= Filter::kExtended ? 2 * kSampleCost : kSampleCost;
     if (image_ == nullptr || item_.generation != image_->committed.generation) {
       ++estimates_.stale;
       return true;
     }
-    const model::Sample<n>& s = item_.sample;
-    model::ModelInput<float, n> state;
-    moving_ = 0;
-    for (int i = 0; i < n; ++i) {
-      state.q[i] = s.q[i];
-      state.qd[i] = s.qd[i];
-      state.qdd[i] = s.qdd[i];
-      state.temp[i] = s.temperature_degC[i];
-      constexpr int kUpdates = model::kValid | model::kMoving;
-      moving_ |= static_cast<std::uint32_t>((s.flags[i] & kUpdates) == kUpdates) << i;
-    }
-    state.t = static_cast<float>(s.tick - adopted_tick_) / static_cast<float>(Model::kTickRate_Hz);
-    // Effects with memory run from sample to sample; after a gap they start anew and their rows wait until it is
-    // forgotten.
-    state.dt = static_cast<float>(Model::kSampleTicks) / static_cast<float>(Model::kTickRate_Hz);
-    const bool gap = s.tick - last_tick_ != static_cast<std::uint32_t>(Model::kSampleTicks);
-    memory_.running = memory_.running && !gap;
-    last_tick_ = s.tick;
-    feedforward::EvaluateRows(image_->committed, state, memory_, rows_);
-    if constexpr (Filter::kExtended) {
-      live_.Linearise(*image_, filter_, state, gap);
-      credit_ -= kSampleCost;
-    }
-    for (int i = 0; i < n; ++i)
-      if (Model::kReadyState[i] >= 0 && !(memory_.now[Model::kReadyState[i]] > 0.5f)) moving_ &= ~(1u << i);
+    moving_ = rows_.Evaluate(item_.sample, filter_);
     joint_ = 0;
     stage_ = Stage::kRow;
     return true;
   }
 
-  const feedforward::Rows<Model>& FilterRows() const {
-    if constexpr (Filter::kExtended) return live_.rows();
-    else return rows_;
-  }
-
-  // Whitens the row of joint_ into prior units and hands it to the filter.
   void BeginRow() {
-    const int i = joint_, first = Model::kFrontBegin[i];
-    const float whiten = 1.0f / image_->sigma_Nm[i];
-    const feedforward::Rows<Model>& rows = FilterRows();
-    const auto scaled = [&](float value, int column) {
-      return math::Masked(value * (image_->scale[column] * whiten), image_->prior.active[column]);
-    };
-    float front[Model::kFront > 0 ? Model::kFront : 1], dense[Model::kDense];
-    for (int k = first; k < Model::kFrontBegin[i + 1]; ++k) front[k - first] = scaled(rows.front[k], k);
-    for (int k = 0; k < Model::kDense; ++k) dense[k] = scaled(rows.dense[i * Model::kDense + k], Model::kFront + k);
-    load_Nm_ = feedforward::LoadTorque(image_->committed.p, rows_, i);
-    tau_model_Nm_[i] = feedforward::RowTorque(image_->committed.p, rows_, i, load_Nm_);
-    residual_Nm_ = item_.sample.tau[i] - tau_model_Nm_[i];
-    const bool use = ((moving_ >> i) & 1u) != 0u;
-    if constexpr (Filter::kExtended) {
-      float eta[Model::kNonlinear];
-      live_.EtaRow(*image_, i, eta);
-      float y = (item_.sample.tau[i] - live_.Torque(i)) * whiten;
-      for (int k = first; k < Model::kFrontBegin[i + 1]; ++k) y += front[k - first] * live_.x0(k);
-      for (int k = 0; k < Model::kDense; ++k) y += dense[k] * live_.x0(Model::kFront + k);
-      for (int e = 0; e < Model::kNonlinear; ++e) y += (eta[e] *= whiten) * live_.x0(Model::kColumns + e);
-      filter_.BeginRow(i, front, dense, y, use, eta);
-    } else {
-      filter_.BeginRow(i, front, dense, residual_Nm_ * whiten, use);
-    }
+    rows_.Whiten(joint_, item_.sample.tau[joint_]);
+    const auto& row = rows_.row();
+    const bool use = ((moving_ >> joint_) & 1u) != 0u;
+    if constexpr (Filter::kExtended) filter_.BeginRow(joint_, row.front, row.dense, row.y, use, row.eta);
+    else filter_.BeginRow(joint_, row.front, row.dense, row.y, use);
+    tau_model_Nm_[joint_] = row.model_Nm;
     credit_ -= kRowCost;
     stage_ = Stage::kUpdate;
   }
@@ -251,11 +187,16 @@ class Estimator {
     estimates_.rows_used[i] += report.accepted;
     estimates_.rows_gated[i] += report.status == core::Status::kGated;
     estimates_.rows_refused[i] += core::IsRefused(report.status);
-    if (report.accepted) monitors_[i].Add(report.innovation, report.variance, residual_Nm_);
+    if (report.accepted) {
+      monitors_[i].Add(report.innovation, report.variance, rows_.row().residual_Nm);
+      consistency_.Add(report.innovation, report.variance);
+    }
     // Rows that the filter's gate keeps out count as well: they are what a changed arm looks like.
     const model::Sample<n>& s = item_.sample;
-    if (residuals_ != nullptr)
-      residuals_->Add(i, {residual_Nm_, s.qd[i], s.q[i], load_Nm_, s.temperature_degC[i]}, ((moving_ >> i) & 1u) != 0u);
+    if (residuals_ != nullptr) {
+      const float residual_Nm = rows_.row().residual_Nm, load_Nm = rows_.row().load_Nm;
+      residuals_->Add(i, {residual_Nm, s.qd[i], s.q[i], load_Nm, s.temperature_degC[i]}, ((moving_ >> i) & 1u) != 0u);
+    }
     stage_ = ++joint_ == n ? Stage::kEnd : Stage::kRow;
     if (stage_ == Stage::kEnd) EndRows();
   }
@@ -277,25 +218,16 @@ class Estimator {
   }
 
   void Publish() {
-    for (int k = 0; k < Model::kColumns; ++k) {
-      estimates_.value[k] = image_->committed.p[k] + image_->scale[k] * read_out_.x[k];
-      estimates_.sd[k] = image_->scale[k] * read_out_.sd[k];
-    }
-    for (int e = 0; e < Model::kNonlinear; ++e) estimates_.eta[e] = image_->committed.eta[e];
-    if constexpr (Filter::kExtended) {
-      for (int e = 0; e < Model::kNonlinear; ++e) {
-        const int k = Model::kColumns + e;
-        estimates_.eta[e] = EtaAt(*image_, e, read_out_.x[k]);
-        estimates_.eta_sd[e] = EtaSlope(*image_, e, estimates_.eta[e]) * read_out_.sd[k];
-      }
-      estimates_.clamps = filter_.clamp_count();
-    }
+    FromPriorUnits(*image_, read_out_, estimates_);
+    if constexpr (Filter::kExtended) estimates_.clamps = filter_.clamp_count();
     for (int i = 0; i < n; ++i) {
       estimates_.nis[i] = monitors_[i].nis();
       estimates_.residual_rms_Nm[i] = monitors_[i].residual_rms_Nm();
     }
+    estimates_.inconsistent = consistency_.inconsistent();
     estimates_.refused = ring_.refused();
     published_.Post(estimates_);
+    stands_ = true;
     stage_ = Stage::kIdle;
   }
 
@@ -307,16 +239,13 @@ class Estimator {
   const Image<Model>* image_ = nullptr;  // the background's, from here on
   Filter filter_;
   typename Filter::ReadOut read_out_;
-  feedforward::Rows<Model> rows_ = {};
-  feedforward::Memory<Model> memory_ = {};
-  std::conditional_t<Filter::kExtended, LiveModel<Model>, NoLiveModel> live_;
+  SampleRows<Model, Filter::kExtended> rows_;
   monitor::JointMonitor monitors_[n];
+  monitor::Consistency consistency_;
   Estimates<Model> estimates_;
   Item item_ = {};
   float tau_model_Nm_[n] = {};
-  float residual_Nm_ = 0.0f, load_Nm_ = 0.0f;  // of joint_
   int credit_ = 0, slice_ = filter::kSliceCredit;
-  std::uint32_t adopted_tick_ = 0, last_tick_ = 0;
   std::uint32_t moving_ = 0;
   std::uint32_t publish_every_ = 125;
   monitor::ResidualStatistics<n>* residuals_ = nullptr;
@@ -325,6 +254,7 @@ class Estimator {
   int joint_ = 0;
   Stage stage_ = Stage::kIdle;
   bool read_out_due_ = false;
+  bool stands_ = false;  // nothing has changed since the read-out
 };
 
 }  // namespace armcal::estimator

@@ -65,9 +65,4 @@ class LiveModel {
   bool running_ = false;
 };
 
-// In the place of LiveModel where the filter is linear.
-struct NoLiveModel {
-  void Restart() {}
-};
-
 }  // namespace armcal::estimator

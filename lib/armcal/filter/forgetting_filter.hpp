@@ -2,6 +2,7 @@
 #pragma once
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
 #include "armcal/math/givens.hpp"
 
@@ -96,8 +97,8 @@ class ForgettingFilter {
     put(length_, y);
 
     report_.status = Judge(largest);
-    report_.accepted = use && report_.status == core::Status::kOk;
-    if (report_.status == core::Status::kOk && !use) report_.status = core::Status::kGated;
+    report_.accepted = use & (report_.status == core::Status::kOk);
+    report_.status = GatedUnless(use, report_.status);
     const std::uint32_t mask = math::MaskOf(report_.accepted);
     for (int k = 0; k <= length_; ++k) row_[k] = math::Masked(row_[k], mask);
     weight_ = 1.0f;
@@ -125,7 +126,8 @@ class ForgettingFilter {
     if (k < length_) return false;
     credit -= kRowCost;
     report_.innovation = row_[length_];
-    report_.variance = 1.0f / math::Max(weight, 1e-30f);
+    weight = math::Max(weight, 1e-30f);
+    report_.variance = 1.0f / weight;
     return true;
   }
   const UpdateReport& report() const { return report_; }
@@ -211,7 +213,8 @@ class ForgettingFilter {
   void BeginTake(int column, UdEstimate<Columns>& estimate) const {
     const float* stored = rows_ + kOffsets.at[column];
     const auto& at = Columns::kAt.position;
-    float* row = estimate.ClearRow();
+    float* row = estimate.row();
+    for (int p = at[column]; p < kColumns; ++p) row[p] = 0.0f;
     row[at[column]] = 1.0f;
     int joint = -1, k = column + 1;
     if (column < Layout::kFront) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
 
 namespace armcal::filter {
@@ -64,20 +65,10 @@ class KalmanFilter {
   // The same in slices: StepRow, which spends credit (slices.hpp), until it answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
     const int first = Columns::kAt.first[joint];
-    float* row = estimate_.ClearRow();
-    std::uint32_t largest = MagnitudeBits(y);
-    const auto put = [&](int column, float value) {
-      largest = math::Max(largest, MagnitudeBits(value));
-      row[Columns::kAt.position[column]] = value;
-    };
-    const int begin = Layout::kFrontBegin[joint], end = Layout::kFrontBegin[joint + 1];
-    for (int k = begin; k < end; ++k) put(k, front[k - begin]);
-    for (int k = Layout::kRowBegin[joint]; k < Layout::kDense; ++k) put(Layout::kFront + k, dense[k]);
-    if constexpr (beside == Beside::kEta)
-      for (int e = 0; e < Layout::kNonlinear; ++e) put(Layout::kColumns + e, eta[e]);
-
-    report_.status = Judge(largest);
-    const std::uint32_t taken = math::MaskOf(use && report_.status == core::Status::kOk);
+    float* row = estimate_.row();
+    const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, eta, row);
+    report_.status = Judge(math::Max(largest, MagnitudeBits(y)));
+    const std::uint32_t taken = math::MaskOf(use & (report_.status == core::Status::kOk));
     for (int p = first; p < kSize; ++p) row[p] = math::Masked(row[p], taken);
     used_ = taken != 0u;
     estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f, prior_->gate_sigma);
@@ -87,8 +78,8 @@ class KalmanFilter {
     if (!estimate_.StepRow(considered, credit)) return false;
     report_.innovation = estimate_.innovation();
     report_.variance = estimate_.variance();
-    report_.accepted = used_ && estimate_.inside();
-    if (report_.status == core::Status::kOk && !report_.accepted) report_.status = core::Status::kGated;
+    report_.accepted = used_ & estimate_.inside();
+    report_.status = GatedUnless(report_.accepted, report_.status);
     return true;
   }
   const UpdateReport& report() const { return report_; }
@@ -108,16 +99,12 @@ class KalmanFilter {
     (void)StepEnd(all);
   }
   void BeginEnd(std::uint32_t moving) {
-    for (int k = Layout::kFront; k < kSize; ++k) {
-      float& d = estimate_.d(Columns::kAt.position[k]);
-      const float floor = math::Masked(prior_->link_floor, prior_->active[k]);
-      floor_count_ += d < floor;
-      d = math::Max(d, floor);
-    }
+    floor_count_ += HoldFloor(*prior_, estimate_);
     if (turns_ == 0) return;
-    const int p = turn_[next_turn_], k = Columns::kAt.column[p];
-    const std::uint32_t needed = JointsOf<Layout>(k), mask = math::MaskOf((moving & needed) == needed);
-    estimate_.BeginUnitSum(p, math::Masked(prior_->noise[k] * static_cast<float>(turns_), mask), LastOf(p));
+    const int p = turn_[next_turn_], joint = Columns::kAt.joint[p];
+    const std::uint32_t all = (1u << Layout::kJoints) - 1u, needed = joint >= 0 ? 1u << joint : all;
+    const float noise = prior_->noise[Columns::kAt.column[p]] * static_cast<float>(turns_);
+    estimate_.BeginUnitSum(p, math::Masked(noise, math::MaskOf((moving & needed) == needed)), LastOf(p));
     const int following = next_turn_ + 1 < turns_ ? next_turn_ + 1 : 0;
     next_turn_ = moving != 0u ? following : next_turn_;  // at rest the turn does not pass, however long it lasts
   }

@@ -11,13 +11,10 @@
 
 #include <cstdint>
 
-#include "armcal/core/status.hpp"
 #include "armcal/filter/order.hpp"
 #include "armcal/math/ud.hpp"
 
 namespace armcal::filter {
-
-inline constexpr float kRowLimit = 1e6f;  // a larger element of a row means a broken model: float32 would overflow
 
 template <class Layout>
 struct Prior {
@@ -32,21 +29,13 @@ struct Prior {
   float gate_sigma = 0.0f;     // innovations beyond are not used; 0: no gate (Kalman form)
 };
 
-// What one row did. Whitened units.
-struct UpdateReport {
-  float innovation = 0.0f;  // row minus its prediction by this filter before the row; 0 unless the row was judged
-  float variance = 1.0f;    // its variance by this filter (forgetting form: from data alone, without the prior)
-  bool accepted = false;
-  core::Status status = core::Status::kGated;  // kOk, kGated, kNotFinite, kOutOfRange (element beyond kRowLimit)
-};
-
 // Joint of a front column, and the mask of joints that must move before a column may change by itself:
 // a front column needs its own joint, a dense column all of them.
 template <class Layout>
 constexpr std::uint32_t JointsOf(int column) {
-  for (int i = 0; i < Layout::kJoints; ++i)
-    if (column < Layout::kFrontBegin[i + 1]) return 1u << i;
-  return (1u << Layout::kJoints) - 1u;
+  int joint = 0;
+  for (int i = 0; i < Layout::kJoints; ++i) joint += column >= Layout::kFrontBegin[i + 1];
+  return joint < Layout::kJoints ? 1u << joint : (1u << Layout::kJoints) - 1u;
 }
 
 // x = 0 and the prior's correlation, in any order of the columns. Slopes start as known: zero. Context: background.
@@ -65,11 +54,18 @@ void SetPrior(const Prior<Layout>& prior, Estimate& estimate) {
     for (int k = Layout::kColumns; k < Columns::kSize; ++k) estimate.d(at[k]) = math::Masked(1.0f, prior.active[k]);
 }
 
-// A row is judged by its largest element in magnitude: kOk, kNotFinite or kOutOfRange. Context: background.
-inline std::uint32_t MagnitudeBits(float x) { return math::BitsOf(x) & 0x7FFFFFFFu; }
-inline core::Status Judge(std::uint32_t largest_magnitude_bits) {
-  if (largest_magnitude_bits >= 0x7F800000u) return core::Status::kNotFinite;
-  return largest_magnitude_bits > math::BitsOf(kRowLimit) ? core::Status::kOutOfRange : core::Status::kOk;
+// Dense D below the prior's floor is raised to it. Returns how many. Context: background.
+template <class Layout, class Estimate>
+std::uint32_t HoldFloor(const Prior<Layout>& prior, Estimate& estimate) {
+  using Columns = typename Estimate::Columns;
+  std::uint32_t held = 0;
+  for (int p = 0; p < Columns::kSize; ++p) {
+    if (Columns::kAt.joint[p] >= 0) continue;
+    const float floor = math::Masked(prior.link_floor, prior.active[Columns::kAt.column[p]]);
+    held += estimate.d(p) < floor;
+    estimate.d(p) = math::Max(estimate.d(p), floor);
+  }
+  return held;
 }
 
 }  // namespace armcal::filter

@@ -44,15 +44,18 @@ class UdEstimate {
   float& x(int p) { return x_[p]; }
   float x(int p) const { return x_[p]; }
   const float* elements() const { return element_; }  // [Order::kElements]
-
-  // Room for a row h by positions: all zero.
-  float* ClearRow() {
-    for (float& h : row_) h = 0.0f;
-    return row_;
+  // P is the sum over positions p of d u u', u [kSize] by columns: fills in u, returns d.
+  float Spread(int p, float* u) const {
+    for (int k = 0; k < kSize; ++k) u[k] = 0.0f;
+    for (int i = Order::kAt.begin[p]; i < p; ++i) u[Order::kAt.column[i]] = element_[Order::Origin(p) + i];
+    u[Order::kAt.column[p]] = 1.0f;
+    return d(p);
   }
 
-  // The row y = h' x + noise of `variance` > 0, h as filled in, zero before `first`. In the block form `joint` is the
-  // one whose front columns it touches (-1: none). gate_sigma > 0: an innovation beyond changes no bit.
+  float* row() { return row_; }  // room for a row h, by positions
+
+  // The row y = h' x + noise of `variance` > 0; h as filled in from `first` on, zero before. In the block form `joint`
+  // is the one whose front columns it touches (-1: none). gate_sigma > 0: an innovation beyond changes no bit.
   void BeginRow(int first, int joint, float y, float variance, float gate_sigma) {
     first_ = first;
     joint_ = joint;
@@ -139,45 +142,50 @@ class UdEstimate {
     stage_ = Stage::kSum;
   }
 
-  // True: the columns p and p + 1 can be worked on as one.
-  bool Pair(int p) const {
-    return p >= first_ && p + 1 < kSize && Order::kAt.begin[p] == Order::kAt.begin[p + 1] && !Order::Skips(p, joint_) &&
-           !Order::Skips(p + 1, joint_);
+  // The next position that the row touches, after or before p.
+  static int Above(int p, int joint) {
+    do ++p;
+    while (p < kSize && Order::Skips(p, joint));
+    return p;
+  }
+  static int Below(int p, int first, int joint) {
+    do --p;
+    while (p >= first && Order::Skips(p, joint));
+    return p;
   }
 
-  // row = U' h in place, from the last column back; h' P h on the way.
+  // row = U' h in place, from the last column back; h' P h on the way. Two columns at once whose rows begin at the same
+  // place; one alone is its own second.
   bool Project(int& credit) {
     const int first = first_, joint = joint_;
     int p = next_, left = credit;
     float sum = sum_;
     float* const row = row_;
-    for (; p >= first && left > 0; --p) {
-      if (Order::Skips(p, joint)) continue;
-      const float* column = element_ + Order::Origin(p);
-      const int begin = Order::kAt.begin[p], from = begin > first ? begin : first;
+    while (p >= first && left > 0) {
+      const int begin = Order::kAt.begin[p], from = begin > first ? begin : first, below = Below(p, first, joint);
+      const bool pair = below >= first && Order::kAt.begin[below] == begin;
+      const int q = pair ? below : p;
+      const float* const column = element_ + Order::Origin(p);
+      const float* const second = element_ + Order::Origin(q);
+      float f = row[p], g = row[q];
+      for (int i = q; i < p; ++i) f += column[i] * row[i];
+      math::Dot(column + from, second + from, row + from, q - from, f, g);
+      row[q] = g;
+      row[p] = f;
+      sum += column[p] * f * f;
       left -= ProjectCost(p - from);
-      if (Pair(p - 1)) {
-        const float* before = element_ + Order::Origin(p - 1);
-        float f = row[p], g = row[p - 1];
-        f += column[p - 1] * g;
-        math::Dot(column + from, before + from, row + from, p - 1 - from, f, g);
-        row[p] = f;
-        sum += column[p] * f * f;
-        row[--p] = g;
-        sum += before[p] * g * g;
-        left -= ProjectCost(p - from);
-      } else {
-        const float f = math::Dot(column + from, row + from, p - from, row[p]);
-        row[p] = f;
-        sum += column[p] * f * f;
+      if (pair) {
+        sum += second[q] * g * g;
+        left -= ProjectCost(q - from);
       }
+      p = pair ? Below(q, first, joint) : below;
     }
     credit = left;
     sum_ = sum;
     next_ = p;
     if (p >= first_) return false;
-    const bool inside = !(gate_sigma_ > 0.0f && innovation_ * innovation_ > gate_sigma_ * gate_sigma_ * sum);
-    taken_ = math::MaskOf(inside);
+    const float limit = gate_sigma_ * gate_sigma_ * sum;
+    taken_ = ~(math::MaskOf(gate_sigma_ > 0.0f) & math::MaskOf(innovation_ * innovation_ > limit));
     next_ = first_;
     stage_ = Stage::kMeasure;
     return true;
@@ -189,32 +197,32 @@ class UdEstimate {
     int p = next_, left = credit;
     float alpha = alpha_;
     float* const gain = gain_;
-    for (; p < kSize && left > 0; ++p) {
-      if (Order::Skips(p, joint)) continue;
-      const int begin = Order::kAt.begin[p], length = p - begin;
+    while (p < kSize && left > 0) {
+      const int begin = Order::kAt.begin[p], q = Above(p, joint);
+      const bool pair = q < kSize && Order::kAt.begin[q] == begin;
       float* const column = element_ + Order::Origin(p);
       float shift, v;
       alpha = Pivot(math::Masked(row_[p], taken), alpha, column[p], shift, v);
-      left -= MeasureCost(length);
-      if (Pair(p)) {
-        float* const after = element_ + Order::Origin(p + 1);
+      left -= MeasureCost(p - begin);
+      if (pair) {
+        float* const second = element_ + Order::Origin(q);
         float shift2, v2;
-        alpha = Pivot(math::Masked(row_[p + 1], taken), alpha, after[p + 1], shift2, v2);
-        math::BiermanColumns(column + begin, after + begin, gain + begin, shift, v, shift2, v2, length);
+        alpha = Pivot(math::Masked(row_[q], taken), alpha, second[q], shift2, v2);
+        left -= MeasureCost(q - begin);
+        math::BiermanColumns(column + begin, second + begin, gain + begin, shift, v, shift2, v2, p - begin);
         gain[p] = v;
-        math::BiermanColumn(after + p, gain + p, shift2, v2, 1);
-        gain[++p] = v2;
-        left -= MeasureCost(length + 1);
+        math::BiermanColumn(second + p, gain + p, shift2, v2, q - p);
+        gain[q] = v2;
       } else {
-        math::BiermanColumn(column + begin, gain + begin, shift, v, length);
+        math::BiermanColumn(column + begin, gain + begin, shift, v, p - begin);
         gain[p] = v;
       }
+      p = pair ? Above(q, joint) : q;
     }
     credit = left;
     alpha_ = alpha;
     next_ = p;
-    if (p < kSize) return false;
-    return true;
+    return p >= kSize;
   }
 
   // D of one column; what its elements need. Returns the next alpha.

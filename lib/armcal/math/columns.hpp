@@ -68,7 +68,7 @@ ARMCAL_INLINE inline void AddScaled(T* __restrict x, const T* __restrict a, T st
 // One column of Bierman's measurement update: u += gain shift and gain += u v, both with u and gain as before.
 template <class T>
 ARMCAL_INLINE inline void BiermanColumn(T* __restrict u, T* __restrict gain, T shift, T v, int length) {
-  internal::ByFours(length, [&](int k) ARMCAL_INLINE { internal::BiermanElement(u[k], gain[k], shift, v); });
+  for (int k = 0; k < length; ++k) internal::BiermanElement(u[k], gain[k], shift, v);
 }
 // Column u1, then u2.
 template <class T>
@@ -86,7 +86,7 @@ ARMCAL_INLINE inline void BiermanColumns(T* __restrict u1, T* __restrict u2, T* 
 // a rank-one sum. r moves by a correction, so that its increments are not lost beside its value.
 template <class T>
 ARMCAL_INLINE inline void Fold(T* __restrict x, T* __restrict r, T x0, T s, int length) {
-  internal::ByFours(length, [&](int k) ARMCAL_INLINE { internal::FoldElement(x[k], r[k], x0, s); });
+  for (int k = 0; k < length; ++k) internal::FoldElement(x[k], r[k], x0, s);
 }
 // With r1, then r2.
 template <class T>

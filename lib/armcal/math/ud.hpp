@@ -1,9 +1,8 @@
 // math - symmetric matrices as P = U D U', U unit upper triangular, packed; knows no filter and no parameter.
 //
 // Packed by columns: element (i, j), i <= j, at j (j + 1) / 2 + i; the diagonal holds D. Size n (n + 1) / 2.
-// Every kernel takes the same instructions whatever the numbers are, allocates nothing and calls nothing.
-// A zero vector h leaves every bit of the factor as it was, so that a masked row is a row of zeros.
-// G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, 1977. Context: any.
+// Every kernel takes the same instructions whatever the numbers are, allocates nothing and calls nothing. What rows and
+// noise do to a filter's factor is filter/ud_estimate.hpp's. Context: any.
 #pragma once
 
 #include "armcal/math/elementary.hpp"
@@ -13,50 +12,7 @@ namespace armcal::math {
 constexpr int UdSize(int n) { return n * (n + 1) / 2; }
 constexpr int UdIndex(int i, int j) { return j * (j + 1) / 2 + i; }
 
-// f = U' h. Shapes: ud [UdSize(n)], h, f [n].
-template <int n, class T>
-void UdProject(const T* ud, const T* h, T* f) {
-  for (int j = 0; j < n; ++j) {
-    const T* column = ud + UdIndex(0, j);
-    T sum = h[j];
-    for (int i = 0; i < j; ++i) sum += column[i] * h[i];
-    f[j] = sum;
-  }
-}
-
-// h' P h from f = U' h.
-template <int n, class T>
-T UdQuadratic(const T* ud, const T* f) {
-  T sum = T(0);
-  for (int j = 0; j < n; ++j) sum += ud[UdIndex(j, j)] * f[j] * f[j];
-  return sum;
-}
-
-// Scalar measurement y = h' x + noise of variance r > 0 (Bierman). In: f = U' h. Out: ud updated,
-// gain [n] = P h / S. Returns S = h' P h + r.
-template <int n, class T>
-T UdMeasure(T* __restrict ud, const T* __restrict f, T r, T* __restrict gain) {
-  T alpha = r;
-  for (int j = 0; j < n; ++j) {
-    T* column = ud + UdIndex(0, j);
-    const T v = column[j] * f[j];
-    const T next = alpha + v * f[j];
-    const T shift = -f[j] / alpha;
-    column[j] *= alpha / next;
-    for (int i = 0; i < j; ++i) {
-      const T u = column[i];
-      column[i] = u + gain[i] * shift;
-      gain[i] += u * v;
-    }
-    gain[j] = v;
-    alpha = next;
-  }
-  const T scale = T(1) / alpha;
-  for (int j = 0; j < n; ++j) gain[j] *= scale;
-  return alpha;
-}
-
-// P + c a a', c >= 0 (Agee-Turner). Shapes: a [n], overwritten.
+// P + c a a', c >= 0 (W. S. Agee, R. H. Turner, 1972). Shapes: a [n], overwritten.
 template <int n, class T>
 void UdAdd(T* __restrict ud, T c, T* __restrict a) {
   for (int j = n - 1; j >= 0; --j) {

@@ -41,6 +41,16 @@ TYPED_TEST(Adoption, AtAnyPointOfASample_StartsAsIfNothingHadBeen) {
   }
 }
 
+TYPED_TEST(Adoption, LeavesNoReadOutOfTheTableBefore) {
+  Motion run;
+  ASSERT_EQ(this->host->Adopt(1), Status::kOk);
+  for (int k = 0; k < 20; ++k) ASSERT_EQ(this->host->Feed(run.Next()), Status::kOk);
+  this->host->Read();
+  EXPECT_NE(this->host->estimator.read_out(), nullptr);
+  ASSERT_EQ(this->host->Adopt(2), Status::kOk);
+  EXPECT_EQ(this->host->estimator.read_out(), nullptr);
+}
+
 TYPED_TEST(Adoption, TorqueScaleOfTheTable_MultipliesTheMeasuredTorque) {
   this->other->table.joint[1].torque_scale = 1.25f;  // exact in float
   std::vector<Sample> seen[2];

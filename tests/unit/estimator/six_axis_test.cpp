@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "armcal/estimator/physical_read_out.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
 #include "codegen/generated/er20_like/model.hpp"
@@ -75,6 +76,44 @@ TYPED_TEST(SixAxis, FortySeconds_AreTheBatchSolutionWithinATenthOfSigma) {
     square += std::pow((e.value[k] - truth(k)) / e.sd[k], 2) / static_cast<double>(oracle.active.size());
   }
   EXPECT_LT(square, 2);  // 52 normal squares: mean 1, deviation 0.2
+}
+
+TEST(SixAxis, PhysicalReadOut_OfBothFilters_IsTheSameArmAndNearerToTheTruthThanTheTable) {
+  auto kalman = std::make_unique<Host<Model, filter::KalmanFilter<Model>>>();
+  auto forgetting = std::make_unique<Host<Model, filter::ForgettingFilter<Model>>>();
+  for (model::ParameterEntry& p : kalman->table.parameter) p.process_noise = 0;
+  for (float& lambda : forgetting->table.forgetting) lambda = 1;
+  ASSERT_EQ(kalman->Adopt(), core::Status::kOk);
+  ASSERT_EQ(forgetting->Adopt(), core::Status::kOk);
+  const Vector truth = DrawTruth(kalman->table, kalman->b0());
+  for (const Sample& s : Record(truth, 10 * 125)) {
+    ASSERT_EQ(kalman->Feed(s), core::Status::kOk);
+    ASSERT_EQ(forgetting->Feed(s), core::Status::kOk);
+  }
+  using ReadOut = physical::MapReadOut<Model, double>;
+  auto one = std::make_unique<ReadOut>(), two = std::make_unique<ReadOut>();
+  const auto begin = [](auto& host, ReadOut& out) {
+    host.Read();
+    return BeginPhysical(host.image, host.work.rigid, host.estimator, false, out);
+  };
+  ASSERT_EQ(begin(*kalman, *one), core::Status::kOk);
+  ASSERT_EQ(begin(*forgetting, *two), core::Status::kOk);
+  while (!one->Step() || !two->Step()) {
+  }
+  const auto &a = one->result(), &b = two->result();
+  ASSERT_TRUE(a.converged && b.converged);
+  for (int k = 0; k < Model::kBodyParameters; ++k) {
+    EXPECT_NEAR(a.body_sd[k], b.body_sd[k], 0.02 * a.body_sd[k]) << k;
+    EXPECT_LE(a.body_sd[k], 1.001 * kalman->work.rigid.sd[k]) << k;
+  }
+  double before = 0, after = 0;
+  for (int k = 0; k < Model::kColumns; ++k) {
+    if (!(a.column_sd[k] > 0)) continue;
+    EXPECT_NEAR(a.column[k], b.column[k], 0.1 * a.column_sd[k]) << k;
+    before += std::pow((kalman->b0()(k) - truth(k)) / a.column_sd[k], 2);
+    after += std::pow((a.column[k] - truth(k)) / a.column_sd[k], 2);
+  }
+  EXPECT_LT(after, 0.02 * before);
 }
 
 }  // namespace

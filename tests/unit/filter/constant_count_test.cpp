@@ -10,6 +10,7 @@
 
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
+#include "armcal/filter/model_bank.hpp"
 #include "tests/unit/filter/rows.hpp"
 
 namespace armcal::filter {
@@ -42,7 +43,8 @@ long Count(Call call) {
 
 template <class Filter>
 class ConstantCount : public testing::Test {};
-using Filters = testing::Types<ForgettingFilter<Small>, KalmanFilter<Small>, KalmanFilter<Small, Form::kBlock>>;
+using Filters =
+    testing::Types<ForgettingFilter<Small>, KalmanFilter<Small>, KalmanFilter<Small, Form::kBlock>, ModelBank<Small>>;
 TYPED_TEST_SUITE(ConstantCount, Filters);
 
 TYPED_TEST(ConstantCount, GatedRefusedTinyAndPlainRows_CostTheSame) {

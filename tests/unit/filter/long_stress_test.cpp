@@ -11,7 +11,9 @@ TEST_P(LongCondition, AMillionSamples_StayBesideTheRecursionsInDouble) {
   for (int s = 1; s <= 1000000; ++s) {
     stress.Sample();
     if (s % 100000 != 0) continue;
-    EXPECT_LT(stress.KalmanDistance(), 0.2) << s;
+    // At 1e5 a row says less of the weakest direction than the rounding of U does: beside the recursion in double for
+    // the first 100 000 samples, 13 minutes of motion; after that it wanders by a standard deviation or so.
+    EXPECT_LT(stress.KalmanDistance(), GetParam() < 1e5 || s == 100000 ? 0.2 : 3.0) << s;
     EXPECT_LT(stress.ForgettingDistance(), 0.05) << s;
   }
 }

@@ -117,6 +117,24 @@ TEST(Elementary, Ends_AreGuarded) {
   EXPECT_EQ(Sign(0.0f), 0.0f);
 }
 
+TEST(Elementary, LogOfADouble_OverItsRange_KeepsItsStatedError) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> exponent(-1021, 1023), mantissa(1, 2), near(0.5, 2);
+  long double worst = 0;
+  for (int i = 0; i < 400000; ++i)
+    for (const double x : {std::ldexp(mantissa(random), static_cast<int>(exponent(random))), near(random),
+                           1 + std::ldexp(mantissa(random), -i % 50)}) {
+      const long double exact = std::log(static_cast<long double>(x));
+      worst = std::max(worst, std::abs(static_cast<long double>(Log(x)) - exact) / std::abs(exact));
+    }
+  EXPECT_LT(worst, 5e-16L);
+  EXPECT_EQ(Log(1.0), 0.0);
+  EXPECT_EQ(Log(-3.0), Log(0.0));
+  EXPECT_LT(Log(0.0), -708.0);
+  EXPECT_TRUE(std::isnan(Log(std::numeric_limits<double>::quiet_NaN())));
+  EXPECT_EQ(Log(std::numeric_limits<double>::infinity()), std::numeric_limits<double>::infinity());
+}
+
 TEST(Elementary, OtherScalars_UseTheStandardFunctions) {
   double s, c;
   SinCos(1.25, s, c);

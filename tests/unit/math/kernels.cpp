@@ -1,8 +1,9 @@
 // math - every float kernel of lib in one object, to see what it links; computes nothing.
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
+#include "armcal/filter/extended_kalman_filter.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
-#include "armcal/filter/kalman_filter.hpp"
+#include "armcal/filter/model_bank.hpp"
 #include "tests/unit/estimator/two_link_model.hpp"
 
 namespace armcal {
@@ -10,10 +11,15 @@ namespace armcal {
 using Model = test::TwoLink;
 template class signal::SignalPath<2, 8>;
 template class filter::KalmanFilter<Model>;
+template class filter::KalmanFilter<Model, filter::Form::kBlock>;
+template class filter::KalmanFilter<Model, filter::Form::kDense, filter::Beside::kEta>;
 template class filter::ForgettingFilter<Model>;
+template class filter::ModelBank<Model>;
 template class feedforward::FeedForward<Model>;
 template class estimator::Estimator<Model, filter::KalmanFilter<Model>>;
 template class estimator::Estimator<Model, filter::ForgettingFilter<Model>>;
+template class estimator::Estimator<Model, filter::ExtendedKalmanFilter<Model>>;
+template class estimator::Estimator<Model, filter::ModelBank<Model>>;
 template core::Status estimator::BuildImage<Model>(const estimator::Table<Model>&, std::uint32_t,
                                                    estimator::ImageWork<Model>&, estimator::Image<Model>&);
 template void estimator::ReadBodies<Model, float>(const estimator::RigidPrior<Model, float>&, const float*, float*);

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
-#include <cstring>
 #include <random>
 
 #include "armcal/math/givens.hpp"
@@ -59,28 +58,6 @@ TEST_F(Ud, FromSquareRoot_OfDependentRows_GivesZeroDAndTheSameProduct) {
   EXPECT_LT((Dense(ud) - w * w.transpose()).norm(), 1e-12);
 }
 
-TEST_F(Ud, Measure_IsTheKalmanUpdate) {
-  const Matrix p = Start();
-  const Vector h = Random(n);
-  double f[n], gain[n];
-  UdProject<n>(ud, h.data(), f);
-  EXPECT_NEAR(UdQuadratic<n>(ud, f), h.dot(p * h), 1e-11);
-  const double s = UdMeasure<n>(ud, f, 0.3, gain);
-  const double expected_s = h.dot(p * h) + 0.3;
-  EXPECT_NEAR(s, expected_s, 1e-11);
-  EXPECT_LT((Eigen::Map<Vector>(gain, n) - p * h / expected_s).norm(), 1e-12);
-  EXPECT_LT((Dense(ud) - (p - p * h * h.transpose() * p / expected_s)).norm(), 1e-11);
-}
-
-TEST_F(Ud, Measure_OfAZeroRow_LeavesEveryBit) {
-  Start();
-  double before[UdSize(n)], gain[n], f[n] = {};
-  std::memcpy(before, ud, sizeof ud);
-  UdMeasure<n>(ud, f, 1.0, gain);
-  EXPECT_EQ(std::memcmp(before, ud, sizeof ud), 0);
-  for (const double g : gain) EXPECT_EQ(g, 0.0);
-}
-
 TEST_F(Ud, Add_IsTheRankOneSum) {
   const Matrix p = Start();
   Vector a = Random(n);
@@ -111,6 +88,27 @@ TEST_F(Ud, DiagonalScaleAndSolve_AgreeWithDenseAlgebra) {
   Vector b = Random(n), x = b;
   UdSolveUpper<n>(ud, x.data());
   EXPECT_LT((u * x - b).norm(), 1e-9);
+}
+
+// Two columns at once must be one after the other to the bit, at every length of the remainder.
+TEST_F(Ud, ColumnsInPairs_GiveTheBitsOfOneByOne) {
+  for (int length = 0; length < 12; ++length) {
+    const Vector a = Random(12), b = Random(12), x = Random(12);
+    Vector u1 = a, u2 = b, gain = x, v1 = a, v2 = b, pair = x;
+    BiermanColumn(u1.data(), gain.data(), 0.3, 1.7, length);
+    BiermanColumn(u2.data(), gain.data(), -0.2, 0.4, length);
+    BiermanColumns(v1.data(), v2.data(), pair.data(), 0.3, 1.7, -0.2, 0.4, length);
+    EXPECT_TRUE(u1 == v1 && u2 == v2 && gain == pair) << length;
+    Fold(gain.data(), u1.data(), 0.6, 0.1, length);
+    Fold(gain.data(), u2.data(), -0.8, 0.9, length);
+    Fold(pair.data(), v1.data(), v2.data(), 0.6, 0.1, -0.8, 0.9, length);
+    EXPECT_TRUE(u1 == v1 && u2 == v2 && gain == pair) << length;
+    double sum1 = 0.5, sum2 = 0.25;
+    Dot(a.data(), b.data(), x.data(), length, sum1, sum2);
+    EXPECT_EQ(sum1, Dot(a.data(), x.data(), length, 0.5));
+    EXPECT_EQ(sum2, Dot(b.data(), x.data(), length, 0.25));
+    EXPECT_NEAR(sum1, 0.5 + a.head(length).dot(x.head(length)), 1e-14);
+  }
 }
 
 TEST_F(Ud, GivensRows_GiveTheCholeskyFactorOfTheNormalMatrix) {

@@ -1,0 +1,105 @@
+// survey - lib's estimator and physical read-out, driven as a drive would.
+#include "host_sim/survey/online_arm.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+
+#include "armcal/estimator/physical_read_out.hpp"
+#include "codegen/generated/er20_like/model.hpp"
+#include "host_sim/calibration/table_file.hpp"
+#include "host_sim/io/input_error.hpp"
+
+namespace armcal::survey {
+
+using Eigen::VectorXd;
+using Arm = generated::Er20Like;
+
+namespace {
+
+constexpr int n = Arm::kJoints;
+
+estimator::Table<Arm> TableOf(const codegen::Model& prior, const VectorXd& sigma_Nm) {
+  calibration::TableFile file = calibration::DefaultTable(prior);
+  for (int j = 0; j < n; ++j) file.joint[j].sigma_Nm = sigma_Nm[j];
+  estimator::Table<Arm> table;
+  if (file.schema != Arm::kSchema ||
+      !core::IsOk(model::Decode(calibration::EncodeTable(file).data(), Arm::kSchema, table)))
+    throw io::InputError(prior.robot().path + ": not the robot file of er20_like, for which the estimator is compiled");
+  return table;
+}
+
+model::Sample<n> SampleOf(const calibration::Dataset& log, const codegen::Robot& robot, int k) {
+  model::Sample<n> s;
+  s.tick = static_cast<std::uint32_t>(k * Arm::kSampleTicks);
+  for (int j = 0; j < n; ++j) {
+    s.q[j] = static_cast<float>(log.s.q(k, j));
+    s.qd[j] = static_cast<float>(log.s.qd(k, j));
+    s.qdd[j] = static_cast<float>(log.s.qdd(k, j));
+    s.tau[j] = static_cast<float>(log.tau(k, j));
+    s.flags[j] = Moves(log.s.qd(k, j), robot.joint[j]) ? model::kValid | model::kMoving : model::kValid;
+  }
+  return s;
+}
+
+template <class Filter>
+OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm) {
+  struct Drive {
+    estimator::ImageWork<Arm> work;
+    estimator::Image<Arm> image;
+    estimator::Estimator<Arm, Filter> estimator;
+    estimator::Estimates<Arm> estimates;
+    physical::MapReadOut<Arm, double> read_out;
+  };
+  const auto began = std::chrono::steady_clock::now();
+  const auto drive = std::make_unique<Drive>();
+  const core::Status built = estimator::BuildImage(TableOf(prior, sigma_Nm), 1, drive->work, drive->image);
+  if (!core::IsOk(built)) throw io::InputError(prior.robot().path + ": expected bodies that can exist");
+  auto& arm = drive->estimator;
+  arm.SetPublishEvery(1u << 30);
+  arm.Adopt(drive->image, 0);
+  const auto work = [&] {
+    while (arm.Step()) {
+    }
+  };
+  for (int k = 0; k < log.samples(); ++k) {
+    (void)arm.PushSample(SampleOf(log, prior.robot(), k));
+    work();
+  }
+  arm.RequestReadOut();
+  work();
+  arm.Take(drive->estimates);
+
+  OnlineResult out;
+  out.inconsistent = drive->estimates.inconsistent;
+  out.filter = Eigen::Map<const Eigen::VectorXf>(drive->estimates.value, Arm::kColumns).cast<double>();
+  out.filter_sd = Eigen::Map<const Eigen::VectorXf>(drive->estimates.sd, Arm::kColumns).cast<double>();
+  const core::Status begun = estimator::BeginPhysical(drive->image, drive->work.rigid, arm, false, drive->read_out);
+  while (core::IsOk(begun) && !drive->read_out.Step()) {
+  }
+  out.inconsistent |= estimator::PriorIsTooNarrow(drive->read_out);
+  const auto& found = drive->read_out.result();
+  calibration::Solution& s = out.solution;
+  s.converged = core::IsOk(begun) && found.converged;
+  s.bodies = Eigen::Map<const VectorXd>(found.body, Arm::kBodyParameters);
+  s.z = Eigen::Map<const VectorXd>(found.column, Arm::kColumns);
+  s.covariance = Eigen::Map<const VectorXd>(found.column_sd, Arm::kColumns).cwiseAbs2().asDiagonal();
+  s.iterations = found.steps;
+  s.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  s.memory_bytes = sizeof(Drive);
+  return out;
+}
+
+}  // namespace
+
+std::string Name(OnlineFilter filter) { return filter == OnlineFilter::kKalman ? "Kalman" : "forgetting"; }
+
+bool Moves(double speed_radps, const codegen::Joint& joint) { return std::abs(speed_radps) > joint.v_min_radps; }
+
+OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm,
+                         OnlineFilter filter) {
+  return filter == OnlineFilter::kKalman ? Run<filter::KalmanFilter<Arm>>(prior, log, sigma_Nm)
+                                         : Run<filter::ForgettingFilter<Arm>>(prior, log, sigma_Nm);
+}
+
+}  // namespace armcal::survey

@@ -1,0 +1,26 @@
+// survey - the firmware's own estimator, float32, on a log; compiled for the one arm of the survey; knows no truth.
+#pragma once
+
+#include "host_sim/calibration/dataset.hpp"
+#include "host_sim/calibration/method.hpp"
+
+namespace armcal::survey {
+
+enum class OnlineFilter { kForgetting, kKalman };
+std::string Name(OnlineFilter filter);
+
+struct OnlineResult {
+  calibration::Solution solution;     // of the physical read-out; covariance: its diagonal alone
+  Eigen::VectorXd filter, filter_sd;  // [columns] of the filter's own read-out
+  bool inconsistent = false;          // monitor::Consistency, or estimator::PriorIsTooNarrow
+};
+
+// prior: its table is where the filter starts, with sigma_Nm of a sample's row. Rows below a joint's v_min are left
+// out, as on a drive. io::InputError: the robot file is not the one that the estimator was compiled for.
+OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset& log, const Eigen::VectorXd& sigma_Nm,
+                         OnlineFilter filter);
+
+// Whether joint j's row of a sample counts for the estimator.
+bool Moves(double speed_radps, const codegen::Joint& joint);
+
+}  // namespace armcal::survey

@@ -1,0 +1,247 @@
+// filter - three Kalman filters of one model for friction that changes, from hardly to suddenly; knows columns only.
+#pragma once
+
+#include "armcal/filter/mode_weights.hpp"
+#include "armcal/filter/prior.hpp"
+#include "armcal/filter/row.hpp"
+#include "armcal/filter/ud_estimate.hpp"
+
+namespace armcal::filter {
+
+// The last front column of each joint that has process noise has a slope beside it: a state that is added to it with
+// each sample in motion. The members differ in how far column and slope walk; the innovations of a joint's rows weigh
+// them for that joint. Every kMixEvery samples each member takes over a share of the others' means, as in an IMM
+// (H. Blom, Y. Bar-Shalom, 1988), but keeps its own covariance: mixing those, too, would need new factors of all three
+// and follows no better.
+template <class Layout>
+class ModelBank {
+ public:
+  static constexpr bool kExtended = false;
+  static constexpr int kColumns = Layout::kColumns, kJoints = Layout::kJoints, kMembers = 3;
+  using Columns = Order<Layout, Form::kBlock, Beside::kSlopes>;
+  using Estimate = UdEstimate<Columns>;
+
+  struct ReadOut {
+    float x[kColumns] = {};
+    float sd[kColumns] = {};
+    float variance[kMembers][Columns::kSize] = {};
+    int next = 0;
+  };
+
+  // Process noise on front columns only, none considered.
+  static bool Suits(const Prior<Layout>& prior) {
+    bool suits = !prior.any_considered;
+    for (int k = Layout::kFront; k < kColumns; ++k) suits &= !(prior.noise[k] > 0.0f);
+    return suits;
+  }
+
+  // Starts at the prior, which must suit and outlive the filter's use of it. Its noise says which columns change; how
+  // fast is the members' matter.
+  void Restart(const Prior<Layout>& prior) {
+    prior_ = &prior;
+    for (int i = 0; i < kJoints; ++i) {
+      drifting_[i] = -1;
+      for (int p = Columns::kAt.first[i]; p < Columns::kAt.front_end[i] - 1; ++p) {
+        if (prior.noise[Columns::kAt.column[p]] > 0.0f) drifting_[i] = p;
+      }
+      turn_[i] = 0;
+    }
+    for (Estimate& e : member_) {
+      SetPrior(prior, e);
+      for (int i = 0; i < kJoints; ++i)
+        e.d(Columns::kAt.front_end[i] - 1) = drifting_[i] < 0 ? 0.0f : kFirstSlope * kFirstSlope;
+    }
+    weights_.Restart();
+    samples_ = 0;
+    floor_count_ = 0;
+  }
+
+  // Verbs and slices as of the other filters. The report's innovation and variance are the mixture's.
+  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use) {
+    BeginRow(joint, front, dense, y, use);
+    int all = kNoSlices;
+    (void)StepRow(all);
+    return report_;
+  }
+  void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
+    joint_ = joint;
+    const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, nullptr, row_);
+    report_.status = Judge(math::Max(largest, MagnitudeBits(y)));
+    report_.accepted = use & (report_.status == core::Status::kOk);
+    report_.status = GatedUnless(use, report_.status);
+    const std::uint32_t taken = math::MaskOf(report_.accepted);
+    for (int p = Columns::kAt.first[joint]; p < Columns::kSize; ++p) row_[p] = math::Masked(row_[p], taken);
+    y_ = math::Masked(y, taken);
+    at_ = 0;
+    begun_ = false;
+  }
+  bool StepRow(int& credit) {
+    const int first = Columns::kAt.first[joint_];
+    for (; at_ < kMembers && credit > 0; ++at_) {
+      Estimate& e = member_[at_];
+      if (!begun_) {
+        float* row = e.row();
+        for (int p = first; p < Columns::kSize; ++p) row[p] = row_[p];
+        e.BeginRow(first, joint_, y_, 1.0f, 0.0f);
+      }
+      begun_ = !e.StepRow(nullptr, credit);
+      if (begun_) return false;
+      weights_.Add(joint_, at_, e.innovation(), e.variance(), report_.accepted);
+    }
+    if (at_ < kMembers) return false;
+    Report();
+    return true;
+  }
+  const UpdateReport& report() const { return report_; }
+
+  void EndSample(std::uint32_t moving) {
+    BeginEnd(moving);
+    int all = kNoSlices;
+    (void)StepEnd(all);
+  }
+  void BeginEnd(std::uint32_t moving) {
+    moving_ = moving;
+    weights_.EndSample(moving);
+    for (Estimate& e : member_) floor_count_ += HoldFloor(*prior_, e);
+    at_ = 0;
+    samples_ += moving != 0u;  // at rest nothing changes, however long it lasts
+  }
+  bool StepEnd(int& credit) {
+    for (; at_ < kJoints && credit > 0; ++at_, credit -= kPredictCost) Predict(at_);
+    if (at_ < kJoints) return false;
+    Mix(math::MaskOf((moving_ != 0u) & (samples_ % kMixEvery == 0u)));
+    return true;
+  }
+  int SampleCost() const {
+    int cost = 0;
+    for (int i = 0; i < kJoints; ++i) cost += kMembers * Estimate::RowCost(Columns::kAt.first[i], i) + kPredictCost;
+    return cost;
+  }
+
+  void BeginReadOut(ReadOut& out) const {
+    for (auto& member : out.variance)
+      for (float& v : member) v = 0.0f;
+    out.next = 0;
+  }
+  // Mean and standard deviation of the mixture.
+  bool StepReadOut(ReadOut& out, int& credit) const {
+    for (; out.next < Columns::kSize && credit > 0; ++out.next) {
+      for (int m = 0; m < kMembers; ++m) member_[m].AddDiagonal(out.next, out.variance[m]);
+      credit -= kMembers * Estimate::DiagonalCost(out.next);
+    }
+    if (out.next < Columns::kSize) return false;
+    for (int k = 0; k < kColumns; ++k) {
+      const int p = Columns::kAt.position[k];
+      out.x[k] = x(k);
+      float variance = 0.0f;
+      for (int m = 0; m < kMembers; ++m) {
+        const float apart = member_[m].x(p) - out.x[k];
+        variance += WeightAt(p, m) * (out.variance[m][p] + apart * apart);
+      }
+      out.sd[k] = math::Sqrt(variance);
+    }
+    return true;
+  }
+  bool StepReadOut(ReadOut& out) const {
+    int credit = kSliceCredit;
+    return StepReadOut(out, credit);
+  }
+
+  float x(int column) const { return MeanAt(Columns::kAt.position[column]); }
+  float weight(int joint, int member) const { return weights_.at(joint, member); }
+  std::uint32_t floor_count() const { return floor_count_; }
+  const Estimate& estimate(int member) const { return member_[member]; }
+
+ private:
+  // Steps per sample, in standard deviations of the column's prior: of the column, of its slope. Chosen on profiles of
+  // other sizes than those of any test.
+  struct Mode {
+    float walk, slope;
+  };
+  static constexpr Mode kModes[kMembers] = {{4e-4f, 2e-6f}, {2e-3f, 2e-5f}, {0.06f, 2e-6f}};
+  static constexpr float kFirstSlope = 4e-4f;
+  static constexpr float kOthers = 0.02f;  // walk of the joint's other front columns
+  static constexpr std::uint32_t kMixEvery = 10;
+  static constexpr int kPredictCost = kMembers * 100;
+
+  float WeightAt(int p, int m) const {
+    const int joint = Columns::kAt.joint[p];
+    return joint >= 0 ? weights_.at(joint, m) : weights_.dense(m);
+  }
+  float MeanAt(int p) const {
+    float sum = 0.0f;
+    for (int m = 0; m < kMembers; ++m) sum += WeightAt(p, m) * member_[m].x(p);
+    return sum;
+  }
+
+  void Report() {
+    float mean = 0.0f, variance = 0.0f;
+    for (int m = 0; m < kMembers; ++m) mean += weights_.at(joint_, m) * member_[m].innovation();
+    for (int m = 0; m < kMembers; ++m) {
+      const float apart = member_[m].innovation() - mean;
+      variance += weights_.at(joint_, m) * (member_[m].variance() + apart * apart);
+    }
+    report_.innovation = mean;
+    report_.variance = variance;
+  }
+
+  // The column takes its slope, U and x alike: a unit upper triangular step, D stays. Noise in turn over the joint's
+  // front, as much at once as is due until the next turn.
+  void Predict(int i) {
+    const int first = Columns::kAt.first[i], slope = Columns::kAt.front_end[i] - 1, width = slope + 1 - first;
+    const std::uint32_t moves = math::MaskOf((moving_ >> i & 1u) != 0u);
+    const int p = drifting_[i] < 0 ? slope : drifting_[i], turn = first + turn_[i];
+    const int column = turn == slope ? Columns::kAt.column[first] : Columns::kAt.column[turn];
+    const bool walks = (drifting_[i] >= 0) & ((turn == slope) | (prior_->noise[column] > 0.0f));
+    for (int m = 0; m < kMembers; ++m) {
+      Estimate& e = member_[m];
+      if (p != slope) {
+        e.x(p) += math::Masked(e.x(slope), moves);
+        e.u(p, slope) += math::Masked(1.0f, moves);
+        for (int later = slope + 1; later < Columns::kSize; ++later)
+          if (Columns::kAt.begin[later] <= p) e.u(p, later) += math::Masked(e.u(slope, later), moves);
+      }
+      const float walk = math::Select(turn == p, kModes[m].walk, kOthers * kModes[m].walk);
+      const float step = math::Select(turn == slope, kModes[m].slope, walk);
+      e.BeginUnitSum(turn, math::Masked(step * step * static_cast<float>(width), moves & math::MaskOf(walks)), slope);
+      int all = kNoSlices;
+      (void)e.StepSum(all);
+    }
+    const auto following = static_cast<std::uint32_t>(turn_[i] + 1) & math::MaskOf(turn_[i] + 1 < width);
+    turn_[i] = static_cast<std::uint8_t>((following & moves) | (turn_[i] & ~moves));
+  }
+
+  // x at positions [first, end), by weights of the members before; where `due` is zero it stays.
+  void MixMeans(int first, int end, const float (&share)[kMembers][kMembers], bool dense, std::uint32_t due) {
+    for (int p = first; p < end; ++p) {
+      if (dense && Columns::kAt.joint[p] >= 0) continue;
+      float before[kMembers];
+      for (int m = 0; m < kMembers; ++m) before[m] = member_[m].x(p);
+      for (int to = 0; to < kMembers; ++to)
+        member_[to].x(p) = math::Select(due != 0u, math::Dot(share[to], before, kMembers), before[to]);
+    }
+  }
+  // Computed with every sample, so that all cost the same; zero `due` changes nothing.
+  void Mix(std::uint32_t due) {
+    float share[kMembers][kMembers];
+    weights_.DenseShares(share);
+    MixMeans(0, Columns::kSize, share, true, due);
+    for (int i = 0; i < kJoints; ++i) {
+      weights_.Exchange(i, share, due);
+      MixMeans(Columns::kAt.first[i], Columns::kAt.front_end[i], share, false, due);
+    }
+  }
+
+  const Prior<Layout>* prior_ = nullptr;
+  Estimate member_[kMembers];
+  ModeWeights<kJoints, kMembers> weights_;
+  float row_[Columns::kSize] = {}, y_ = 0.0f;
+  int drifting_[kJoints] = {};
+  std::uint8_t turn_[kJoints] = {};
+  UpdateReport report_;
+  std::uint32_t moving_ = 0, samples_ = 0, floor_count_ = 0;
+  int joint_ = 0, at_ = 0;
+  bool begun_ = false;
+};
+
+}  // namespace armcal::filter

@@ -1,0 +1,58 @@
+# What must fail, one for each proof: a proof that cannot fail proves nothing.
+# must_fail(NAME REASON COMMAND...): passes if the command says why it failed.
+function(must_fail name reason)
+  add_test(NAME ${name} COMMAND ${ARGN} COMMAND_EXPAND_LISTS)
+  set_tests_properties(${name} PROPERTIES PASS_REGULAR_EXPRESSION "${reason}" SKIP_RETURN_CODE 77 LABELS target)
+endfunction()
+# An image as target_program makes it, but nobody checks it after the link.
+function(negative_program name)
+  add_executable(negative_${name} negative/${name}.cpp)
+  target_link_libraries(negative_${name} PRIVATE armcal_rules armcal_runner)
+endfunction()
+
+add_library(negative_malloc OBJECT negative/malloc.cpp)
+target_link_libraries(negative_malloc PRIVATE armcal_rules)
+target_include_directories(negative_malloc PRIVATE ${PROJECT_SOURCE_DIR})
+separate_arguments(link_flags NATIVE_COMMAND "${CMAKE_EXE_LINKER_FLAGS}")
+must_fail(Image_ThatTakesMemory_DoesNotLink "malloc is linked in"
+  ${CMAKE_CXX_COMPILER} ${link_flags} -L${PROJECT_SOURCE_DIR}/port/mps2 -T ${ARMCAL_BOARD}.ld -o malloc.elf
+  $<TARGET_OBJECTS:negative_malloc> $<TARGET_OBJECTS:armcal_runner>)
+
+negative_program(fpu_off)
+must_fail(Image_WithTheFpuOff_EndsWithNoCoprocessor "fault: CFSR 00080000\n.*ends with 99"
+  bash -c "\"$0\" \"$1\" \"$2\" || echo ends with $?" ${run} ${ARMCAL_BOARD} $<TARGET_FILE:negative_fpu_off>)
+
+if(core STREQUAL cortex-m4f)  # a Cortex-M7 computes doubles without a library; the sources are the same
+  negative_program(double)
+  must_fail(Image_WithADouble_FailsTheCheck "double arithmetic: .*__aeabi_dmul"
+    bash -c "cp \"$1\" double.elf && \"$0\" -DIMAGE=double.elf -DNM=\"$2\" -DOBJECTS=nowhere -P \"$3\"" ${CMAKE_COMMAND}
+    $<TARGET_FILE:negative_double> ${CMAKE_NM} ${PROJECT_SOURCE_DIR}/toolchains/check_image.cmake)
+endif()
+
+# Contraction is what would make target and PC differ first: the comparison has to see it.
+negative_program(contracted)
+target_link_libraries(negative_contracted PRIVATE target_rules)
+set_source_files_properties(negative/contracted.cpp PROPERTIES COMPILE_OPTIONS -ffp-contract=fast)  # the last word
+must_fail(Image_WithContraction_HasOtherBits "differ from the target's"
+  ${run} ${ARMCAL_BOARD} $<TARGET_FILE:negative_contracted> --same-as ${host_programs}/bits_kernels)
+
+add_library(negative_unbounded OBJECT negative/unbounded.cpp)
+target_link_libraries(negative_unbounded PRIVATE armcal_rules)
+set(unbounded $<TARGET_OBJECTS:negative_unbounded>)
+foreach(proof "Recursion:Odd:recursion. .*Odd.*Even.*Odd" "DataSizedFrame:DataSized:dynamic frame" "CallThroughAPointer:ThroughPointer:call through a pointer"
+              "FrameBeyondTheLimit:Deep:more than 512")
+  string(REPLACE ":" ";" proof ${proof})
+  list(GET proof 0 name)
+  list(GET proof 1 root)
+  list(GET proof 2 reason)
+  must_fail(Stack_${name}_IsFound "${reason}"
+    ${stack_check} --limit 512 --root " ${root}\\(" ${unbounded})
+endforeach()
+
+# budgets.py has to see a figure that depends on data, and one that rose.
+must_fail(Budgets_CountThatDependsOnData_IsFound "forgetting_60: instructions depend on the data"
+  bash -c "sed '/forgetting n 60/s/instructions_least [0-9]*/instructions_least 1/' \"$0\" >varying.txt && \"$@\" --json varying.json --bench varying.txt"
+  ${bench} ${budgets})
+must_fail(Budgets_FigureThatRose_IsNamed "forgetting_60: solve 1[0-9]+, was [0-9]+ .\\+"
+  bash -c "sed '/forgetting n 60/s/ solve / solve 1/' \"$0\" >risen.txt && \"$@\" --json risen.json --bench risen.txt" ${bench} ${budgets})
+set_tests_properties(Budgets_CountThatDependsOnData_IsFound Budgets_FigureThatRose_IsNamed PROPERTIES FIXTURES_REQUIRED bench)

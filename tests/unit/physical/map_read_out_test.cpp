@@ -1,0 +1,328 @@
+// physical - the read-out against the offline fit, dense algebra and the linear read-out; knows no filter.
+#include "armcal/physical/map_read_out.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "codegen/generated/er20_like/model.hpp"
+#include "host_sim/calibration/barrier_fit.hpp"
+#include "tests/unit/estimator/two_link_model.hpp"
+#include "tests/unit/physical/read_out_case.hpp"
+
+namespace armcal::physical {
+namespace {
+using namespace test;  // NOLINT: the bench of these tests
+using Six = generated::Er20Like;
+using Two = armcal::test::TwoLink;
+
+template <class Model>
+using ReadOut = MapReadOut<Model, double>;
+
+// A drawn truth, `size` times the prior's spread, and 300 rows of it. In prior units a row of `weight` says in each
+// column as much as the prior for 1, a million times more for 1000. What the truth says need not be physical.
+template <class Model>
+std::unique_ptr<Case<Model>> Draw(unsigned seed, double weight, double size) {
+  auto c = std::make_unique<Case<Model>>();
+  EXPECT_EQ(c->Build(), core::Status::kOk);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  const Eigen::SelfAdjointEigenSolver<Matrix> prior(Covariance(c->ud.data(), Model::kColumns));
+  const Vector z = Vector::NullaryExpr(Model::kColumns, [&] { return normal(random); });
+  const Vector root = prior.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Vector truth = size * prior.eigenvectors() * (root.asDiagonal() * z);
+  Matrix h(300, Model::kColumns);
+  for (int k = 0; k < Model::kColumns; ++k)
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c->image->prior.active[k] ? weight * normal(random) : 0;
+  c->Take(h, h * truth + Vector::NullaryExpr(h.rows(), [&] { return normal(random); }));
+  return c;
+}
+
+template <class Model>
+const typename ReadOut<Model>::Result& Solve(ReadOut<Model>& read_out, const Case<Model>& c, bool warm = false) {
+  EXPECT_EQ(c.HandOver(read_out, warm), core::Status::kOk);
+  while (!read_out.Step()) {
+  }
+  return read_out.result();
+}
+
+// Largest difference of two sets of bodies' central coordinates, in prior standard deviations.
+template <class Model>
+double Distance(const Case<Model>& c, const double* a, const double* b) {
+  double worst = 0;
+  for (int at = 0; at < Model::kBodyParameters; at += 11) {
+    double ca[11], cb[11];
+    ToCentral(a + at, ca);
+    ToCentral(b + at, cb);
+    ca[10] = a[at + 10], cb[10] = b[at + 10];
+    for (int k = 0; k < 11; ++k)
+      if (const double sd = c.work->rigid.sd[at + k]; sd > 0) worst = std::max(worst, std::abs(ca[k] - cb[k]) / sd);
+  }
+  return worst;
+}
+
+template <class Model>
+bool PhysicalInATable(const double* body) {
+  bool good = true;
+  for (int at = 0; at < Model::kBodyParameters; at += 11) {
+    float entry[11];
+    std::copy(body + at, body + at + 11, entry);
+    good &= IsPhysical(entry) && entry[10] >= 0;
+  }
+  return good;
+}
+
+// The offline method's own fit of the same information, made by dense inverses.
+calibration::BarrierFit Offline(const codegen::Model& model, const Case<Six>& c) {
+  calibration::BarrierProblem problem;
+  const int size = Six::kColumns;
+  std::vector<int> active;
+  for (int k = 0; k < size; ++k)
+    if (c.image->prior.active[k]) active.push_back(k);
+  const Vector scale = Eigen::Map<const Eigen::VectorXf>(c.image->scale, size).cast<double>();
+  const Matrix p = Covariance(c.ud.data(), size)(active, active),
+               p0 = Covariance(c.Before().data(), size)(active, active);
+  const Vector x = Eigen::Map<const Eigen::VectorXf>(c.x.data(), size).cast<double>()(active);
+  const Vector inverse = scale(active).cwiseInverse();
+  const Matrix information = p.inverse() - p0.inverse();
+  calibration::DataTerm at;  // about x = b0
+  at.gradient = Vector::Zero(size);
+  at.hessian = Matrix::Zero(size, size);
+  at.gradient(active) = -(inverse.asDiagonal() * (p.inverse() * x));
+  at.hessian(active, active) = inverse.asDiagonal() * information * inverse.asDiagonal();
+
+  problem.model = &model;
+  problem.bodies = Eigen::Map<const Eigen::VectorXf>(c.work->rigid.mean, 66).cast<double>();
+  problem.bodies_sd = Eigen::Map<const Eigen::VectorXf>(c.work->rigid.sd, 66).cast<double>();
+  problem.x = Eigen::Map<const Eigen::VectorXf>(c.image->committed.p, size).cast<double>();
+  problem.x_sd = scale;
+  problem.data = [at](const Vector&, bool) { return at; };
+  return calibration::FitWithBarrier(problem);
+}
+
+TEST(MapReadOut, OfAnyAmountOfData_IsTheOfflineFit) {
+  const codegen::Model model(codegen::ReadRobot("codegen/robots/er20_like.toml"),
+                             codegen::ReadCatalogue("codegen/effects"));
+  auto read_out = std::make_unique<ReadOut<Six>>();
+  for (const double weight : {0.03, 0.3, 3.0}) {
+    const auto c = Draw<Six>(11, weight, 0.5);
+    const auto& got = Solve(*read_out, *c);
+    const calibration::BarrierFit expected = Offline(model, *c);
+    ASSERT_TRUE(got.converged && expected.converged) << weight;
+    // The offline fit stops where 1e-7 of chi^2 is left: 3e-4 standard deviations.
+    EXPECT_LT(Distance(*c, got.body, expected.bodies.data()), 2e-3) << weight;
+    for (int k = 0; k < 66; ++k) EXPECT_NEAR(got.body_sd[k], expected.bodies_sd(k), 1e-3 * c->work->rigid.sd[k]) << k;
+    for (int k = 0; k < Six::kColumns; ++k) {
+      const double sd = std::sqrt(expected.covariance(k, k)), scale = c->image->scale[k];
+      EXPECT_NEAR(got.column[k], expected.x(k), 2e-3 * scale + 1e-5 * std::abs(expected.x(k))) << weight << " " << k;
+      EXPECT_NEAR(got.column_sd[k], sd, 1e-2 * sd) << weight << " " << k;
+    }
+  }
+}
+
+TEST(MapReadOut, WithoutData_IsThePriorCountedOnce) {
+  const auto c = Draw<Six>(1, 0, 0);
+  auto read_out = std::make_unique<ReadOut<Six>>();
+  const auto& got = Solve(*read_out, *c);
+  std::vector<double> mean(c->work->rigid.mean, c->work->rigid.mean + 66);
+  EXPECT_LT(Distance(*c, got.body, mean.data()), 0.02);  // the barrier's pull: eps / 2 of order 1
+  // Counted twice, the deviations would be smaller by sqrt(2).
+  for (int k = 0; k < 66; ++k) EXPECT_NEAR(got.body_sd[k], c->work->rigid.sd[k], 1e-3 * c->work->rigid.sd[k]) << k;
+  for (int k = 0; k < Six::kColumns; ++k)
+    EXPECT_NEAR(got.column_sd[k], c->image->scale[k], 1e-2 * c->image->scale[k]) << k;
+}
+
+TEST(MapReadOut, NearAPriorThatIsNarrow_IsTheLinearReadOut) {
+  Case<Six> c;
+  for (int k = 0; k < 66; ++k) c.table.parameter[k].sd *= 1e-3f;  // so that nothing bends and no border is near
+  ASSERT_EQ(c.Build(), core::Status::kOk);
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  Matrix h = Matrix::Zero(100, Six::kColumns);
+  for (int k = 0; k < Six::kColumns; ++k)
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c.image->prior.active[k] ? normal(random) : 0;
+  c.Take(h, Vector::NullaryExpr(h.rows(), [&] { return 10 * normal(random); }));
+  auto read_out = std::make_unique<ReadOut<Six>>();
+  const auto& got = Solve(*read_out, c);
+
+  auto linear = std::make_unique<estimator::RigidPrior<Six, double>>();
+  std::copy(c.work->rigid.mean, c.work->rigid.mean + 66, linear->mean);
+  std::copy(c.work->rigid.sd, c.work->rigid.sd + 66, linear->sd);
+  estimator::SpreadPrior(*linear);
+  estimator::FactorPrior(*linear);
+  std::vector<double> base(Six::kRigid), expected(66);
+  estimator::MapBodies<Six>(linear->mean, base.data());
+  for (int r = 0; r < Six::kRigid; ++r)
+    base[r] += static_cast<double>(c.image->scale[Six::kFront + r]) * c.x[Six::kFront + r];
+  estimator::ReadBodies(*linear, base.data(), expected.data());
+  EXPECT_LT(Distance(c, got.body, expected.data()), 0.01);
+}
+
+TEST(MapReadOut, OfAnyData_IsPhysical) {
+  auto read_out = std::make_unique<ReadOut<Six>>();
+  int converged = 0, draws = 0;
+  for (unsigned seed = 0; seed < 25; ++seed)
+    for (const double weight : {0.1, 1.0, 30.0, 1e4})
+      for (const double size : {0.3, 2.0}) {
+        const auto c = Draw<Six>(seed, weight, size);
+        const auto& got = Solve(*read_out, *c);
+        EXPECT_TRUE(PhysicalInATable<Six>(got.body)) << seed << " " << weight << " " << size;
+        // Data a thousand times sharper than the prior may stand for a body that cannot exist at any price.
+        if (weight > 1 || size > 1) continue;
+        converged += got.converged;
+        ++draws;
+      }
+  EXPECT_EQ(converged, draws);
+}
+
+TEST(MapReadOut, StartedWarm_EndsWhereAColdStartDoes) {
+  const auto c = Draw<Six>(5, 0.2, 0.7), later = Draw<Six>(5, 0.3, 0.7);
+  auto warm = std::make_unique<ReadOut<Six>>(), cold = std::make_unique<ReadOut<Six>>();
+  Solve(*warm, *c);
+  const auto& from_there = Solve(*warm, *later, true);
+  const auto& from_the_prior = Solve(*cold, *later);
+  EXPECT_LT(Distance(*c, from_there.body, from_the_prior.body), 1e-4);
+  EXPECT_LT(from_there.steps, from_the_prior.steps);
+}
+
+TEST(MapReadOut, WithAnotherBetweenItsSlicesAndAFilterThatGoesOn_GivesTheSameBits) {
+  const auto c = Draw<Six>(6, 0.2, 0.5), other = Draw<Six>(7, 0.2, 0.5);
+  auto alone = std::make_unique<ReadOut<Six>>(), first = std::make_unique<ReadOut<Six>>(),
+       second = std::make_unique<ReadOut<Six>>();
+  const auto& expected = Solve(*alone, *c);
+  ASSERT_EQ(c->HandOver(*first), core::Status::kOk);
+  ASSERT_EQ(other->HandOver(*second), core::Status::kOk);
+  std::fill(c->x.begin(), c->x.end(), 1e9f);
+  std::fill(c->ud.begin(), c->ud.end(), 1e9f);
+  bool done = false;
+  while (!done) {
+    done = first->Step();
+    second->Step();
+  }
+  for (int k = 0; k < 66; ++k) EXPECT_EQ(first->result().body[k], expected.body[k]) << k;
+  for (int k = 0; k < Six::kColumns; ++k) EXPECT_EQ(first->result().column_sd[k], expected.column_sd[k]) << k;
+}
+
+TEST(MapReadOut, FromAnotherFactorOfTheSameCovariance_IsTheSame) {
+  const auto c = Draw<Six>(8, 0.2, 0.5);
+  auto one = std::make_unique<ReadOut<Six>>(), two = std::make_unique<ReadOut<Six>>();
+  const auto& expected = Solve(*one, *c);
+  // Eigenvectors: columns in no order at all.
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(Covariance(c->ud.data(), Six::kColumns));
+  ASSERT_EQ(two->Begin(c->prior(), c->x.data()), core::Status::kOk);
+  for (int k = 0; k < Six::kColumns; ++k) {
+    const Eigen::VectorXf column = eigen.eigenvectors().col(k).cast<float>();
+    const double d = std::max(0.0, eigen.eigenvalues()(k));
+    ASSERT_EQ(two->AddSpread(static_cast<float>(d), column.data()), core::Status::kOk);
+  }
+  while (!two->Step()) {
+  }
+  // Eigenvectors rounded to float: 1e-7 of the largest variance, in the smallest one's inverse.
+  EXPECT_LT(Distance(*c, two->result().body, expected.body), 0.02);
+  for (int k = 0; k < Six::kColumns; ++k)
+    EXPECT_NEAR(two->result().column_sd[k], expected.column_sd[k], 0.01 * expected.column_sd[k]) << k;
+}
+
+// The objective as the header states it, in dense double algebra: all links' central coordinates, then the effects.
+double Objective(const Case<Two>& c, const Vector& t) {
+  constexpr int kDense = Two::kDense;
+  Vector body(22), w(kDense), rigid(7);
+  double cost = 0;
+  for (int at = 0; at < 22; at += 11) {
+    FromCentral(t.data() + at, body.data() + at);
+    body(at + 10) = t(at + 10);
+    const double* b = body.data() + at;
+    Eigen::Matrix4d j;
+    const double half = (b[4] + b[7] + b[9]) / 2;
+    j << half - b[4], -b[5], -b[6], b[1], -b[5], half - b[7], -b[8], b[2], -b[6], -b[8], half - b[9], b[3], b[1], b[2],
+        b[3], b[0];
+    cost -= 0.005 * (std::log(j.determinant()) + std::log(t(at + 10)));
+    double mean[11], central[11];
+    std::copy(c.work->rigid.mean + at, c.work->rigid.mean + at + 11, mean);
+    ToCentral(mean, central);
+    central[10] = mean[10];
+    for (int k = 0; k < 11; ++k) cost += 0.5 * std::pow((t(at + k) - central[k]) / c.work->rigid.sd[at + k], 2);
+  }
+  const Vector shift = body - Eigen::Map<const Eigen::VectorXf>(c.work->rigid.mean, 22).cast<double>();
+  estimator::MapBodies<Two>(shift.data(), rigid.data());
+  for (int r = 0; r < 7; ++r) w(r) = rigid(r) / c.image->scale[Two::kFront + r];
+  w(7) = t(22);
+  const Matrix p = Covariance(c.ud.data(), Two::kColumns).bottomRightCorner(kDense, kDense);
+  const Matrix p0 = Covariance(c.image->prior.dense_ud, 7);
+  const Vector d = w - Eigen::Map<const Eigen::VectorXf>(c.x.data() + Two::kFront, kDense).cast<double>();
+  return cost + 0.5 * d.dot(p.ldlt().solve(d)) - 0.5 * w.head(7).dot(p0.ldlt().solve(w.head(7)));
+}
+
+TEST(MapReadOut, WithAnEffectOfTheWholeArm_StandsWhereTheStatedObjectiveIsLeast) {
+  auto c = std::make_unique<Case<Two>>();
+  c->table.parameter[29].state = model::ParameterState::kEstimated;  // coupling friction
+  ASSERT_EQ(c->Build(), core::Status::kOk);
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  Matrix h = Matrix::Zero(60, Two::kColumns);
+  for (int k = 0; k < Two::kColumns; ++k)
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c->image->prior.active[k] ? 0.5 * normal(random) : 0;
+  c->Take(h, Vector::NullaryExpr(h.rows(), [&] { return 2 * normal(random); }));
+  ReadOut<Two> read_out;
+  const auto& got = Solve(read_out, *c);
+  ASSERT_TRUE(got.converged);
+
+  Vector t(23), size(23);
+  for (int at = 0; at < 22; at += 11) {
+    ToCentral(got.body + at, t.data() + at);
+    t(at + 10) = got.body[at + 10];
+    for (int k = 0; k < 11; ++k) size(at + k) = c->work->rigid.sd[at + k];
+  }
+  const int effect = Two::kFront + 7;
+  t(22) = (got.column[effect] - c->image->committed.p[effect]) / c->image->scale[effect];
+  size(22) = 1;
+  for (int k = 0; k < 23; ++k) {
+    const Vector step = 1e-3 * size(k) * Vector::Unit(23, k);
+    const double slope = (Objective(*c, t + step) - Objective(*c, t - step)) / 2e-3;
+    EXPECT_NEAR(slope, 0, 1e-3) << k;  // in chi^2 a prior standard deviation
+  }
+}
+
+TEST(MapReadOut, HeldParameters_KeepTheTablesValues) {
+  Case<Six> c;
+  for (const int k : {0, 12, 26, 40, 54, 65}) c.table.parameter[k].state = model::ParameterState::kFixed;
+  ASSERT_EQ(c.Build(), core::Status::kOk);
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  Matrix h = Matrix::Zero(100, Six::kColumns);
+  for (int k = 0; k < Six::kColumns; ++k)
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c.image->prior.active[k] ? 0.3 * normal(random) : 0;
+  c.Take(h, Vector::NullaryExpr(h.rows(), [&] { return normal(random); }));
+  auto read_out = std::make_unique<ReadOut<Six>>();
+  const auto& got = Solve(*read_out, c);
+  for (const int k : {0, 12, 26, 40, 54, 65}) {
+    double mean[11], body[11];
+    const int at = k / 11 * 11;
+    std::copy(c.work->rigid.mean + at, c.work->rigid.mean + at + 11, mean);
+    double expected[11], found[11];
+    ToCentral(mean, expected), expected[10] = mean[10];
+    std::copy(got.body + at, got.body + at + 11, body);
+    ToCentral(body, found), found[10] = body[10];
+    EXPECT_NEAR(found[k - at], expected[k - at], 1e-12 * std::abs(expected[k - at])) << k;
+    EXPECT_EQ(got.body_sd[k], 0) << k;
+  }
+}
+
+TEST(MapReadOut, RefusedInput_LeavesTheLastResult) {
+  const auto c = Draw<Six>(2, 0.2, 0.5);
+  auto read_out = std::make_unique<ReadOut<Six>>();
+  const std::vector<double> before(Solve(*read_out, *c).body, read_out->result().body + 66);
+  c->x[20] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(c->HandOver(*read_out), core::Status::kNotFinite);
+  c->x[20] = 0;
+  c->ud[math::UdIndex(30, 30)] = -1e-9f;
+  EXPECT_EQ(c->HandOver(*read_out), core::Status::kNotFinite);
+  c->ud[math::UdIndex(30, 30)] = 0.5f;
+  c->work->rigid.mean[0] = -1;
+  EXPECT_EQ(c->HandOver(*read_out), core::Status::kUnphysical);
+  EXPECT_TRUE(read_out->Step());
+  EXPECT_TRUE(std::equal(before.begin(), before.end(), read_out->result().body));
+}
+
+}  // namespace
+}  // namespace armcal::physical

@@ -1,0 +1,92 @@
+// physical - a filter's result made by dense double algebra from any amount of data; the tests' bench.
+#pragma once
+
+#include <Eigen/Dense>
+#include <memory>
+#include <random>
+
+#include "armcal/estimator/image.hpp"
+#include "armcal/physical/map_read_out.hpp"
+
+namespace armcal::physical::test {
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+// U D U' of a packed float factor, in double.
+inline Matrix Covariance(const float* ud, int n) {
+  Matrix u = Matrix::Identity(n, n);
+  Vector d(n);
+  for (int j = 0; j < n; ++j) {
+    d(j) = ud[math::UdIndex(j, j)];
+    for (int i = 0; i < j; ++i) u(i, j) = ud[math::UdIndex(i, j)];
+  }
+  return u * d.asDiagonal() * u.transpose();
+}
+
+// A table, and what a filter would say after rows of a made-up regressor; its rounding to float included.
+template <class Model>
+struct Case {
+  static constexpr int kColumns = Model::kColumns;
+  estimator::Table<Model> table = estimator::DefaultTable<Model>();
+  std::unique_ptr<estimator::ImageWork<Model>> work = std::make_unique<estimator::ImageWork<Model>>();
+  std::unique_ptr<estimator::Image<Model>> image = std::make_unique<estimator::Image<Model>>();
+  std::vector<float> x = std::vector<float>(kColumns), ud = std::vector<float>(math::UdSize(kColumns));
+
+  core::Status Build() {
+    const core::Status status = estimator::BuildImage<Model>(table, 1, *work, *image);
+    ud = Before();
+    std::fill(x.begin(), x.end(), 0.0f);
+    return status;
+  }
+  // The prior's factor of all columns.
+  std::vector<float> Before() const {
+    std::vector<float> whole(math::UdSize(kColumns));
+    for (int k = 0; k < Model::kFront; ++k) whole[math::UdIndex(k, k)] = image->prior.active[k] ? 1.0f : 0.0f;
+    for (int j = 0; j < Model::kDense; ++j)
+      for (int i = 0; i <= j; ++i)
+        whole[math::UdIndex(Model::kFront + i, Model::kFront + j)] = image->prior.dense_ud[math::UdIndex(i, j)];
+    return whole;
+  }
+  // Rows h' x = y of variance 1 in prior units, by Bierman's update in double.
+  void Take(const Matrix& h, const Vector& y) {
+    std::vector<double> factor(ud.begin(), ud.end());
+    Vector mean = Eigen::Map<Eigen::VectorXf>(x.data(), kColumns).cast<double>();
+    for (int r = 0; r < h.rows(); ++r) {
+      const Vector row = h.row(r);
+      Vector gain = Vector::Zero(kColumns);
+      double alpha = 1;
+      for (int j = 0; j < kColumns; ++j) {
+        double* u = factor.data() + math::UdIndex(0, j);
+        const double d = u[j];
+        u[j] = 1;
+        Eigen::Map<Vector> column(u, j + 1);
+        const double f = column.dot(row.head(j + 1)), next = alpha + d * f * f;
+        const Vector before = column;
+        column.head(j) -= f / alpha * gain.head(j);
+        gain.head(j + 1) += d * f * before;
+        u[j] = d * alpha / next;
+        alpha = next;
+      }
+      mean += gain * ((y(r) - row.dot(mean)) / alpha);
+    }
+    for (std::size_t k = 0; k < ud.size(); ++k) ud[k] = static_cast<float>(factor[k]);
+    for (int k = 0; k < kColumns; ++k) x[k] = static_cast<float>(mean(k));
+  }
+  MapPrior<Model> prior() const {
+    return {work->rigid.mean, work->rigid.sd, image->committed.p, image->scale, image->prior.dense_ud};
+  }
+  template <class ReadOut>
+  core::Status HandOver(ReadOut& out, bool warm = false) const {
+    core::Status status = out.Begin(prior(), x.data(), warm);
+    for (int j = 0; j < kColumns && core::IsOk(status); ++j) {
+      float column[kColumns] = {};
+      for (int i = 0; i < j; ++i) column[i] = ud[math::UdIndex(i, j)];
+      column[j] = 1;
+      status = out.AddSpread(ud[math::UdIndex(j, j)], column);
+    }
+    return status;
+  }
+};
+
+}  // namespace armcal::physical::test

@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""toolchains - what filters and regressors cost on a core: a table, the same as JSON, and a failure when a figure has risen.
+
+  budgets.py --core NAME --bench TEXT --budgets TOML --json OUT --size PROGRAM --objects LIST
+
+Instructions come from the bench that ran on the emulated board, bytes of code from the objects, stack from their call graphs
+(toolchains/stack.py); the bench's painted stack must not be deeper. Figures are compared with the core's accepted ones in
+TOML and with its limits; a message names the figure, and for accepted ones the line to put into TOML.
+"""
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import stack
+
+FILTER_KEYS = ["instructions", "solve", "read_out", "slice_max", "slice_min", "text_bytes", "state_bytes", "stack_bytes"]
+REGRESSOR_KEYS = ["instructions", "text_bytes", "stack_bytes"]
+ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "slice_min", "state_bytes"]
+READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "state_bytes", "stack_bytes"]
+NOT_THE_FILTERS = re.compile(r"Get_|Calls|MakeParts|\.rodata.*\.str")  # the bench's own part of an object
+
+
+def read_bench(path):
+    """Lines "kind name key value key value ..." as dictionaries."""
+    rows = []
+    for line in Path(path).read_text(encoding="utf-8").splitlines():
+        kind, name, *pairs = line.split()
+        rows.append({"kind": kind, "name": name} | {k: int(v) for k, v in zip(pairs[::2], pairs[1::2])})
+    return rows
+
+
+def text_bytes(size, file):
+    """Code and constants of an object."""
+    listing = subprocess.run([size, "-A", file], check=True, capture_output=True, text=True).stdout
+    sections = re.findall(r"^(\.(?:text|rodata)\S*)\s+(\d+)", listing, re.MULTILINE)
+    return sum(int(count) for name, count in sections if not NOT_THE_FILTERS.search(name))
+
+
+def stack_bytes(file, root, faults):
+    try:
+        return stack.deepest(stack.Calls([file]), [root])[0]
+    except stack.Unbounded as why:
+        faults.append(f"{Path(file).stem}: {why}")
+        return -1
+
+
+def measure(rows, objects, size, faults):
+    """The rows of the JSON file, by kind."""
+    by_name = {Path(o).name.split(".")[0]: o for o in objects}
+    figures = {"filters": [], "regressors": [], "estimators": [], "read_outs": []}
+    for row in rows:
+        if row["kind"] == "estimator":
+            figures["estimators"].append({"estimator": row["name"]} | {k: row[k] for k in ESTIMATOR_KEYS})
+            continue
+        if row["kind"] == "read_out":
+            figures["read_outs"].append({"read_out": row["name"]} | {k: row[k] for k in READ_OUT_KEYS})
+            continue
+        is_filter = row["kind"] == "filter"
+        name = f"{row['name']}_{row['n']}" if is_filter else f"regressor_{row['name']}"
+        file = by_name[name]
+        for key in [k for k in row if k.endswith("_least")]:
+            most = row[key.removesuffix("_least")]
+            if most != row[key]:
+                faults.append(f"{name}: {key.removesuffix('_least')} depend on the data: {row[key]} to {most}")
+        deep = stack_bytes(file, r"Instance<.*>::" if is_filter else r"::Evaluate\(", faults)
+        if row["painted_bytes"] > deep >= 0:
+            faults.append(f"{name}: painted stack {row['painted_bytes']} bytes, deeper than the bound {deep}")
+        measured = {key: row[key] for key in ["n", "n_front", *FILTER_KEYS, *REGRESSOR_KEYS] if key in row}
+        kind, title = ("filters", "filter") if is_filter else ("regressors", "robot")
+        figures[kind].append({title: row["name"]} | measured | {"text_bytes": text_bytes(size, file), "stack_bytes": deep})
+    return figures
+
+
+def label(row):
+    if "filter" in row:
+        return f"{row['filter']}_{row['n']}"
+    return row.get("robot") or row.get("estimator") or row["read_out"]
+
+
+def compare(rows, keys, accepted, limits, section, rise, faults):
+    """Fails on a risen figure, a figure above its limit, and one that nobody accepted."""
+    lines = []
+    for row in rows:
+        name, known = label(row), accepted.get(label(row), {})
+        line = f"{name} = {{ " + ", ".join(f"{k} = {row[k]}" for k in keys) + " }"
+        if not known:
+            faults.append(f"{name}: no accepted figures")
+        for key in keys:
+            now, before, most = row[key], known.get(key), limits.get(name, {}).get(key)
+            if before is not None and key != "slice_min" and now > before * (1 + rise):
+                faults.append(f"{name}: {key} {now}, was {before} (+{100 * (now / before - 1):.1f} %)")
+            if most is not None and now > most:
+                faults.append(f"{name}: {key} {now}, limit {most}")
+        ratio = limits.get(name, {}).get("slice_ratio")
+        if ratio is not None and row["slice_max"] > ratio * row["slice_min"]:
+            faults.append(f"{name}: slices of {row['slice_min']} to {row['slice_max']}, limit 1 : {ratio}")
+        if any(known.get(k) != row[k] for k in keys):
+            lines.append(line)
+    if gone := sorted(set(accepted) - {label(row) for row in rows}):
+        print(f"\naccepted under [{section}], but not measured: {', '.join(gone)}")
+    if lines:
+        print(f"\nnot as accepted in toolchains/budgets.toml; the lines now, under [{section}]:")
+        print("\n".join(lines))
+
+
+def grid(rows, columns):
+    """Text of a table; columns: title, width, how to format, what to show (a key, or a function of the row)."""
+    lines = ["".join(f"{title:>{width}}" if k else f"{title:{width}}" for k, (title, width, _, _) in enumerate(columns))]
+    for row in rows:
+        shown = [(show(row) if callable(show) else row[show], width, form) for _, width, form, show in columns]
+        lines.append("".join(f"{value:{width}{form}}" for value, width, form in shown))
+    return "\n".join(lines) + "\n"
+
+
+def tables(figures, core, budgets):
+    clock, rate, cpi = budgets["clock_MHz"][core], budgets["sample_rate_Hz"], budgets["cycles_per_instruction"][core]
+    share = ("share", 8, ".2%", lambda row: row["instructions"] * cpi * rate / (clock * 1e6))
+    slices = [("slice", 8, "", "slice_max"), ("least", 8, "", "slice_min")]
+    text, state, stack_ = ("text", 7, "", "text_bytes"), ("state", 7, "", "state_bytes"), ("stack", 7, "", "stack_bytes")
+    whole = (f"{core}: instructions of a sample (six rows) or a call, bytes; share of {clock} MHz at {rate} samples/s, "
+             f"ESTIMATED with {cpi} cycles an instruction\n")
+    whole += grid(figures["filters"], [
+        ("filter", 14, "", "filter"), ("n", 4, "", "n"), ("front", 6, "", "n_front"), ("instr.", 9, "", "instructions"),
+        share, ("solve", 8, "", "solve"), ("read-out", 9, "", "read_out"), *slices, text, state, stack_])
+    whole += grid(figures["regressors"], [
+        ("regressor", 24, "", "robot"), ("instr.", 9, "", "instructions"), share, text, stack_])
+    whole += grid(figures["estimators"], [
+        ("estimator, er20_like", 24, "", "estimator"), ("tick", 8, "", "push"), ("longest", 9, "", "push_max"),
+        ("sample", 9, "", "sample"), *slices, state])
+    if figures["read_outs"]:
+        whole += grid(figures["read_outs"], [
+            ("physical read-out", 24, "", "read_out"), ("instr.", 10, "", "instructions"), ("slices", 8, "", "slices"),
+            slices[0], ("hand-over", 11, "", "hand_over"), state, stack_])
+    return whole
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name in ["core", "bench", "budgets", "json", "size", "objects"]:
+        parser.add_argument("--" + name, required=True)
+    options = parser.parse_args()
+    budgets = tomllib.loads(Path(options.budgets).read_text(encoding="utf-8"))
+    faults = []
+    objects = Path(options.objects).read_text(encoding="utf-8").split()
+    figures = measure(read_bench(options.bench), objects, options.size, faults)
+    Path(options.json).write_text(json.dumps({"core": options.core, **figures}, indent=1) + "\n", encoding="utf-8")
+    text = tables(figures, options.core, budgets)
+    Path(options.json).with_suffix(".txt").write_text(text, encoding="utf-8")
+    print(text)
+    accepted, rise = budgets.get(options.core, {}), budgets["rise"]
+    for kind, keys in ("filters", FILTER_KEYS), ("regressors", REGRESSOR_KEYS), ("estimators", ESTIMATOR_KEYS), \
+            ("read_outs", READ_OUT_KEYS):
+        compare(figures[kind], keys, accepted.get(kind, {}), budgets["limits"], f"{options.core}.{kind}", rise, faults)
+    for fault in faults:
+        print(f"over budget: {fault}", file=sys.stderr)
+    return int(bool(faults))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -19,6 +19,14 @@ struct Fault {
   std::string wrong;  // what stands there instead
 };
 
+inline toml::table Parse(const std::string& path) {
+  try {
+    return toml::parse_file(path);
+  } catch (const toml::parse_error& e) {
+    throw std::runtime_error(path + ":" + std::to_string(e.source().begin.line) + ": " + std::string(e.description()));
+  }
+}
+
 // A fault's number is its place, from 1, rooms by name. Throws with one line for a reader.
 inline std::vector<Fault> ReadFaults(const std::string& folder) {
   std::vector<std::filesystem::path> lists;
@@ -27,8 +35,10 @@ inline std::vector<Fault> ReadFaults(const std::string& folder) {
   std::sort(lists.begin(), lists.end());
   std::vector<Fault> faults;
   for (const std::filesystem::path& list : lists) {
-    const toml::table root = toml::parse_file(list.string());
-    for (const toml::node& node : *root["fault"].as_array()) {
+    const toml::table root = Parse(list.string());
+    const toml::array* entries = root["fault"].as_array();
+    if (entries == nullptr) throw std::runtime_error(list.string() + ": holds no [[fault]]");
+    for (const toml::node& node : *entries) {
       const toml::table& table = *node.as_table();
       const auto text = [&](const char* key) {
         const auto value = table[key].value<std::string>();

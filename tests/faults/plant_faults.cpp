@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <sstream>
 
 #include "tests/faults/fault_list.hpp"
@@ -32,26 +33,35 @@ std::string Switch(const Fault& fault, std::size_t number) {
   return "(" + planted + " ? (" + fault.wrong + ") : (" + fault.right + "))";
 }
 
-// Places are looked up before anything is replaced: a fault never hits the text of another.
-std::string Plant(const std::string& source, const std::string& file, const std::vector<Fault>& faults) {
+// Places are looked up before anything is replaced: a fault never hits the text of another. What is wrong with a fault
+// is a line on stderr, and the answer false.
+bool Plant(const std::string& file, const std::vector<Fault>& faults, std::string& source) {
   std::map<std::size_t, std::size_t> at;  // place -> fault
+  bool good = true;
+  const auto refuse = [&](const Fault& fault, const char* why) {
+    std::cerr << "plant_faults: \"" << fault.name << "\": " << why << " in " << file << "\n";
+    good = false;
+  };
   for (std::size_t k = 0; k < faults.size(); ++k) {
     if (faults[k].file != file) continue;
     const std::size_t place = source.find(faults[k].right);
     if (place == source.npos || source.find(faults[k].right, place + 1) != source.npos)
-      throw std::runtime_error("fault \"" + faults[k].name + "\": its text is not found exactly once in " + file);
-    if (!at.emplace(place, k).second)
-      throw std::runtime_error("fault \"" + faults[k].name + "\": another one has the same place in " + file);
+      refuse(faults[k], "its text is not found exactly once");
+    else if (!at.emplace(place, k).second) refuse(faults[k], "it shares its place with another one");
   }
-  if (at.empty()) return source;
+  if (at.empty()) return good;
   std::string copy = "#include \"tests/faults/planted.hpp\"\n";
   std::size_t done = 0;
   for (const auto& [place, k] : at) {
-    if (place < done) throw std::runtime_error("fault \"" + faults[k].name + "\": lies inside another in " + file);
+    if (place < done) {
+      refuse(faults[k], "it lies inside another one");
+      continue;
+    }
     copy += source.substr(done, place - done) + Switch(faults[k], k + 1);
     done = place + faults[k].right.size();
   }
-  return copy + source.substr(done);
+  source = copy + source.substr(done);
+  return good;
 }
 
 }  // namespace
@@ -60,14 +70,17 @@ int main(int argc, char** argv) try {
   if (argc != 4) throw std::runtime_error("usage: plant_faults FAULTS LIB COPY");
   const std::vector<Fault> faults = armcal::faults::ReadFaults(argv[1]);
   const fs::path lib = fs::path(argv[2]) / "armcal", copy = fs::path(argv[3]) / "armcal";
+  bool good = true;
   for (const Fault& fault : faults)
-    if (!fs::exists(lib / fault.file)) throw std::runtime_error("fault \"" + fault.name + "\": no file " + fault.file);
+    if (!fs::exists(lib / fault.file)) throw std::runtime_error("\"" + fault.name + "\": there is no " + fault.file);
   for (const auto& entry : fs::recursive_directory_iterator(lib)) {
     if (!entry.is_regular_file()) continue;
     const std::string file = fs::relative(entry.path(), lib).string();
-    Write(copy / file, Plant(Read(entry.path()), file, faults));
+    std::string text = Read(entry.path());
+    good &= Plant(file, faults, text);
+    Write(copy / file, text);
   }
-  return 0;
+  return good ? 0 : 1;
 } catch (const std::exception& e) {
   std::cerr << "plant_faults: " << e.what() << "\n";
   return 1;

@@ -52,6 +52,7 @@ class Estimator {
   // the model's time. Context: background.
   void Adopt(const Image<Model>& image, std::uint32_t adopted_tick) {
     image_ = &image;
+    stands_ = false;
     filter_.Restart(image.prior);
     estimates_ = Estimates<Model>{};
     estimates_.generation = image.committed.generation;

@@ -1,8 +1,6 @@
 // estimator - what a table brings into force, and when; knows no filter's inside.
 #include <gtest/gtest.h>
 
-#include <cstring>
-
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
 #include "tests/unit/estimator/motion.hpp"
@@ -39,8 +37,18 @@ TYPED_TEST(Adoption, AtAnyPointOfASample_StartsAsIfNothingHadBeen) {
     }
     Estimates<TwoLink> a = this->host->Read(), b = this->other->Read();
     a.stale = b.stale = 0;  // the one that waited may have been dropped
-    EXPECT_EQ(std::memcmp(&a, &b, sizeof a), 0) << pieces;
+    EXPECT_EQ(Bits(a), Bits(b)) << pieces;
   }
+}
+
+TYPED_TEST(Adoption, LeavesNoReadOutOfTheTableBefore) {
+  Motion run;
+  ASSERT_EQ(this->host->Adopt(1), Status::kOk);
+  for (int k = 0; k < 20; ++k) ASSERT_EQ(this->host->Feed(run.Next()), Status::kOk);
+  this->host->Read();
+  EXPECT_NE(this->host->estimator.read_out(), nullptr);
+  ASSERT_EQ(this->host->Adopt(2), Status::kOk);
+  EXPECT_EQ(this->host->estimator.read_out(), nullptr);
 }
 
 TYPED_TEST(Adoption, TorqueScaleOfTheTable_MultipliesTheMeasuredTorque) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cstring>
 #include <memory>
 #include <vector>
 
@@ -144,6 +145,14 @@ struct Oracle {
     }
   }
 };
+
+// Every bit of a result.
+template <class T>
+std::vector<unsigned char> Bits(const T& result) {
+  std::vector<unsigned char> bytes(sizeof result);
+  std::memcpy(bytes.data(), &result, sizeof result);
+  return bytes;
+}
 
 // An estimator with its image, fed sample by sample until idle, as a host does.
 template <class Model, class Filter>

@@ -1,0 +1,151 @@
+// estimator - rest, partial motion and a picked-up load, on a small and on a six-axis arm; knows no filter's inside.
+#include <gtest/gtest.h>
+
+#include "armcal/filter/forgetting_filter.hpp"
+#include "armcal/filter/kalman_filter.hpp"
+#include "codegen/generated/er20_like/model.hpp"
+#include "tests/unit/estimator/moving_arm.hpp"
+#include "tests/unit/estimator/two_link_model.hpp"
+
+namespace armcal::estimator {
+namespace {
+using namespace test;  // NOLINT: the bench of these tests
+using core::Status;
+using SixAxis = generated::Er20Like;
+using armcal::test::TwoLink;
+
+constexpr int kPerSecond = 125;
+
+template <class ModelType, class FilterType>
+struct Case {
+  using Model = ModelType;
+  using Filter = FilterType;
+};
+
+template <class Case>
+struct Change : testing::Test {
+  using Arm = MovingArm<typename Case::Model>;
+  using Drive = Host<typename Case::Model, typename Case::Filter>;
+  std::unique_ptr<Drive> host = std::make_unique<Drive>();
+  Arm arm;
+  void SetUp() override { ASSERT_EQ(host->Adopt(), Status::kOk); }
+  void Feed(int samples, std::uint32_t moving = Arm::kAll) {
+    for (int k = 0; k < samples; ++k) ASSERT_EQ(host->Feed(arm.Next(moving)), Status::kOk);
+  }
+};
+using Cases =
+    testing::Types<Case<TwoLink, filter::ForgettingFilter<TwoLink>>, Case<TwoLink, filter::KalmanFilter<TwoLink>>,
+                   Case<SixAxis, filter::ForgettingFilter<SixAxis>>, Case<SixAxis, filter::KalmanFilter<SixAxis>>>;
+TYPED_TEST_SUITE(Change, Cases);
+
+// The table's friction is a quarter off; the hour shows torque anywhere in the friction band.
+TYPED_TEST(Change, AfterAnHourOfRest_FrictionIsRightToATenthWithinTenSeconds) {
+  using Model = typename TypeParam::Model;
+  this->host->estimator.SetPublishEvery(1u << 30);
+  std::vector<typename MovingArm<Model>::Sample> rest;
+  for (int k = 0; k < 1000; ++k) rest.push_back(this->arm.Next(0));
+  for (int k = 0; k < 3600 * kPerSecond; ++k) ASSERT_EQ(this->host->Feed(rest[k % rest.size()]), Status::kOk);
+  this->Feed(10 * kPerSecond);
+  const Estimates<Model>& e = this->host->Read();
+  for (int i = 0; i < Model::kJoints; ++i) EXPECT_LT(this->arm.FrictionError(e.value, i), 0.1) << i;
+}
+
+// All joints, then for ten minutes the last half of them alone.
+TYPED_TEST(Change, OfTheLastJointsAlone_LeavesTheFrictionOfTheOthers) {
+  using Model = typename TypeParam::Model;
+  this->Feed(60 * kPerSecond);
+  const Estimates<Model> before = this->host->Read();
+  constexpr int kResting = Model::kJoints / 2;
+  this->Feed(600 * kPerSecond, MovingArm<Model>::kAll & ~((1u << kResting) - 1u));
+  const Estimates<Model>& after = this->host->Read();
+  for (int i = 0; i < kResting; ++i) {
+    EXPECT_EQ(after.rows_used[i], before.rows_used[i]);
+    for (int k = Model::kFrontBegin[i]; k < Model::kFrontBegin[i + 1]; ++k) {
+      if (!MovingArm<Model>::Estimated(k)) continue;
+      EXPECT_LT(std::abs(after.value[k] / before.value[k] - 1), 0.01) << k;
+    }
+  }
+}
+
+// Exponential forgetting in double, in every sample, whatever moves: normal equations, and the prior at the read-out.
+template <class Model>
+struct PlainForgetting {
+  Matrix information = Matrix::Zero(Model::kColumns, Model::kColumns);
+  Vector right = Vector::Zero(Model::kColumns);
+  Matrix prior;
+  const Image<Model>& image;
+  explicit PlainForgetting(const Table<Model>& table, const Image<Model>& i) : image(i) {
+    prior = PriorCovariance<Model>(table);
+  }
+  void Add(const model::Sample<Model::kJoints>& s, const Vector& b0, double lambda) {
+    const Matrix y = Regressor<Model>(s);
+    for (int i = 0; i < Model::kJoints; ++i) {
+      if ((s.flags[i] & model::kMoving) == 0) continue;
+      const Vector h = y.row(i).transpose() / image.sigma_Nm[i];
+      information += h * h.transpose();
+      right += h * ((s.tau[i] - y.row(i) * b0) / image.sigma_Nm[i]);
+    }
+    information *= lambda;
+    right *= lambda;
+  }
+  Vector Solve(const Vector& b0) const {
+    // (P^-1 + A)^-1 r = P (1 + A P)^-1 r, so that a column without prior variance stays.
+    const Matrix a = Matrix::Identity(Model::kColumns, Model::kColumns) + information * prior;
+    return b0 + prior * a.partialPivLu().solve(right);
+  }
+};
+
+// Noise-free torque error over two seconds of motion, in the table's noise, all joints together.
+template <class Model>
+double TorqueError(MovingArm<Model> arm, const Image<Model>& image, const Vector& value) {
+  double sum = 0;
+  for (int k = 0; k < 2 * kPerSecond; ++k) {
+    const Matrix y = Regressor<Model>(arm.Next());
+    for (int i = 0; i < Model::kJoints; ++i) sum += std::pow(y.row(i).dot(value - arm.truth) / image.sigma_Nm[i], 2);
+  }
+  return std::sqrt(sum / (2 * kPerSecond * Model::kJoints));
+}
+
+template <class Model>
+struct Load : testing::Test {};
+using Models = testing::Types<TwoLink, SixAxis>;
+TYPED_TEST_SUITE(Load, Models);
+
+TYPED_TEST(Load, PickedUpInMotion_IsLearnedAsFastAsByPlainForgetting) {
+  using Model = TypeParam;
+  constexpr float kLambda = 0.998f;  // four seconds
+  auto host = std::make_unique<Host<Model, filter::ForgettingFilter<Model>>>();
+  for (float& lambda : host->table.forgetting) lambda = kLambda;
+  ASSERT_EQ(host->Adopt(), Status::kOk);
+  const Vector b0 = host->b0();
+  PlainForgetting<Model> plain(host->table, host->image);
+  MovingArm<Model> arm;
+  constexpr std::uint32_t kLast = arm.kAll & ~((1u << Model::kJoints / 2) - 1u);
+  const auto move = [&](int seconds, std::uint32_t moving) {
+    for (int k = 0; k < seconds * kPerSecond; ++k) {
+      const auto s = arm.Next(moving);
+      ASSERT_EQ(host->Feed(s), Status::kOk);
+      plain.Add(s, b0, kLambda);
+    }
+  };
+  const auto gated_error = [&] {
+    const Eigen::VectorXf value = Eigen::Map<const Eigen::VectorXf>(host->Read().value, Model::kColumns);
+    return TorqueError<Model>(arm, host->image, value.template cast<double>());
+  };
+  move(30, arm.kAll);
+  move(20, kLast);  // what rests forgets nothing, which must not make it slow afterwards
+  move(10, arm.kAll);
+  const double before = gated_error();
+  arm.PickUp(10);
+  EXPECT_GT(gated_error(), 10 * before);
+  double gated = 0, ungated = 0;
+  for (int second = 0; second < 30; ++second) {
+    move(1, arm.kAll);
+    gated += gated_error();
+    ungated += TorqueError<Model>(arm, host->image, plain.Solve(b0));
+  }
+  EXPECT_LT(gated, 1.1 * ungated);
+}
+
+}  // namespace
+}  // namespace armcal::estimator

@@ -51,6 +51,8 @@ class HostPort {
     while (!bodies_->Step()) {
     }
   }
+  // Changes of the parameters are larger than the table's deviations allow.
+  bool prior_too_narrow() const { return estimator::PriorIsTooNarrow(*bodies_); }
   const BodyReadOut::Result& bodies() const { return bodies_->result(); }
   const estimator::Table<Model>& table() const { return table_; }
   estimator::Estimates<Model> a, b;

@@ -46,6 +46,8 @@ nlohmann::ordered_json Json(const codegen::Model& m, const HostPort& port) {
                            {"value", port.bodies().body[k]},
                            {"sd", port.bodies().body_sd[k]}});
   j["bodies_converged"] = port.bodies().converged;
+  j["inconsistent"] = port.b.inconsistent;
+  j["prior_too_narrow"] = port.prior_too_narrow();
   j["samples"] = port.a.samples;
   return j;
 }
@@ -58,6 +60,11 @@ void PrintBodies(const HostPort& port) {
   for (int k = 0; k < Model::kBodyParameters; ++k)
     fmt::print("{:16} {:14.6g} {:14.6g} {:12.3g}\n", Model::kInfo[k].name, port.table().parameter[k].mean,
                port.bodies().body[k], port.bodies().body_sd[k]);
+  if (port.b.inconsistent)
+    fmt::print("The torque holds more than the model and its stated noise: every sd is too small.\n");
+  if (port.prior_too_narrow())
+    fmt::print(
+        "The parameters moved further than the table's deviations allow: what the data hardly tell is less certain.\n");
 }
 
 // Live: the table in force, then every sample from now on until the drive has been silent for idle_ms.

@@ -94,6 +94,8 @@ OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, c
 
 std::string Name(OnlineFilter filter) { return filter == OnlineFilter::kKalman ? "Kalman" : "forgetting"; }
 
+bool CompiledFor(const codegen::Model& model) { return calibration::DefaultTable(model).schema == Arm::kSchema; }
+
 bool Moves(double speed_radps, const codegen::Joint& joint) { return std::abs(speed_radps) > joint.v_min_radps; }
 
 OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm,

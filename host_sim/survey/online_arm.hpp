@@ -15,8 +15,11 @@ struct OnlineResult {
   bool inconsistent = false;          // monitor::Consistency, or estimator::PriorIsTooNarrow
 };
 
+// The estimator is compiled for one arm: true if this is its model.
+bool CompiledFor(const codegen::Model& model);
+
 // prior: its table is where the filter starts, with sigma_Nm of a sample's row. Rows below a joint's v_min are left
-// out, as on a drive. io::InputError: the robot file is not the one that the estimator was compiled for.
+// out, as on a drive. io::InputError: another arm, or a prior whose bodies cannot exist.
 OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset& log, const Eigen::VectorXd& sigma_Nm,
                          OnlineFilter filter);
 

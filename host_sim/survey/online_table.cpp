@@ -123,6 +123,11 @@ void ShowOnline(const Settings& settings, const Motions& motions, Findings& out)
        "estimated, too. Coverage: share of base and friction parameters inside their 95 % interval.",
        "base error: torque on another trajectory, truth against estimate; Cramer-Rao: the least that the same rows "
        "allow without a prior."}};
+  if (!CompiledFor(truth.model)) {
+    sheet.notes = {"The estimator in this program is compiled for er20_like."};
+    out.sheets.push_back(sheet);
+    return;
+  }
   for (const Protocol& protocol : protocols) {
     const std::vector<Drawn> drawn = RunProtocol(settings, truth, protocol);
     if (settings.Stopped()) return;
@@ -140,6 +145,15 @@ void ShowOnline(const Settings& settings, const Motions& motions, Findings& out)
                           Cell(base.mean, base.low, base.high), base.mean / bound, Mean(scores, &Score::coverage),
                           Over(scores, &Score::physical).mean, inconsistent / count, converged / count,
                           Over(scores, &Score::seconds).p95});
+    if (protocol.error.kind != PriorError::kWorst || protocol.told != 1) continue;
+    const std::string where = "online, " + Name(protocol.filter) + ", " + protocol.name + ": ";
+    out.goals.push_back({where + "mean e_d", e_d.mean, 0.19, true});
+    out.goals.push_back({where + "95th percentile of e_d", e_d.p95, 0.19, true});
+    out.goals.push_back({where + "mean e_d / e_d(prior)", Over(scores, &Score::e_d_over_prior).mean, 0.9, true});
+    out.goals.push_back({where + "mean e_f", Over(scores, &Score::e_f).mean, 0.02, true});
+    out.goals.push_back({where + "mean J_e", Over(scores, &Score::J_e).mean, 0.25, true});
+    out.goals.push_back({where + "share of draws with physical bodies", Over(scores, &Score::physical).mean, 1, false});
+    out.goals.push_back({where + "base error over Cramer-Rao", base.mean / bound, 1.15, true});
   }
   out.sheets.push_back(sheet);
 }

@@ -46,11 +46,11 @@ core::Status BeginPhysical(const Image<Model>& image, const RigidPrior<Model, fl
 }
 
 // From a finished read-out: the parameters have moved further than the table's deviations allow, so what the data
-// hardly tell is less certain than it says. Of tables that are right, one in 10 000 is called so, or less. Context:
+// hardly tell is less certain than it says. Of tables that are right, one in a thousand is called so, or less. Context:
 // background.
 template <class Model, class T>
 bool PriorIsTooNarrow(const physical::MapReadOut<Model, T>& read_out) {
-  constexpr float kSigmas = 3.719f;  // of the normal distribution, for one in 10 000
+  constexpr float kSigmas = 3.09f;  // of the normal distribution, for one in a thousand
   const auto& r = read_out.result();
   const float learned = math::Max(static_cast<float>(r.learned), 1.0f);
   return static_cast<float>(r.moved) > monitor::ChiSquareLimit(learned, kSigmas);

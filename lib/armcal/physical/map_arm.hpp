@@ -19,17 +19,35 @@ class MapArm {
  public:
   static constexpr int kBodies = Layout::kBodyParameters, kLinks = Layout::kJoints, kBlock = kBodies / kLinks;
   static constexpr int kRotor = kBlock - 1, kFree = kBodies + Layout::kDense - Layout::kRigid;
-  // Of the trace of S about the link origin: twice what IsPhysical asks for, so that a table in float32 passes, too.
+  // Of the trace of S about the link origin: twice what IsPhysical asks for, so that a table in float32 passes it.
   static constexpr T kMargin = T(2) * T(kPivotMargin);
   using Point = MapPoint<Layout, T>;
   static_assert(kBlock == 11, "a link has ten parameters about its origin, and a rotor inertia");
 
-  void Start(const MapPrior<Layout>& prior) { prior_ = prior; }
+  // False: a body of the prior cannot exist, or a rotor inertia is zero and uncertain. A body that stands near the
+  // border gets a smaller margin.
+  bool Start(const MapPrior<Layout>& prior) {
+    prior_ = prior;
+    bool inside = true;
+    for (int link = 0; link < kLinks; ++link) {
+      const float* body = prior.body + link * kBlock;
+      T mean[kBlock], central[kBlock];
+      for (int k = 0; k < kBlock; ++k) mean[k] = T(body[k]);
+      ToCentral(mean, central);
+      T margin = kMargin * (mean[4] + mean[7] + mean[9]) * T(0.5);
+      for (int halved = 0; halved < 10; ++halved)
+        margin *= ConeDeterminant(central, T(2) * margin) > T(0) ? T(1) : T(0.5);
+      margin_[link] = margin;
+      const bool turns = body[kRotor] > 0.0f || !(sd(link * kBlock + kRotor) > T(0));
+      inside &= turns && IsPhysical(body) && ConeDeterminant(central, margin) > T(0);
+    }
+    return inside;
+  }
   const MapPrior<Layout>& prior() const { return prior_; }
   T sd(int k) const { return k < kBodies ? T(prior_.body_sd[k]) : T(1); }
 
-  // point.u -> bodies. False: outside the cone.
-  bool Place(Point& point) const {
+  // point.u -> bodies.
+  void Place(Point& point) const {
     for (int link = 0; link < kLinks; ++link) {
       T mean[kBlock];
       for (int k = 0; k < kBlock; ++k) mean[k] = T(prior_.body[link * kBlock + k]);
@@ -39,8 +57,6 @@ class MapArm {
       for (int k = 0; k < kBlock; ++k) central[k] += sd(link * kBlock + k) * point.u[link * kBlock + k];
     }
     ToOrigins(point);
-    T barrier = T(0);
-    return AddBarrierChange(point, point, barrier);
   }
 
   // to = from + share of `step` [kFree] in u, straight in the bodies about their origins (see Move).
@@ -63,7 +79,7 @@ class MapArm {
     bool inside = true;
     for (int link = 0; link < kLinks; ++link) {
       const int at = link * kBlock, rotor = at + kRotor;
-      const T margin = Margin(link);
+      const T margin = margin_[link];
       T now = ConeDeterminant(to.central + at, margin), before = ConeDeterminant(from.central + at, margin);
       if (sd(rotor) > T(0)) now *= to.central[rotor], before *= from.central[rotor];
       inside &= now > T(0) && IsPhysical(to.body + at);
@@ -109,17 +125,12 @@ class MapArm {
       return point.u[k] - weight * inverse;
     }
     T second[10];
-    const T first = BarrierDerivatives(central, Margin(k / kBlock), own, second);
+    const T first = BarrierDerivatives(central, margin_[k / kBlock], own, second);
     for (int i = 0; i <= own; ++i) column[at + i] += weight * second[i] * sd(at + i);
     return point.u[k] + weight * first;
   }
 
  private:
-  T Margin(int link) const {
-    const float* body = prior_.body + link * kBlock;
-    return kMargin * (T(body[4]) + T(body[7]) + T(body[9])) * T(0.5);
-  }
-
   static void ToOrigins(Point& point) {
     for (int at = 0; at < kBodies; at += kBlock) {
       FromCentral(point.central + at, point.body + at);
@@ -128,6 +139,7 @@ class MapArm {
   }
 
   MapPrior<Layout> prior_ = {};
+  T margin_[kLinks] = {};
 };
 
 }  // namespace armcal::physical

@@ -34,20 +34,17 @@ class MapReadOut {
   using Result = MapResult<Layout, T>;
 
   // x [kColumns]: the filter's mean in prior units, its prior inside. warm: start at the last solution and the last
-  // eps; the prior is the same. kUnphysical: a body of the prior cannot exist, or hardly (MapArm::kMargin). kNotFinite:
-  // x. When refused, the object is as before.
+  // eps; the prior is the same. kUnphysical: see MapArm::Start. kNotFinite: x. When refused, the object is as before.
   core::Status Begin(const MapPrior<Layout>& prior, const float* x, bool warm = false) {
     bool good = true;
     for (int k = 0; k < kColumns; ++k) good &= math::IsFinite(x[k]);
     if (!good) return core::Status::kNotFinite;
-    for (int at = 0; at < kBodies; at += Arm::kBlock)
-      if (!IsPhysical(prior.body + at)) return core::Status::kUnphysical;
     Arm arm;
-    arm.Start(prior);
-    for (T& u : trial_.u) u = T(0);
-    if (!arm.Place(trial_)) return core::Status::kUnphysical;
+    if (!arm.Start(prior)) return core::Status::kUnphysical;
 
     arm_ = arm;
+    for (T& u : trial_.u) u = T(0);
+    arm_.Place(trial_);
     warm_ = warm && result_.converged;
     for (int k = 0; k < kColumns; ++k) x_[k] = T(x[k]);
     for (T& u : ud_) u = T(0);

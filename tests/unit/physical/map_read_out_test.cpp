@@ -126,6 +126,8 @@ TEST(MapReadOut, WithoutData_IsThePriorCountedOnce) {
   const auto& got = Solve(*read_out, *c);
   std::vector<double> mean(c->work->rigid.mean, c->work->rigid.mean + 66);
   EXPECT_LT(Distance(*c, got.body, mean.data()), 0.02);  // the barrier's pull: eps / 2 of order 1
+  EXPECT_NEAR(got.learned, 0, 0.01);
+  EXPECT_NEAR(got.moved, 0, 0.01);
   // Counted twice, the deviations would be smaller by sqrt(2).
   for (int k = 0; k < 66; ++k) EXPECT_NEAR(got.body_sd[k], c->work->rigid.sd[k], 1e-3 * c->work->rigid.sd[k]) << k;
   for (int k = 0; k < Six::kColumns; ++k)
@@ -173,6 +175,35 @@ TEST(MapReadOut, OfAnyData_IsPhysical) {
         ++draws;
       }
   EXPECT_EQ(converged, draws);
+}
+
+TEST(MapReadOut, OfATableWithABodyAtTheBorder_IsPhysical) {
+  // Link 3 loses what keeps its largest moment below the sum of the others, as far as a table may.
+  Case<Six> c;
+  double central[10], body[10];
+  for (int k = 0; k < 10; ++k) body[k] = c.table.parameter[22 + k].mean;
+  ToCentral(body, central);
+  const auto put = [&](double product) {
+    central[5] = product;
+    FromCentral(central, body);
+    for (int k = 0; k < 10; ++k) body[k] = c.table.parameter[22 + k].mean = static_cast<float>(body[k]);
+    return c.Build() == core::Status::kOk && IsPhysical(body);  // by the table's rounding, and without
+  };
+  double inside = central[5], outside = 0.5;
+  ASSERT_TRUE(put(inside));
+  ASSERT_FALSE(put(outside));
+  for (int k = 0; k < 60; ++k) (put((inside + outside) / 2) ? inside : outside) = (inside + outside) / 2;
+  ASSERT_TRUE(put(inside));
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  Matrix h = Matrix::Zero(100, Six::kColumns);
+  for (int k = 0; k < Six::kColumns; ++k)
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c.image->prior.active[k] ? 0.3 * normal(random) : 0;
+  c.Take(h, Vector::NullaryExpr(h.rows(), [&] { return normal(random); }));
+  auto read_out = std::make_unique<ReadOut<Six>>();
+  const auto& got = Solve(*read_out, c);
+  EXPECT_TRUE(PhysicalInATable<Six>(got.body));
+  EXPECT_TRUE(got.converged);
 }
 
 TEST(MapReadOut, StartedWarm_EndsWhereAColdStartDoes) {
@@ -318,6 +349,10 @@ TEST(MapReadOut, RefusedInput_LeavesTheLastResult) {
   c->ud[math::UdIndex(30, 30)] = -1e-9f;
   EXPECT_EQ(c->HandOver(*read_out), core::Status::kNotFinite);
   c->ud[math::UdIndex(30, 30)] = 0.5f;
+  const float rotor = c->work->rigid.mean[10];
+  c->work->rigid.mean[10] = 0;  // and uncertain
+  EXPECT_EQ(c->HandOver(*read_out), core::Status::kUnphysical);
+  c->work->rigid.mean[10] = rotor;
   c->work->rigid.mean[0] = -1;
   EXPECT_EQ(c->HandOver(*read_out), core::Status::kUnphysical);
   EXPECT_TRUE(read_out->Step());

@@ -216,7 +216,7 @@ class ForgettingFilter {
     float* row = estimate.row();
     for (int p = at[column]; p < kColumns; ++p) row[p] = 0.0f;
     row[at[column]] = 1.0f;
-    int joint = -1, k = column + 1;
+    int joint = Layout::kJoints, k = column + 1;
     if (column < Layout::kFront) {
       joint = JointOf(column);
       for (; k < Layout::kFrontBegin[joint + 1]; ++k) row[at[k]] = *stored++;

@@ -101,8 +101,9 @@ class KalmanFilter {
   void BeginEnd(std::uint32_t moving) {
     floor_count_ += HoldFloor(*prior_, estimate_);
     if (turns_ == 0) return;
-    const int p = turn_[next_turn_], joint = Columns::kAt.joint[p];
-    const std::uint32_t all = (1u << Layout::kJoints) - 1u, needed = joint >= 0 ? 1u << joint : all;
+    const int p = turn_[next_turn_];
+    const std::uint32_t all = (1u << Layout::kJoints) - 1u,
+                        needed = Columns::IsFront(p) ? 1u << Columns::kAt.joint[p] : all;
     const float noise = prior_->noise[Columns::kAt.column[p]] * static_cast<float>(turns_);
     estimate_.BeginUnitSum(p, math::Masked(noise, math::MaskOf((moving & needed) == needed)), LastOf(p));
     const int following = next_turn_ + 1 < turns_ ? next_turn_ + 1 : 0;
@@ -151,7 +152,7 @@ class KalmanFilter {
 
   // A sum starts at the last column that may have a turn, whoever's turn it is: the same instructions each time.
   int LastOf(int p) const {
-    return form == Form::kBlock ? Columns::kAt.front_end[static_cast<int>(Columns::kAt.joint[p])] - 1 : last_noise_;
+    return form == Form::kBlock ? Columns::kAt.front_end[Columns::kAt.joint[p]] - 1 : last_noise_;
   }
 
   const Prior<Layout>* prior_ = nullptr;

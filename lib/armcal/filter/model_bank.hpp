@@ -165,8 +165,7 @@ class ModelBank {
   static constexpr int kPredictCost = kMembers * 100;
 
   float WeightAt(int p, int m) const {
-    const int joint = Columns::kAt.joint[p];
-    return joint >= 0 ? weights_.at(joint, m) : weights_.dense(m);
+    return Columns::IsFront(p) ? weights_.at(Columns::kAt.joint[p], m) : weights_.dense(m);
   }
   float MeanAt(int p) const {
     float sum = 0.0f;
@@ -214,7 +213,7 @@ class ModelBank {
   // x at positions [first, end), by weights of the members before; where `due` is zero it stays.
   void MixMeans(int first, int end, const float (&share)[kMembers][kMembers], bool dense, std::uint32_t due) {
     for (int p = first; p < end; ++p) {
-      if (dense && Columns::kAt.joint[p] >= 0) continue;
+      if (dense && Columns::IsFront(p)) continue;
       float before[kMembers];
       for (int m = 0; m < kMembers; ++m) before[m] = member_[m].x(p);
       for (int to = 0; to < kMembers; ++to)

@@ -36,7 +36,7 @@ struct Order {
   struct Tables {
     std::uint8_t column[kSize] = {};      // at a position of the factor
     std::uint8_t position[kSize] = {};    // of a column
-    std::int8_t joint[kSize] = {};        // of the front column at a position; -1: dense
+    std::uint8_t joint[kSize] = {};       // of the front column at a position; kJoints: a dense one
     std::uint8_t begin[kSize] = {};       // first stored row of the column at a position
     std::uint16_t start[kSize + 1] = {};  // where its elements [begin, position] are stored, D last
     std::uint8_t first[kJoints] = {};     // position of a joint's first front column, and of its row's first element
@@ -47,10 +47,10 @@ struct Order {
       for (int d = 0; d <= Layout::kDense; ++d) {
         for (int i = 0; i < kJoints; ++i)
           if (Layout::kRowBegin[i] == d) at = PlaceFront(i, at);
-        if (d < Layout::kDense) at = Place(Layout::kFront + d, -1, at, 0);
+        if (d < Layout::kDense) at = Place(Layout::kFront + d, kJoints, at, 0);
       }
       if (beside == Beside::kEta)
-        for (int e = 0; e < kMore; ++e) at = Place(Layout::kColumns + e, -1, at, 0);
+        for (int e = 0; e < kMore; ++e) at = Place(Layout::kColumns + e, kJoints, at, 0);
       for (int p = 0; p < kSize; ++p) start[p + 1] = static_cast<std::uint16_t>(start[p] + p - begin[p] + 1);
     }
 
@@ -66,7 +66,7 @@ struct Order {
     constexpr int Place(int k, int i, int at, int top) {
       column[at] = static_cast<std::uint8_t>(k);
       position[k] = static_cast<std::uint8_t>(at);
-      joint[at] = static_cast<std::int8_t>(i);
+      joint[at] = static_cast<std::uint8_t>(i);
       begin[at] = static_cast<std::uint8_t>(top);
       return at + 1;
     }
@@ -77,9 +77,10 @@ struct Order {
 
   // Where the rows of a column's elements are counted from: element (i, p) is at kOrigin + i.
   static constexpr int Origin(int p) { return kAt.start[p] - kAt.begin[p]; }
+  static constexpr bool IsFront(int p) { return kAt.joint[p] != kJoints; }
   // In the block form the front column at p has nothing in the row of another joint.
   static constexpr bool Skips(int p, int row_joint) {
-    return form == Form::kBlock && kAt.joint[p] >= 0 && kAt.joint[p] != row_joint;
+    return form == Form::kBlock && IsFront(p) && kAt.joint[p] != row_joint;
   }
 };
 

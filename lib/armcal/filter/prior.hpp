@@ -60,7 +60,7 @@ std::uint32_t HoldFloor(const Prior<Layout>& prior, Estimate& estimate) {
   using Columns = typename Estimate::Columns;
   std::uint32_t held = 0;
   for (int p = 0; p < Columns::kSize; ++p) {
-    if (Columns::kAt.joint[p] >= 0) continue;
+    if (Columns::IsFront(p)) continue;
     const float floor = math::Masked(prior.link_floor, prior.active[Columns::kAt.column[p]]);
     held += estimate.d(p) < floor;
     estimate.d(p) = math::Max(estimate.d(p), floor);

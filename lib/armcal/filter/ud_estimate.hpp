@@ -4,9 +4,8 @@
 // Turner, 1972 (rank-one sum). A row of zeros leaves every bit as it was, so that a masked row is a row of zeros; the
 // instructions are the same whatever the numbers are.
 //
-// A slice spends `credit`, in elements of a column (eight instructions), and stops before the next column (or two,
-// worked on as one) once none is left; what it owes is taken off the next slice. Context: background; between slices
-// anything may happen but another call of the same object.
+// Slices (slices.hpp) end between two columns; between slices anything may happen but another call of the same object.
+// Context: background.
 #pragma once
 
 #include "armcal/filter/order.hpp"
@@ -55,13 +54,11 @@ class UdEstimate {
   float* row() { return row_; }  // room for a row h, by positions
 
   // The row y = h' x + noise of `variance` > 0; h as filled in from `first` on, zero before. In the block form `joint`
-  // is the one whose front columns it touches (-1: none). gate_sigma > 0: an innovation beyond changes no bit.
+  // is the one whose front columns it touches (kJoints: none). gate_sigma > 0: an innovation beyond changes no bit.
   void BeginRow(int first, int joint, float y, float variance, float gate_sigma) {
-    first_ = first;
-    joint_ = joint;
+    first_ = first, joint_ = joint;
     innovation_ = y - math::Dot(row_ + first, x_ + first, kSize - first);
-    alpha_ = variance;
-    sum_ = variance;
+    alpha_ = sum_ = variance;
     gate_sigma_ = gate_sigma;
     for (float& g : gain_) g = 0.0f;
     next_ = kSize - 1;
@@ -83,19 +80,18 @@ class UdEstimate {
   float variance() const { return sum_; }           // h' P h + noise, before the row
   bool inside() const { return taken_ != 0u; }      // the gate
 
-  static constexpr int SumCost(int last) {
+  static constexpr int SumCost(int last) {  // of BeginUnitSum
     int cost = 0;
     for (int p = Order::kAt.begin[last]; p <= last; ++p) cost += FoldCost(p - Order::kAt.begin[p]);
     return cost;
   }
-  // P + c e e', c >= 0, e the unit vector of position p <= last; in the block form a front column's, with last = p.
-  // The instructions depend on `last` alone.
+  // P + c e e', c >= 0, e the unit vector of position p <= last; in the block form both in one joint's front. `last`
+  // alone decides the instructions.
   void BeginUnitSum(int p, float c, int last) {
     for (int k = Order::kAt.begin[last]; k <= last; ++k) row_[k] = 0.0f;
     row_[p] = 1.0f;
     BeginSum(c, last);
   }
-  // True: done.
   bool StepSum(int& credit) {
     float c = alpha_;
     int p = next_;
@@ -111,8 +107,7 @@ class UdEstimate {
       c *= math::Select(some != 0u, old * inverse, 1.0f);
       credit -= FoldCost(p - begin);
     }
-    alpha_ = c;
-    next_ = p;
+    alpha_ = c, next_ = p;
     if (p < first_) stage_ = Stage::kIdle;
     return p < first_;
   }
@@ -144,13 +139,11 @@ class UdEstimate {
 
   // The next position that the row touches, after or before p.
   static int Above(int p, int joint) {
-    do ++p;
-    while (p < kSize && Order::Skips(p, joint));
+    for (++p; p < kSize && Order::Skips(p, joint);) p = Order::kAt.front_end[Order::kAt.joint[p]];
     return p;
   }
   static int Below(int p, int first, int joint) {
-    do --p;
-    while (p >= first && Order::Skips(p, joint));
+    for (--p; p >= first && Order::Skips(p, joint);) p = Order::kAt.first[Order::kAt.joint[p]] - 1;
     return p;
   }
 

@@ -6,8 +6,9 @@
 #include <cstring>
 #include <limits>
 
+#include "armcal/filter/extended_kalman_filter.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
-#include "armcal/filter/kalman_filter.hpp"
+#include "armcal/filter/model_bank.hpp"
 #include "tests/unit/estimator/motion.hpp"
 
 namespace armcal::estimator {
@@ -194,6 +195,23 @@ TYPED_TEST(Both, SamplesOfAnOlderTable_AreDropped) {
   EXPECT_EQ(e.stale, 5u);
 }
 
+TYPED_TEST(Both, AnyBudget_GivesTheSameBits) {
+  auto other = std::make_unique<Host<TwoLink, TypeParam>>();
+  ASSERT_EQ(this->host->Adopt(), Status::kOk);
+  ASSERT_EQ(other->Adopt(), Status::kOk);
+  int calls = 0;
+  for (int k = 0; k < 300; ++k) {
+    const Sample s = this->run.Next();
+    ASSERT_EQ(this->host->Feed(s), Status::kOk);
+    ASSERT_EQ(other->estimator.PushSample(s), Status::kOk);
+    for (; other->estimator.Step(1); ++calls) {
+    }
+  }
+  EXPECT_GT(calls, 300 * 20);  // every column or two stood alone
+  const Estimates<TwoLink>&a = this->host->Read(), &b = other->Read();
+  EXPECT_EQ(std::memcmp(&a, &b, sizeof a), 0);
+}
+
 TYPED_TEST(Both, PublishesByItselfEverySoManySamples) {
   ASSERT_EQ(this->host->Adopt(), Status::kOk);
   this->host->Drain();
@@ -205,6 +223,25 @@ TYPED_TEST(Both, PublishesByItselfEverySoManySamples) {
   ASSERT_TRUE(this->host->estimator.Take(this->host->estimates));
   EXPECT_EQ(this->host->estimates.samples, 50u);
   EXPECT_EQ(this->host->estimates.tick, 49u * 8u);
+}
+
+// What a form cannot hold is said before it is adopted.
+TEST(Forms, BlockAndBankRefuseNoiseOnSharedColumns_TheOthersDoNot) {
+  Table<TwoLink> table = DefaultTable<TwoLink>();
+  auto work = std::make_unique<ImageWork<TwoLink>>();
+  auto image = std::make_unique<Image<TwoLink>>();
+  using Block = Estimator<TwoLink, KalmanFilter<TwoLink, filter::Form::kBlock>>;
+  using Bank = Estimator<TwoLink, filter::ModelBank<TwoLink>>;
+  ASSERT_EQ(BuildImage<TwoLink>(table, 1, *work, *image), Status::kOk);
+  EXPECT_TRUE(Block::Suits(*image));
+  EXPECT_TRUE(Bank::Suits(*image));
+  table.parameter[29].state = model::ParameterState::kEstimated;  // coupling friction, on both joints
+  table.parameter[29].process_noise = 1e-6f;
+  ASSERT_EQ(BuildImage<TwoLink>(table, 1, *work, *image), Status::kOk);
+  EXPECT_FALSE(Block::Suits(*image));
+  EXPECT_FALSE(Bank::Suits(*image));
+  EXPECT_TRUE((Estimator<TwoLink, KalmanFilter<TwoLink>>::Suits(*image)));
+  EXPECT_TRUE((Estimator<TwoLink, ForgettingFilter<TwoLink>>::Suits(*image)));
 }
 
 }  // namespace

@@ -65,22 +65,25 @@ TEST_F(Mixture, EachMembersColumn_TakesItsSlope_AndTheirCovariancesWithAllOthers
 }
 
 TEST_F(Mixture, ReadOut_HasTheMeanAndVarianceOfTheMembersTogether) {
+  double apart = 0;
   for (int s = 0; s < 1020; ++s) {
-    if (s == 1000) bench.truth(kDrifting) += 1;  // some follow at once, some do not
+    if (s == 1000) bench.truth(kDrifting) += 0.1;  // some follow at once, some do not
     Rows();
     filter.EndSample(kAll);
+    if (s < 1000) continue;
+    const Filter::ReadOut out = Read(filter);
+    double mean = 0, square = 0, within = 0;
+    for (int m = 0; m < Filter::kMembers; ++m) {
+      const double weight = filter.weight(2, m), x = At(m, kDrifting), variance = Covariance(m)(kDrifting, kDrifting);
+      mean += weight * x;
+      within += weight * variance;
+      square += weight * (variance + x * x);
+    }
+    EXPECT_NEAR(out.x[kDrifting], mean, 1e-6);
+    EXPECT_NEAR(out.sd[kDrifting] * out.sd[kDrifting] / (square - mean * mean), 1, 2e-3);
+    apart = std::max(apart, (square - mean * mean) / within);
   }
-  const Filter::ReadOut out = Read(filter);
-  double mean = 0, square = 0, within = 0;
-  for (int m = 0; m < Filter::kMembers; ++m) {
-    const double weight = filter.weight(2, m), x = At(m, kDrifting), variance = Covariance(m)(kDrifting, kDrifting);
-    mean += weight * x;
-    within += weight * variance;
-    square += weight * (variance + x * x);
-  }
-  EXPECT_NEAR(out.x[kDrifting], mean, 1e-6);
-  EXPECT_NEAR(out.sd[kDrifting] * out.sd[kDrifting] / (square - mean * mean), 1, 1e-3);
-  EXPECT_GT(square - mean * mean, 1.01 * within);  // or the test would show nothing
+  EXPECT_GT(apart, 1.1);  // or the test would show nothing
 }
 
 }  // namespace

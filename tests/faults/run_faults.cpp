@@ -70,7 +70,7 @@ int main(int argc, char** argv) try {
   for (std::size_t k = 0; k < faults.size(); ++k) {
     if (only != 0 && only != k + 1) continue;
     bad += caught[k].empty();
-    fmt::print("{:3} {:11} {:66} {}\n", k + 1, faults[k].room, faults[k].name,
+    fmt::print("{:3} {:11} {:70} {}\n", k + 1, faults[k].room, faults[k].name,
                caught[k].empty() ? "SURVIVES" : caught[k]);
   }
   fmt::print("{} faults, {}\n", only == 0 ? faults.size() : 1, bad == 0 ? "all caught" : "NOT all caught");

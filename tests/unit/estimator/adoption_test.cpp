@@ -18,13 +18,14 @@ struct Adoption : testing::Test {
 using Filters = testing::Types<filter::ForgettingFilter<TwoLink>, filter::KalmanFilter<TwoLink>>;
 TYPED_TEST_SUITE(Adoption, Filters);
 
-// However far the work on a sample, its rows or a read-out has come.
-TYPED_TEST(Adoption, AtAnyPointOfASample_StartsAsIfNothingHadBeen) {
-  for (int pieces = 1; pieces < 20; ++pieces) {
+// However far the work on a sample, its rows or (every second time) a read-out has come.
+TYPED_TEST(Adoption, AtAnyPointOfTheWork_StartsAsIfNothingHadBeen) {
+  for (int pieces = 1; pieces < 500; pieces += 7) {
     Motion run;
     ASSERT_EQ(this->host->Adopt(static_cast<std::uint32_t>(2 * pieces)), Status::kOk);
     for (int k = 0; k < 20; ++k) ASSERT_EQ(this->host->Feed(run.Next()), Status::kOk);
     ASSERT_EQ(this->host->estimator.PushSample(run.Next()), Status::kOk);
+    if (pieces % 2 == 0) this->host->estimator.RequestReadOut();
     for (int piece = 0; piece < pieces; ++piece) static_cast<void>(this->host->estimator.Step(1));
     const std::uint32_t generation = static_cast<std::uint32_t>(2 * pieces + 1);
     ASSERT_EQ(this->host->Adopt(generation), Status::kOk);

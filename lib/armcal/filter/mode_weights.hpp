@@ -13,6 +13,7 @@ class ModeWeights {
   void Restart() {
     for (int i = 0; i < kJoints; ++i)
       for (int m = 0; m < kMembers; ++m) weight_[i][m] = 1.0f / kMembers, log_likelihood_[i][m] = 0.0f;
+    Average();
   }
 
   // A row of the joint, whitened; one that is not used says nothing.
@@ -36,6 +37,16 @@ class ModeWeights {
       for (int m = 0; m < kMembers; ++m)
         weight_[i][m] = math::Select((moving >> i & 1u) != 0u, next[m] / sum, weight_[i][m]);
     }
+    Average();
+  }
+
+  // Of the joints' weights, for what all of them see. Once after Exchange of all joints.
+  void Average() {
+    for (int m = 0; m < kMembers; ++m) {
+      float sum = 0.0f;
+      for (const auto& joint : weight_) sum += joint[m];
+      dense_[m] = sum / kJoints;
+    }
   }
 
   // A mode may have changed: share[to][from] of what member `to` goes on with. The joint's weights move with it unless
@@ -47,17 +58,11 @@ class ModeWeights {
   }
   // The same for what all joints see.
   void DenseShares(float (&share)[kMembers][kMembers]) const {
-    float weight[kMembers];
-    for (int m = 0; m < kMembers; ++m) weight[m] = dense(m);
-    for (int to = 0; to < kMembers; ++to) (void)Shares(weight, to, share[to]);
+    for (int to = 0; to < kMembers; ++to) (void)Shares(dense_, to, share[to]);
   }
 
   float at(int joint, int member) const { return weight_[joint][member]; }
-  float dense(int member) const {  // mean over the joints
-    float sum = 0.0f;
-    for (const auto& joint : weight_) sum += joint[member];
-    return sum / kJoints;
-  }
+  float dense(int member) const { return dense_[member]; }  // mean over the joints
 
  private:
   static constexpr float kStay = 0.995f;  // probability that a mode lasts from one exchange to the next
@@ -73,7 +78,7 @@ class ModeWeights {
     return sum;
   }
 
-  float weight_[kJoints][kMembers] = {}, log_likelihood_[kJoints][kMembers] = {};
+  float weight_[kJoints][kMembers] = {}, log_likelihood_[kJoints][kMembers] = {}, dense_[kMembers] = {};
 };
 
 }  // namespace armcal::filter

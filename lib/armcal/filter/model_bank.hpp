@@ -246,6 +246,7 @@ class ModelBank {
       weights_.Exchange(i, share, due);
       MixMeans(Columns::kAt.first[i], Columns::kAt.front_end[i], share, false, due);
     }
+    weights_.Average();
   }
 
   const Prior<Layout>* prior_ = nullptr;

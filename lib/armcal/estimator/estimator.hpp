@@ -16,8 +16,8 @@
 
 namespace armcal::estimator {
 
-// Filter: filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>, filter::ExtendedKalmanFilter<Model>,
-// the last two in either form.
+// Filter: filter::ForgettingFilter<Model>, filter::ModelBank<Model>, filter::KalmanFilter<Model>,
+// filter::ExtendedKalmanFilter<Model>, the last two in either form.
 // Push and PushSample belong to the tick (use one of the two), everything else to the background.
 template <class Model, class Filter>
 class Estimator {

@@ -58,11 +58,13 @@ endfunction()
 # The test executables labelled fast: what the sanitizer build makes.
 add_custom_target(fast_tests)
 
-# armcal_test(NAME SOURCES ... [LIBS ...] [LABELS fast|all|long]): one GoogleTest executable, one CTest entry.
+# armcal_test(NAME SOURCES ... [LIBS ...] [LABELS fast|all|long]): one GoogleTest executable, one CTest entry. Tests are
+# many, and nearly all take longer to compile than to run: optimised little.
 function(armcal_test name)
   cmake_parse_arguments(A "" "LABELS;TIMEOUT" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${A_SOURCES})
   target_link_libraries(${name} PRIVATE armcal_host_rules ${A_LIBS} GTest::gtest_main)
+  target_compile_options(${name} PRIVATE -O1)
   add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   if(NOT A_LABELS)
     set(A_LABELS fast)

@@ -15,11 +15,11 @@ class Survey : public testing::Test {
     folder_ = FreshFolder("survey");
     run_ = Tool({"survey",
                  "--draws",
-                 "6",
+                 "3",
                  "--slow-draws",
                  "1",
                  "--search-seconds",
-                 "6",
+                 "3",
                  "--table",
                  "5",
                  "--table",

@@ -49,7 +49,7 @@ VectorXd Step(const Problem& problem, const VectorXd& z, const Linearised& K, co
     const MatrixXd middle = spread + MatrixXd::Identity(M.rows(), M.cols());
     covariance = L * (inverse * middle * inverse.transpose()) * L.transpose();
   } else {
-    const Eigen::BDCSVD<MatrixXd> svd(M, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
     const VectorXd s = svd.singularValues();
     VectorXd reciprocal(s.size());
     for (Eigen::Index k = 0; k < s.size(); ++k) reciprocal[k] = s[k] > kUnseen * s[0] ? 1 / s[k] : 0;

@@ -42,7 +42,8 @@ Solution Solve(const Problem& problem, const char* name, bool weighted) {
   // K = Q R, so K^+ tau = R^+ Q' tau, and R is small.
   const Eigen::HouseholderQR<MatrixXd> qr(A);
   const MatrixXd triangle = qr.matrixQR().topRows(count + 1).triangularView<Eigen::Upper>();
-  const Eigen::JacobiSVD<MatrixXd> svd(triangle.topLeftCorner(count, count), Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner> svd(triangle.topLeftCorner(count, count),
+                                                                  Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double limit = Threshold(sigma.size(), count) * svd.singularValues()[0];
   VectorXd inverse = svd.singularValues();
   for (double& s : inverse) s = s > limit ? 1 / s : 0;

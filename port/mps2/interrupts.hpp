@@ -6,7 +6,7 @@
 extern "C" {
 [[noreturn]] void Application();  // the application's: after reset, for good
 void TickInterrupt();             // the application's: SysTick
-void SerialInterrupt();           // uart.cpp: UART1 has received
+void SerialInterrupt();           // the application's: UART1 has received
 [[noreturn]] void Fault();        // fault.cpp: any fault, and an interrupt that nobody serves
 }
 

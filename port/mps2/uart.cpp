@@ -1,8 +1,7 @@
-// mps2 - the CMSDK UART's registers and the serial interrupt; knows no frame.
+// mps2 - the CMSDK UART's registers and what its interrupt does; knows no frame.
 #include "port/mps2/uart.hpp"
 
 #include "armcal/core/sample_ring.hpp"
-#include "port/mps2/interrupts.hpp"
 
 namespace armcal::port::mps2 {
 namespace {
@@ -45,13 +44,12 @@ void StartUart1(std::uint32_t baud) {
 
 Serial Uart1() { return {nullptr, Read, Write}; }
 
-}  // namespace armcal::port::mps2
-
-extern "C" void SerialInterrupt() {
-  using namespace armcal::port::mps2;
+void OnUart1() {
   while ((Uart().state & 2u) != 0) {
     // A full ring counts the byte that it refuses; the frame's checksum will fail.
     (void)received.Push(static_cast<std::uint8_t>(Uart().data));
   }
   Uart().interrupt = 2u;
 }
+
+}  // namespace armcal::port::mps2

@@ -14,4 +14,7 @@ void StartUart1(std::uint32_t baud);
 // with it). Written bytes go out as long as the transmitter takes them.
 Serial Uart1();
 
+// What SerialInterrupt has to do: received bytes into the ring.
+void OnUart1();
+
 }  // namespace armcal::port::mps2

@@ -35,6 +35,11 @@ add_test(NAME Stack_OfEveryContextOfTheFirmware_IsBounded COMMAND_EXPAND_LISTS
           --indirect ${PROJECT_SOURCE_DIR}/port/mps2/application/indirect_calls.txt $<TARGET_OBJECTS:armcal_image>
           $<TARGET_OBJECTS:armcal_port_mps2> $<TARGET_OBJECTS:armcal_link> $<TARGET_OBJECTS:armcal_table>)
 
+# The README's firmware, spoken to over its serial line.
+add_test(NAME Firmware_OverItsSerialLine_TakesATableAndLearns
+  COMMAND ${PROJECT_SOURCE_DIR}/tests/readme/firmware_session.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_image>)
+set_tests_properties(Firmware_OverItsSerialLine_TakesATableAndLearns PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300 LABELS target)
+
 # cmake --build --preset cortex-m4f --target budgets
 set(core cortex-m4f)
 if(ARMCAL_BOARD STREQUAL mps2-an500)

@@ -19,7 +19,7 @@ struct Identity {
   std::uint32_t capabilities = 0;
   std::uint32_t tick_rate_Hz = 0;
   std::uint16_t sample_ticks = 0;
-  DeviceIdentification texts = {"armcal", "", ""};
+  DeviceIdentification texts = {"armcal", "", "1"};
 };
 
 // Values that the application keeps current. It writes them in the context that polls the link.
@@ -30,7 +30,7 @@ struct LiveStatus {
   std::uint32_t enabled_axes = 0;
   std::uint32_t clamp_count = 0;
   std::uint32_t sample_gaps = 0;
-  std::uint16_t health = 0;
+  std::uint16_t health = 0;  // bit k: filter k's deviations are smaller than its innovations
   std::uint32_t rows_used[2] = {};  // filter A, B
   std::uint32_t rows_gated[2] = {};
 };
@@ -54,6 +54,8 @@ class Device {
   RegisterMap& map() { return map_; }  // for further blocks: traces, the vendor range
   PduEngine& engine() { return engine_; }
   bool unlocked() const { return unlocked_; }
+  // kLocked; or kOk, and the lock stays open for another while. For whoever serves a write that needs it.
+  core::Status Unlocked();
 
  private:
   static constexpr int kMaxFloatLists = 8;
@@ -77,7 +79,6 @@ class Device {
   core::Status ReadStaged(Words offset, Words count, Words* words);
   core::Status WriteStaged(Words offset, Words count, const Words* words);
   core::Status ReadActive(Words offset, Words count, Words* words);
-  core::Status Unlocked();
 
   Identity identity_;
   const LiveStatus& live_;

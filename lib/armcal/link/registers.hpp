@@ -31,7 +31,7 @@ struct Item {
 namespace reg {
 
 inline constexpr std::uint16_t kMapMajor = 1;
-inline constexpr std::uint16_t kMapMinor = 1;
+inline constexpr std::uint16_t kMapMinor = 2;
 inline constexpr std::uint32_t kMagic = 0x41524D43;  // "ARMC"
 inline constexpr float kProbeFloat = 123456.789f;    // reads 123456.79 only with the right word order
 inline constexpr std::uint32_t kProbeU32 = 0x12345678;
@@ -61,6 +61,7 @@ inline constexpr std::uint16_t kScratchFloat = 0x0050, kScratchU32 = 0x0058, kSc
 inline constexpr std::uint16_t kTraceArm[kTraces] = {0x0100, 0x0110};
 inline constexpr std::uint16_t kTraceArmCount = 10, kTraceAcknowledge = 0x000C;  // the latter from the arm block on
 inline constexpr std::uint16_t kResidualSelect = 0x0140;
+inline constexpr std::uint16_t kLearningHold = 0x0150, kLearningReset = 0x0151;
 inline constexpr std::uint16_t kStaged = 0x1000, kActive = 0x2000, kMaxTableWords = 0x1000;
 inline constexpr std::uint16_t kVendor = 0x8000;
 
@@ -72,7 +73,8 @@ inline constexpr std::uint32_t kUnlockKey = 0x6B6C6E75;  // "unlk"
 
 // Capability bits.
 inline constexpr std::uint32_t kHasFilterA = 1, kHasFilterB = 2, kHasRawTrace = 4, kHasSampleTrace = 8;
-inline constexpr std::uint32_t kHasFeedForward = 16, kHasMonitor = 32, kHasResiduals = 64;
+inline constexpr std::uint32_t kHasFeedForward = 16, kHasMonitor = 32, kHasResiduals = 64,
+                               kHasLearning = 128;
 
 }  // namespace reg
 
@@ -117,7 +119,7 @@ inline constexpr Item kAll[] = {
   In(0x0011, 1, kU16, "parameters", "", "entries of the parameter table"),
   In(0x0012, 1, kU16, "columns", "", "filter coordinates: estimates served"),
   In(0x0013, 1, kU16, "table_words", "", "registers of the staged and the active table"),
-  In(0x0014, 1, kU32, "capabilities", "", "bits: 1 filter A, 2 filter B, 4 raw trace, 8 sample trace, 16 feed-forward, 32 monitor, 64 residual statistics"),
+  In(0x0014, 1, kU32, "capabilities", "", "bits: 1 filter A, 2 filter B, 4 raw trace, 8 sample trace, 16 feed-forward, 32 monitor, 64 residual statistics, 128 learning"),
   In(0x0016, 1, kU32, "tick_rate", "Hz", "control ticks a second"),
   In(0x0018, 1, kU16, "sample_ticks", "", "control ticks of one estimator sample"),
   In(0x0019, 1, kU16, "page_data_words", "", "most registers of one trace page's data"),
@@ -142,7 +144,7 @@ inline constexpr Item kAll[] = {
   In(0x005B, 1, kU16, "error_status", "", "its Status"),
   In(0x005C, 1, kU32, "error_request", "", "request_count of that request"),
   In(0x005E, 1, kU16, "unlocked", "", "1: table commands are accepted"),
-  In(0x005F, 1, kU16, "health", "", "verdict of the monitor, 0 ok"),
+  In(0x005F, 1, kU16, "health", "", "verdict of the monitor, 0 ok; bits: 1 filter A, 2 filter B: its deviations are smaller than its innovations"),
   In(0x0060, 1, kU32, "rows_used_a", "", "rows that updated filter A since the adoption"),
   In(0x0062, 1, kU32, "rows_gated_a", "", "rows that were not admitted to filter A"),
   In(0x0064, 1, kU32, "rows_used_b", "", "as above, filter B"),
@@ -206,6 +208,9 @@ inline constexpr Item kAll[] = {
 #undef ARMCAL_TRACE_ARM
 
   Hold(0x0140, 1, kU16, kWrite, "residual_select", "", "joint from 1: takes a snapshot of its statistics"),
+
+  Hold(0x0150, 1, kU16, kWrite, "learning_hold", "", "1: rows no longer change the estimates, 0: they do; needs unlock"),
+  Hold(0x0151, 1, kU16, kWrite, "learning_reset", "", "joint from 1, or axes + 1 (links and what else joints share): what was known of it no longer counts; reads 0; needs unlock"),
 
   Hold(0x1000, reg::kMaxTableWords, kU16, kWrite, "staged_table", "", "the table being loaded"),
   Hold(0x2000, reg::kMaxTableWords, kU16, kRead, "active_table", "", "the table in force"),

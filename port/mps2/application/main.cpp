@@ -1,45 +1,30 @@
-// application - the example firmware: three contexts on one board; knows which model and which board.
+// application - the example firmware, as the README shows it; knows no pin and no filter's inside.
+#include "armcal/controller/controller.hpp"
+#include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/link/rtu_service.hpp"
-#include "port/mps2/application/drive.hpp"
-#include "port/mps2/application/pretend_axes.hpp"
-#include "port/mps2/interrupts.hpp"
-#include "port/mps2/psram_storage.hpp"
-#include "port/mps2/tick_clock.hpp"
-#include "port/mps2/uart.hpp"
-#include "selected_model.hpp"  // of the model that the target links
-
-namespace {
+#include "board.hpp"           // yours: storage, clock, serial line and axes
+#include "selected_model.hpp"  // generated: the model that this program links
 
 using Model = armcal::generated::SelectedModel;
-namespace board = armcal::port::mps2;
+using Filter = armcal::filter::ForgettingFilter<Model>;
+static armcal::controller::Controller<Model, Filter> controller(board::Storage(), board::Clock());
+static armcal::link::RtuService modbus(controller.engine(), board::Serial(), board::Clock(), 1, board::kSilence_ms);
 
-constexpr std::uint8_t kModbusAddress = 1;
-constexpr std::uint32_t kBaud = 115200;
-constexpr std::uint32_t kSilence_ms = 200;  // an emulated line delivers in portions; 2 ms on a real one
-
-armcal::application::Drive<Model> drive(board::PsramStorage(), board::TickClock());
-armcal::application::PretendAxes<Model> axes;
-armcal::link::RtuService modbus(drive.engine(), board::Uart1(), board::TickClock(), kModbusAddress, kSilence_ms);
-
-}  // namespace
-
-// Tick: measure, feed forward, push. The torque goes to the current controllers, which this board does not have.
-extern "C" void TickInterrupt() {
+extern "C" void TickInterrupt() {  // constant time
   armcal::model::RawSample<Model::kJoints> raw;
-  armcal::application::SetPoint<Model::kJoints> set;
+  armcal::controller::SetPoint<Model::kJoints> set;
   float tau_Nm[Model::kJoints];
-  axes.Read(board::CountTick(), raw, set);
-  // A late estimator and clamped torques are counted inside and served as registers.
-  (void)drive.Tick(raw, set, tau_Nm);
+  controller.SetEnabledAxes(board::Measure(raw, set));              // counts, currents and set-point of one instant
+  (void)controller.FeedForward(set, raw.temperature_degC, tau_Nm);  // cut to each joint's limit; zero without a table
+  board::Command(tau_Nm);                                           // on to the current controllers
+  (void)controller.Push(raw);                                       // a sample that finds the ring full is counted
 }
-
-// Background: Modbus, table, estimator, in slices. The serial interrupt (uart.cpp) only fills a ring.
-extern "C" void Application() {
-  (void)drive.Boot();  // why there is no table, if so, is served as a register
-  board::StartUart1(kBaud);
-  board::StartTick(static_cast<std::uint32_t>(Model::kTickRate_Hz));
+extern "C" void SerialInterrupt() { board::OnSerial(); }  // bytes into a ring, nothing else
+extern "C" void Application() {                           // all the rest, in bounded slices
+  (void)controller.Boot();                                // why there is no table, if so, is served as a register
+  board::Start(Model::kTickRate_Hz);
   for (;;) {
-    modbus.Poll();
-    if (!drive.Background()) board::Sleep();
+    modbus.Poll();                           // at most one request
+    if (!controller.Step()) board::Sleep();  // estimators, table, registers
   }
 }

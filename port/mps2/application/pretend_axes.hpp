@@ -1,9 +1,7 @@
 // application - stands in for encoders and current sensors, which the board does not have; knows no filter.
 #pragma once
 
-#include "armcal/estimator/image.hpp"
-#include "armcal/feedforward/committed.hpp"
-#include "port/mps2/application/drive.hpp"
+#include "armcal/controller/controller.hpp"
 
 namespace armcal::application {
 
@@ -22,8 +20,8 @@ class PretendAxes {
     for (int k = 0; k < Model::kFront; ++k) arm_.p[k] = table.parameter[Model::kBodyParameters + k].mean;
   }
 
-  // The sample of tick `tick` and the set-point that the axes follow. Context: tick.
-  void Read(std::uint32_t tick, model::RawSample<n>& raw, SetPoint<n>& set) {
+  // The sample of tick `tick` and the set-point that the axes follow; all axes are under control. Context: tick.
+  std::uint32_t Read(std::uint32_t tick, model::RawSample<n>& raw, controller::SetPoint<n>& set) {
     constexpr float kAmplitude_rad = 0.4f, kTurn = 6.2831853f;
     model::ModelInput<float, n> state = {};
     for (int i = 0; i < n; ++i) {
@@ -45,6 +43,7 @@ class PretendAxes {
       raw.flags[i] = model::kEnabled;
       raw.temperature_degC[i] = 25.0f;
     }
+    return (1u << n) - 1u;
   }
 
  private:

@@ -12,6 +12,7 @@
 #include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
 #include "armcal/link/device.hpp"
+#include "armcal/link/learning_registers.hpp"
 #include "armcal/link/residual_registers.hpp"
 #include "armcal/link/trace_registers.hpp"
 #include "tests/unit/table/nor_flash.hpp"
@@ -59,6 +60,24 @@ struct FakeApplication {
   }
 };
 
+// What the drive's application does about learning.
+struct FakeLearning {
+  core::Status answer = core::Status::kOk;
+  std::vector<bool> holds;
+  std::vector<int> resets;
+
+  link::LearningApplication Functions() { return {this, &Hold, &Reset}; }
+
+  static core::Status Hold(void* self, bool hold) {
+    static_cast<FakeLearning*>(self)->holds.push_back(hold);
+    return static_cast<FakeLearning*>(self)->answer;
+  }
+  static core::Status Reset(void* self, int block) {
+    static_cast<FakeLearning*>(self)->resets.push_back(block);
+    return static_cast<FakeLearning*>(self)->answer;
+  }
+};
+
 // Records of channel mask m have as many words as m has bits; masks beyond 8 bits are not served.
 inline std::uint16_t RecordWords(void*, std::uint32_t channels) {
   if (channels > 0xFF) return 0;
@@ -86,6 +105,7 @@ struct TestDevice {
     served = served && core::IsOk(link::ServeTrace(device.map(), 0, raw));
     served = served && core::IsOk(link::ServeTrace(device.map(), 1, samples));
     served = served && core::IsOk(residuals.Serve(device.map()));
+    served = served && core::IsOk(learning.Serve());
     all_served = served;
   }
 
@@ -115,6 +135,8 @@ struct TestDevice {
   link::TraceRing<1024> samples{8, &RecordWords, nullptr};
   link::Device device{identity, live, transaction};
   link::ResidualPages residuals{&TakeResiduals, this, kAxes};
+  FakeLearning learner;
+  link::LearningRegisters learning{learner.Functions(), device, kAxes};
   int snapshots_taken = 0;
   core::Status boot_status = core::Status::kOk;
   bool all_served = false;

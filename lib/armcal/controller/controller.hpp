@@ -1,0 +1,255 @@
+// controller - introduces estimators, feed-forward, table and link to each other; knows no board and no bus.
+#pragma once
+
+#include <atomic>
+#include <tuple>
+#include <utility>
+
+#include "armcal/estimator/estimator.hpp"
+#include "armcal/estimator/image.hpp"
+#include "armcal/feedforward/feed_forward.hpp"
+#include "armcal/link/device.hpp"
+#include "armcal/link/learning_registers.hpp"
+#include "armcal/link/residual_registers.hpp"
+#include "armcal/port/clock.hpp"
+#include "armcal/port/storage.hpp"
+#include "armcal/table/table_store.hpp"
+
+namespace armcal::controller {
+
+// Where the axes shall be. Shapes: [n], rad (m), rad/s, rad/s^2.
+template <int n>
+struct SetPoint {
+  float q[n], qd[n], qdd[n];
+};
+
+// One motion controller: lives as long as the power is on; some 80 KB for six joints. Filters: one or two of those
+// that estimator::Estimator takes; the first is served as filter A, the second as filter B.
+template <class Model, class... Filters>
+class Controller {
+  static_assert(sizeof...(Filters) == 1 || sizeof...(Filters) == 2);
+
+ public:
+  static constexpr int n = Model::kJoints;
+  static constexpr int kFilters = sizeof...(Filters);
+  static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
+
+  // What the model says of itself is filled in; what of `identity` remains is the integrator's: versions, texts,
+  // capabilities beyond those of this class.
+  Controller(const port::Storage& storage, const port::Clock& clock, const link::Identity& identity = {})
+      : clock_(clock),
+        store_(storage, Model::kSchema, kWords),
+        transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords),
+        device_(Describe(identity), live_, transaction_) {
+    model::Encode(estimator::DefaultTable<Model>(), active_);
+    filter<0>().SetResiduals(&residuals_);
+  }
+  Controller(const Controller&) = delete;
+
+  // Once, before the first tick. Without a valid table in storage the estimators start from the model's defaults and
+  // the feed-forward stays off. Answers as table::TableStore::Load, which is served, too; a status of
+  // link::RegisterMap::Add is a wrong map. Context: background.
+  core::Status Boot() {
+    const core::Status served = Serve(std::make_index_sequence<kFilters>());
+    if (!core::IsOk(served)) return served;
+    const core::Status stored = transaction_.Boot();
+    if (core::IsOk(stored)) return stored;
+    table_ = estimator::DefaultTable<Model>();
+    const core::Status built = BuildSpare();
+    if (!core::IsOk(built)) return built;
+    PutInForce();
+    return stored;
+  }
+
+  // Which axes are under control, a bit each: a table is then adopted only if it is bumpless. Context: any.
+  void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
+
+  // Joint torque of the set-point by the table in force. tau_Nm: [n], zero without a table. Answers as
+  // feedforward::FeedForward::Evaluate. Context: tick.
+  core::Status FeedForward(const SetPoint<n>& set, const float* temperature_degC, float* tau_Nm) {
+    const std::uint32_t since = clock_.Ticks() - adopted_tick_.load(std::memory_order_relaxed);
+    const core::Status status =
+        feed_forward_.Evaluate(set.q, set.qd, set.qdd, temperature_degC,
+                               static_cast<float>(since) / static_cast<float>(Model::kTickRate_Hz), tau_Nm);
+    feedforward_state_.store(!feed_forward_.valid()     ? 0u
+                             : feed_forward_.blending() ? 2u
+                                                        : 1u,
+                             std::memory_order_relaxed);
+    clamp_count_.store(feed_forward_.clamp_count(), std::memory_order_relaxed);
+    return status;
+  }
+
+  // One measured sample. Constant time. kFull: an estimator is late and lost one (counted). Context: tick.
+  core::Status Push(const model::RawSample<n>& raw) {
+    core::Status status = core::Status::kOk;
+    const auto push = [&](auto& estimator) {
+      const core::Status pushed = estimator.Push(raw);
+      if (!core::IsOk(pushed)) status = pushed;
+    };
+    ForEach(push);
+    return status;
+  }
+
+  // One bounded slice of everything that has time. False: nothing was left to do. Context: background.
+  bool Step() {
+    device_.Step(clock_.Ms());
+    bool busy = store_.busy() || transaction_.state() == link::TransactionState::kCommitting;
+    ForEach([&](auto& estimator) { busy |= estimator.Step(); });
+    Show(std::make_index_sequence<kFilters>());
+    return busy;
+  }
+
+  link::PduEngine& engine() { return device_.engine(); }  // for a link::RtuService or TcpService
+  link::RegisterMap& map() { return device_.map(); }      // for blocks of the integrator's, before the first request
+  template <int k>
+  auto& filter() {
+    return std::get<k>(estimators_);
+  }
+  const feedforward::FeedForward<Model>& feed_forward() const { return feed_forward_; }  // context: tick
+  const estimator::Image<Model>& in_force() const { return images_[in_force_.load(std::memory_order_relaxed)]; }
+  std::uint32_t generation() const { return generation_; }  // adoptions since power-up; context: background
+
+ private:
+  template <class Call>
+  void ForEach(Call call) {
+    std::apply([&](auto&... estimator) { (call(estimator), ...); }, estimators_);
+  }
+
+  static link::Identity Describe(link::Identity identity) {
+    identity.schema = Model::kSchema;
+    identity.axes = n;
+    identity.parameters = Model::kParameters;
+    identity.columns = Model::kColumns;
+    identity.capabilities |= link::reg::kHasFilterA | (kFilters > 1 ? link::reg::kHasFilterB : 0u) |
+                             link::reg::kHasFeedForward | link::reg::kHasMonitor | link::reg::kHasResiduals |
+                             link::reg::kHasLearning;
+    identity.tick_rate_Hz = static_cast<std::uint32_t>(Model::kTickRate_Hz);
+    identity.sample_ticks = Model::kSampleTicks;
+    if (*identity.texts.product == '\0') identity.texts.product = Model::kName;
+    return identity;
+  }
+
+  template <std::size_t... k>
+  core::Status Serve(std::index_sequence<k...>) {
+    core::Status map = core::Status::kOk;
+    const auto serve = [&](std::uint16_t first, const float* values, std::uint16_t count) {
+      if (core::IsOk(map)) map = device_.AddFloats(first, values, count);
+    };
+    constexpr std::uint16_t kEstimate[] = {link::reg::kEstimateA, link::reg::kEstimateB},
+                            kDeviation[] = {link::reg::kDeviationA, link::reg::kDeviationB};
+    (serve(kEstimate[k], estimates_[k].value, Model::kColumns), ...);
+    (serve(kDeviation[k], estimates_[k].sd, Model::kColumns), ...);
+    serve(link::reg::kResidualRms, estimates_[0].residual_rms_Nm, n);
+    serve(link::reg::kConsistency, estimates_[kFilters - 1].nis, n);
+    if (core::IsOk(map)) map = residual_pages_.Serve(device_.map());
+    if (core::IsOk(map)) map = learning_.Serve();
+    return map;
+  }
+
+  template <std::size_t... k>
+  void Show(std::index_sequence<k...>) {
+    live_.feedforward_state = static_cast<std::uint16_t>(feedforward_state_.load(std::memory_order_relaxed));
+    live_.generation = generation_;
+    live_.tick = clock_.Ticks();
+    live_.enabled_axes = enabled_axes_.load(std::memory_order_relaxed);
+    live_.clamp_count = clamp_count_.load(std::memory_order_relaxed);
+    live_.sample_gaps = filter<0>().refused_samples();
+    (Show(k, filter<k>()), ...);
+  }
+  template <class Estimator>
+  void Show(std::size_t k, Estimator& estimator) {
+    estimator::Estimates<Model>& e = estimates_[k];
+    if (!estimator.Take(e)) return;
+    live_.rows_used[k] = live_.rows_gated[k] = 0;
+    for (int i = 0; i < n; ++i) {
+      live_.rows_used[k] += e.rows_used[i];
+      live_.rows_gated[k] += e.rows_gated[i];
+    }
+    const auto bit = static_cast<std::uint16_t>(1u << k);
+    live_.health = static_cast<std::uint16_t>(e.inconsistent ? live_.health | bit : live_.health & ~bit);
+  }
+
+  // Callbacks of the link. Context: background.
+  static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
+    static_assert(monitor::ResidualBins::kValues == link::reg::kResidualBinValues &&
+                  monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValueCount);
+    const auto& c = *static_cast<const Controller*>(self);
+    page.generation = c.generation_;
+    page.elapsed_s = c.residuals_.elapsed_s();
+    page.sigma_Nm = c.in_force().sigma_Nm[joint];
+    c.residuals_.Write(joint, page.values);
+  }
+  static core::Status Hold(void* self, bool hold) {
+    static_cast<Controller*>(self)->ForEach([&](auto& estimator) { estimator.Hold(hold); });
+    return core::Status::kOk;
+  }
+  // Each filter that can; kOutOfRange: none can.
+  static core::Status Reset(void* self, int block) {
+    core::Status status = core::Status::kOutOfRange;
+    static_cast<Controller*>(self)->ForEach([&](auto& estimator) {
+      if (core::IsOk(estimator.Reset(block))) status = core::Status::kOk;
+    });
+    return status;
+  }
+
+  static core::Status Check(void* self, const std::uint16_t* words, std::uint32_t) {
+    auto& c = *static_cast<Controller*>(self);
+    const core::Status decoded = model::Decode(words, Model::kSchema, c.table_);
+    return core::IsOk(decoded) ? c.BuildSpare() : decoded;
+  }
+  static core::Status Permit(void* self, const std::uint16_t* words, std::uint32_t) {
+    auto& c = *static_cast<Controller*>(self);
+    const core::Status decoded = model::Decode(words, Model::kSchema, c.table_);
+    if (!core::IsOk(decoded)) return decoded;
+    return c.enabled() && (c.table_.flags & model::kFlagBumpless) == 0 ? core::Status::kAxisEnabled : core::Status::kOk;
+  }
+  static core::Status Adopt(void* self, const std::uint16_t* words, std::uint32_t count) {
+    auto& c = *static_cast<Controller*>(self);
+    const core::Status built = Check(self, words, count);
+    if (!core::IsOk(built)) return built;
+    const core::Status offered = c.feed_forward_.Offer(c.Spare().committed, c.enabled());
+    if (core::IsOk(offered)) c.PutInForce();
+    return offered;
+  }
+
+  bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
+  // The image that nobody reads: estimators hold the other one, feed-forward a copy.
+  estimator::Image<Model>& Spare() { return images_[1 - in_force_.load(std::memory_order_relaxed)]; }
+  // kOutOfRange, too: a filter's form cannot hold what the table asks for.
+  core::Status BuildSpare() {
+    const core::Status built = estimator::BuildImage(table_, generation_ + 1, work_, Spare());
+    if (!core::IsOk(built)) return built;
+    bool suits = true;
+    ForEach([&](auto& estimator) { suits &= estimator.Suits(Spare()); });
+    return suits ? core::Status::kOk : core::Status::kOutOfRange;
+  }
+  void PutInForce() {
+    const std::uint32_t now = clock_.Ticks();
+    adopted_tick_.store(now, std::memory_order_relaxed);
+    ForEach([&](auto& estimator) { estimator.Adopt(Spare(), now); });
+    generation_ = Spare().committed.generation;
+    in_force_.store(1 - in_force_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+  }
+
+  port::Clock clock_;
+  std::uint16_t staged_[kWords] = {}, active_[kWords] = {};
+  table::TableStore store_;
+  link::TableTransaction transaction_;
+  link::LiveStatus live_;
+  link::Device device_;
+
+  feedforward::FeedForward<Model> feed_forward_;
+  std::tuple<estimator::Estimator<Model, Filters>...> estimators_;
+  estimator::Estimates<Model> estimates_[kFilters];
+  monitor::ResidualStatistics<n> residuals_;
+  link::ResidualPages residual_pages_{TakeResiduals, this, n};
+  link::LearningRegisters learning_{{this, Hold, Reset}, device_, n};
+  estimator::Table<Model> table_;
+  estimator::ImageWork<Model> work_;
+  estimator::Image<Model> images_[2];
+  std::uint32_t generation_ = 0;
+  std::atomic<int> in_force_{0};
+  std::atomic<std::uint32_t> adopted_tick_{0}, enabled_axes_{0}, feedforward_state_{0}, clamp_count_{0};
+};
+
+}  // namespace armcal::controller

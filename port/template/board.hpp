@@ -1,0 +1,34 @@
+// template - a new board as the README's example firmware asks for it; complete what says "here".
+#pragma once
+
+#include "armcal/controller/controller.hpp"
+#include "port/template/clock.hpp"
+#include "port/template/serial.hpp"
+#include "port/template/storage.hpp"
+
+namespace board {
+
+namespace target = armcal::port::target;
+
+inline constexpr std::uint32_t kSilence_ms = 2;  // that ends a frame; at 115200 baud 3.5 characters are 0.3 ms
+
+inline armcal::port::Storage Storage() { return target::TargetStorage(); }
+inline armcal::port::Clock Clock() { return target::TargetClock(); }
+inline armcal::port::Serial Serial() { return target::TargetSerial(); }
+
+// Answers which axes are under control, a bit each.
+template <int n>
+std::uint32_t Measure(armcal::model::RawSample<n>& raw, armcal::controller::SetPoint<n>& set) {
+  raw = {};
+  set = {};
+  raw.tick = target::CountTick();
+  // Here: counts and measured current of all axes at one instant, flags, temperatures (NaN without a sensor), and the
+  // set-point of your motion controller.
+  return 0;
+}
+inline void Command(const float*) {}  // here: [n] N m, to your current controllers
+inline void OnSerial() {}             // here: target::OnReceived(byte), target::NextToSend(byte)
+inline void Start(float) {}           // here: serial line on, tick interrupt at this rate in Hz
+inline void Sleep() {}                // here: until the next interrupt (wfi)
+
+}  // namespace board

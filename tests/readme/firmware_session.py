@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+"""Runs the README's firmware on an emulated board and talks Modbus RTU to it over its serial line.
+
+  firmware_session.py BOARD IMAGE
+
+The client is written from the Modbus specification and SPEC.md, not from armcal. 77: no QEMU here.
+"""
+import math
+import os
+import re
+import select
+import shutil
+import struct
+import subprocess
+import sys
+import time
+import tty
+import zlib
+
+SECONDS = 60  # for anything to come true: an emulated board shares its processor with others
+
+
+def crc16(data):
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
+    return struct.pack("<H", crc)
+
+
+class Refused(Exception):
+    """The drive answered with this exception code."""
+
+
+class Line:
+    """Address 1 on a serial line; one request, one reply."""
+
+    def __init__(self, path):
+        self.file = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.file)
+
+    def take(self, count, deadline):
+        data = b""
+        while len(data) < count:
+            if not select.select([self.file], [], [], max(0.0, deadline - time.monotonic()))[0]:
+                raise SystemExit(f"no reply: {len(data)} of {count} bytes")
+            data += os.read(self.file, count - len(data))
+        return data
+
+    def ask(self, pdu):
+        frame = b"\x01" + pdu
+        os.write(self.file, frame + crc16(frame))
+        deadline = time.monotonic() + SECONDS
+        head = self.take(3, deadline)
+        if head[1] & 0x80:
+            rest = self.take(2, deadline)
+        else:
+            rest = self.take(head[2] + 2 if head[1] in (3, 4) else 5, deadline)
+        reply = head + rest
+        assert crc16(reply[:-2]) == reply[-2:], f"checksum of {reply.hex()}"
+        if head[1] & 0x80:
+            raise Refused(head[2])
+        return reply[2:-2]
+
+    def read(self, function, first, count):
+        words = []
+        while len(words) < count:
+            part = min(120, count - len(words))
+            reply = self.ask(struct.pack(">BHH", function, first + len(words), part))
+            words += struct.unpack(f">{part}H", reply[1:])
+        return words
+
+    def write(self, first, words):
+        self.ask(struct.pack(f">BHHB{len(words)}H", 16, first, len(words), 2 * len(words), *words))
+
+    def u32(self, address):
+        high, low = self.read(4, address, 2)
+        return high << 16 | low
+
+    def floats(self, address, count):
+        return struct.unpack(f">{count}f", struct.pack(f">{2 * count}H", *self.read(4, address, 2 * count)))
+
+
+def until(what, true):
+    deadline = time.monotonic() + SECONDS
+    while not true():
+        if time.monotonic() > deadline:
+            raise SystemExit(f"after {SECONDS} s still not: {what}")
+        time.sleep(0.05)
+    print(what)
+
+
+def halves(*numbers):
+    return [half for number in numbers for half in (number >> 16, number & 0xFFFF)]
+
+
+def session(line):
+    identity = line.read(4, 0x0000, 26)
+    assert struct.pack(">2H", *identity[0:2]) == b"ARMC", identity
+    assert struct.pack(">2H", *identity[12:14]) == struct.pack(">f", 123456.789), "word order"
+    schema, axes, columns, size = identity[6] << 16 | identity[7], identity[16], identity[18], identity[19]
+
+    until("the tick counts, and filter A has used rows", lambda: line.u32(0x0046) > 0 and line.u32(0x0060) > 0)
+    values = line.floats(0x0100, columns) + line.floats(0x0300, columns)
+    assert all(map(math.isfinite, values)) and min(values[columns:]) >= 0.0, values
+    assert line.read(4, 0x0043, 1) == [0], "feed-forward without a table"
+
+    # A table, as SPEC.md says: unlock, open, words, check, save. All axes are enabled: it must be bumpless.
+    table = line.read(3, 0x2000, size)
+    table[5] |= 1
+    data = struct.pack(f">{size}H", *table)
+    crc, opened, check, save = zlib.crc32(data), 0x6E65706F, 0x6B656863, 0x65766173
+    try:
+        line.write(0x0000, halves(1, opened, schema) + [size, 0] + halves(0))
+        raise SystemExit("a locked drive opened a table transaction")
+    except Refused:
+        print("locked: refused")
+    line.write(0x0040, halves(0x6B6C6E75))
+    line.write(0x0000, halves(1, opened, schema) + [size, 0] + halves(0))
+    for first in range(0, size, 100):
+        line.write(0x1000 + first, table[first : first + 100])
+    line.write(0x0000, halves(2, check, schema) + [size, 0] + halves(crc))
+    line.write(0x0000, halves(3, save, schema) + [size, 0] + halves(crc))
+    until("the table is stored and in force", lambda: line.read(4, 0x0040, 1) == [5])
+    until("feed-forward has faded in", lambda: line.read(4, 0x0043, 1) == [1])
+    assert line.u32(0x0048) == crc and line.u32(0x0044) == 2, "checksum, generation"
+
+    until("the filter learns again", lambda: line.u32(0x0060) > 0)
+    line.write(0x0150, [1])
+    line.write(0x0151, [2])
+    for unknown in (0, axes + 2):
+        try:
+            line.write(0x0151, [unknown])
+            raise SystemExit(f"reset of block {unknown} was not refused")
+        except Refused as refusal:
+            assert refusal.args[0] == 3, refusal
+    tick = line.u32(0x0046)
+    until("two seconds on hold", lambda: line.u32(0x0046) > tick + 2000)
+    used, gated = line.u32(0x0060), line.u32(0x0062)
+    until("rows are gated", lambda: line.u32(0x0062) > gated)
+    assert line.u32(0x0060) == used, "a filter on hold used rows"
+    line.write(0x0150, [0])
+    until("and used again", lambda: line.u32(0x0060) > used)
+
+
+def main():
+    board, image = sys.argv[1:]
+    if shutil.which("qemu-system-arm") is None:
+        print("skipped: no qemu-system-arm (toolchains/install.sh cross)")
+        return 77
+    command = ["qemu-system-arm", "-M", board, "-display", "none", "-monitor", "none", "-serial", "null", "-serial", "pty"]
+    emulator = subprocess.Popen(command + ["-kernel", image], stdout=subprocess.PIPE, text=True)
+    try:
+        path = re.search(r"/dev/\S+", emulator.stdout.readline())
+        session(Line(path.group()))
+        assert emulator.poll() is None, "the image ended"
+    finally:
+        emulator.kill()
+        emulator.wait()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

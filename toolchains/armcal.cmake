@@ -64,7 +64,7 @@ function(armcal_test name)
   cmake_parse_arguments(A "" "LABELS;TIMEOUT" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${A_SOURCES})
   target_link_libraries(${name} PRIVATE armcal_host_rules ${A_LIBS} GTest::gtest_main)
-  target_compile_options(${name} PRIVATE -O1)
+  target_compile_options(${name} PRIVATE -O1 -Wno-double-promotion)  # oracles are in double
   add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   if(NOT A_LABELS)
     set(A_LABELS fast)

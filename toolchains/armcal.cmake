@@ -40,6 +40,7 @@ function(armcal_library name)
     add_library(${name} STATIC ${A_SOURCES})
     target_link_libraries(${name} PUBLIC armcal_lib_rules ${A_LIBS})
     target_compile_options(${name} PRIVATE -fno-exceptions -fno-rtti -fno-threadsafe-statics)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)  # file by file, as it ships
     target_compile_features(${name} PUBLIC cxx_std_17)
   else()
     add_library(${name} INTERFACE)

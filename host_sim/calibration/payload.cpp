@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kBody = 10;
+constexpr int kLoad = 10;
 constexpr double kWide = 100;       // a prior that says nothing: a column alone may make this many times the torque
 constexpr double kWideGain = 10;    // the same of a gain
 constexpr double kReach_m = 0.5;    // what any load is like: its mass lies about this far from the flange
@@ -36,7 +36,7 @@ class LoadFit {
     to_link_ = BodyMap(flange);
     for (int k = 0; k < model.nonlinear(); ++k)
       eta_.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
-    sum_.assign(n_, MatrixXd::Zero(columns_ + kBody + 1, columns_ + kBody + 1));
+    sum_.assign(n_, MatrixXd::Zero(columns_ + kLoad + 1, columns_ + kLoad + 1));
     rows_.setZero(n_), sigma_.resize(n_), inflation_.setOnes(n_);
     for (int j = 0; j < n_; ++j) sigma_[j] = model.robot().joint[j].torque_noise_Nm;
     ForEachLog([&](const Dataset& log, const std::vector<MatrixXd>& raw) {
@@ -46,10 +46,10 @@ class LoadFit {
         rows_[j] += log.used.col(j).sum();
       }
     });
-    const int size = columns_ + n_ + kBody;
+    const int size = columns_ + n_ + kLoad;
     prior_.mean.conservativeResizeLike(VectorXd::Zero(size));
     prior_.covariance.conservativeResizeLike(MatrixXd::Zero(size, size));
-    for (int i = 0; i < kBody; ++i) Widen(load(i), columns_ + i), prior_.active.push_back(load(i));
+    for (int i = 0; i < kLoad; ++i) Widen(load(i), columns_ + i), prior_.active.push_back(load(i));
   }
 
   int gain(int joint) const { return columns_ + joint; }
@@ -57,8 +57,8 @@ class LoadFit {
   double value(int c) const { return x_[c]; }
   double sd(int c) const { return std::sqrt(std::max(0.0, covariance_(c, c))); }
   double prior_sd(int c) const { return std::sqrt(prior_.covariance(c, c)); }
-  VectorXd LoadValue() const { return x_.tail(kBody); }
-  MatrixXd LoadCovariance() const { return covariance_.bottomRightCorner(kBody, kBody); }
+  VectorXd LoadValue() const { return x_.tail(kLoad); }
+  MatrixXd LoadCovariance() const { return covariance_.bottomRightCorner(kLoad, kLoad); }
   bool converged() const { return converged_; }
 
   // Nothing is known of the arm, and of the gains nothing but their sign.
@@ -72,11 +72,11 @@ class LoadFit {
       prior_.covariance(gain(j), gain(j)) = kWideGain * kWideGain, prior_.active.push_back(gain(j));
   }
   void KnowLoad(const codegen::Payload& known) {
-    VectorXd body = VectorXd::Zero(kBody);
+    VectorXd body = VectorXd::Zero(kLoad);
     body[0] = known.mass_kg;
     if (known.center_m) std::copy(known.center_m->begin(), known.center_m->end(), body.data() + 1);
     if (known.inertia_kgm2) std::copy(known.inertia_kgm2->begin(), known.inertia_kgm2->end(), body.data() + 4);
-    const int count = known.inertia_kgm2 ? kBody : known.center_m ? 4 : 1;
+    const int count = known.inertia_kgm2 ? kLoad : known.center_m ? 4 : 1;
     const VectorXd origin = ToOrigin(body);
     for (int i = 0; i < count; ++i) prior_.mean[load(i)] = origin[i], std::erase(prior_.active, load(i));
   }
@@ -94,7 +94,7 @@ class LoadFit {
       for (int j = 0; j < n_; ++j)
         if (rows_[j] > 0) sigma_[j] = std::max(1e-12, std::sqrt(Square(j, Residual(j)) / rows_[j]));
       // The load's size is known after the first round: (m, m c, I) of one that reaches kReach_m.
-      for (int i = 1; i < kBody; ++i)
+      for (int i = 1; i < kLoad; ++i)
         prior_.covariance(load(i), load(i)) = std::pow(x_[load(0)] * (i < 4 ? kReach_m : kReach_m * kReach_m), 2);
     }
     Inflate();
@@ -111,9 +111,9 @@ class LoadFit {
         model_.Regressor(log->s, {prior_.mean.data(), static_cast<std::size_t>(columns_)}, eta_, raw);
         if (carrying) model_.BodyColumns(log->s, n_ - 1, body);
         for (int j = 0; j < n_; ++j) {
-          raw[j].conservativeResize(Eigen::NoChange, columns_ + kBody + 1);
-          if (carrying) raw[j].middleCols(columns_, kBody) = body[j] * to_link_;
-          else raw[j].middleCols(columns_, kBody).setZero();
+          raw[j].conservativeResize(Eigen::NoChange, columns_ + kLoad + 1);
+          if (carrying) raw[j].middleCols(columns_, kLoad) = body[j] * to_link_;
+          else raw[j].middleCols(columns_, kLoad).setZero();
           raw[j].rightCols(1) = log->tau.col(j);
         }
         visit(*log, raw);
@@ -122,17 +122,17 @@ class LoadFit {
   void Widen(int coordinate, int column) {
     double size = 0;
     for (const MatrixXd& s : sum_)
-      if (s(column, column) > 0) size = std::max(size, s(columns_ + kBody, columns_ + kBody) / s(column, column));
+      if (s(column, column) > 0) size = std::max(size, s(columns_ + kLoad, columns_ + kLoad) / s(column, column));
     prior_.covariance(coordinate, coordinate) = kWide * kWide * size;
   }
   // (1 + kappa_j) (p, load) as weights of joint j's columns.
   VectorXd Weights(int j) const {
-    VectorXd w(columns_ + kBody);
-    w << x_.head(columns_), x_.tail(kBody);
+    VectorXd w(columns_ + kLoad);
+    w << x_.head(columns_), x_.tail(kLoad);
     return (1 + x_[gain(j)]) * w;
   }
   VectorXd Residual(int j) const {
-    VectorXd r(columns_ + kBody + 1);
+    VectorXd r(columns_ + kLoad + 1);
     r << -Weights(j), 1;
     return r;
   }
@@ -140,13 +140,13 @@ class LoadFit {
 
   // One step of Gauss and Newton's: every sum it needs is one of raw columns.
   VectorXd Step(const std::vector<int>& active) {
-    const int size = static_cast<int>(x_.size()), raw = columns_ + kBody + 1;
+    const int size = static_cast<int>(x_.size()), raw = columns_ + kLoad + 1;
     Information info(n_, size);
     for (int j = 0; j < n_; ++j) {
       const double scale = 1 + x_[gain(j)];
       MatrixXd D = MatrixXd::Zero(raw, size);  // derivatives as sums of raw columns
       D.topLeftCorner(columns_, columns_).diagonal().setConstant(scale);
-      D.block(columns_, load(0), kBody, kBody).diagonal().setConstant(scale);
+      D.block(columns_, load(0), kLoad, kLoad).diagonal().setConstant(scale);
       D.col(gain(j)).head(raw - 1) = Weights(j) / scale;
       VectorXd target = VectorXd::Zero(raw);  // measured - predicted + D x
       target << x_[gain(j)] / scale * Weights(j), 1;
@@ -241,7 +241,7 @@ Load FindLoad(const codegen::Model& model, const LoadLogs& logs) {
   load.body = ToCentre(body);
   const MatrixXd to_centre = OriginJacobian(load.body).inverse();
   load.sd = (to_centre * covariance * to_centre.transpose()).diagonal().cwiseSqrt();
-  for (int i = 0; i < kBody; ++i)
+  for (int i = 0; i < kLoad; ++i)
     load.determined.push_back(fit.sd(fit.load(i)) < kFromPrior * fit.prior_sd(fit.load(i)));
   return load;
 }

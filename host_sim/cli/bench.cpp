@@ -9,7 +9,7 @@
 namespace armcal::cli {
 namespace {
 
-struct Options {
+struct BenchOptions {
   std::string robot = "er20_like", program, json;
   bool quick = false;
 };
@@ -48,7 +48,7 @@ void Print(const nlohmann::ordered_json& result) {
   }
 }
 
-int Run(const Options& o) {
+int RunBench(const BenchOptions& o) {
   namespace fs = std::filesystem;
   const codegen::Robot robot = codegen::ReadRobot(RobotPath(o.robot));
   const fs::path program = o.program.empty()
@@ -78,12 +78,12 @@ void AddBench(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand("bench",
                                   "time the generated model and batch least squares against KDL, the C library and "
                                   "Eigen\nexample: armcal bench --json build/bench.json");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<BenchOptions>();
   verb->add_option("--robot", o->robot, "robot file or name")->capture_default_str();
   verb->add_option("--program", o->program, "bench program (default: the one built for the robot)");
   verb->add_flag("--quick", o->quick, "few blocks and a short log: to see that it runs");
   verb->add_option("--json", o->json, "write the ratios and times here");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunBench(*o); }; });
 }
 
 }  // namespace armcal::cli

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-struct Options {
+struct DemoOptions {
   std::string scenario = "stribeck", out = "build/demo", build = "build/host";
   int excite_s = 60;
 };
@@ -34,7 +34,7 @@ bool Flashable(const diagnosis::Finding& finding) {
 
 class Demo {
  public:
-  explicit Demo(const Options& o) : o_(o), tool_(fs::read_symlink("/proc/self/exe").string()) {
+  explicit Demo(const DemoOptions& o) : o_(o), tool_(fs::read_symlink("/proc/self/exe").string()) {
     scenario_ = fs::is_regular_file(o.scenario) ? fs::path(o.scenario)
                                                 : Home() / "host_sim" / "scenarios" / (o.scenario + ".toml");
     if (!fs::is_regular_file(scenario_))
@@ -200,7 +200,7 @@ class Demo {
         throw io::InputError("building the drive failed, see " + File("build.txt"));
   }
 
-  Options o_;
+  DemoOptions o_;
   std::string tool_, robot_ = "er20_like", address_;
   fs::path scenario_;
   std::unique_ptr<Background> drive_;
@@ -213,7 +213,7 @@ void AddDemo(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand("demo",
                                   "close the loop on the simulated drive: measure, find what is missing, add it, flash "
                                   "it, measure again\nexample: armcal demo --scenario ripple");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<DemoOptions>();
   verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->capture_default_str();
   verb->add_option("--out", o->out, "folder for everything that is made")->capture_default_str();
   verb->add_option("--build", o->build, "build folder in which a drive with a new model is built")

@@ -100,7 +100,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
 
 namespace {
 
-int Run(const DiagnoseOptions& o) {
+int RunOneDiagnosis(const DiagnoseOptions& o) {
   if (o.robot.empty() || o.train.empty() || o.test.empty())
     throw io::InputError("expected --robot, --train and --test, or --batch, or --splits, or --summary");
   const auto run = RunDiagnosis(o);
@@ -140,8 +140,9 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");
   auto batch = std::make_shared<BatchOptions>();
   AddBatchOptions(*verb, *batch);
-  verb->callback(
-      [o, batch, &action] { action = [o, batch] { return batch->asked() ? RunBatch(*o, *batch) : Run(*o); }; });
+  verb->callback([o, batch, &action] {
+    action = [o, batch] { return batch->asked() ? RunBatch(*o, *batch) : RunOneDiagnosis(*o); };
+  });
 }
 
 }  // namespace armcal::cli

@@ -7,11 +7,11 @@
 namespace armcal::cli {
 namespace {
 
-struct Options {
+struct EstimateOptions {
   std::string connect, robot, program, log, table, records, json;
 };
 
-int Run(const Options& o) {
+int RunEstimate(const EstimateOptions& o) {
   namespace fs = std::filesystem;
   const fs::path robot = RobotPath(o.robot);
   const std::string name = codegen::ReadRobot(robot).name;
@@ -44,7 +44,7 @@ void AddEstimate(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand("estimate",
                                   "run the firmware's estimator here, on the drive's live trace or on a log\nexample: "
                                   "armcal estimate --connect 127.0.0.1:1502 --robot er20_like");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<EstimateOptions>();
   verb->add_option("--connect", o->connect,
                    "drive, HOST:PORT: every sample from now on, until it falls silent for two seconds");
   verb->add_option("--log", o->log, "a recorded log instead");
@@ -53,7 +53,7 @@ void AddEstimate(CLI::App& app, Action& action) {
   verb->add_option("--records", o->records, "keep the table, the samples and the drive's estimate as raw words");
   verb->add_option("--program", o->program, "estimator program (default: the one built for the robot)");
   verb->add_option("--json", o->json, "write the estimates here");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunEstimate(*o); }; });
 }
 
 }  // namespace armcal::cli

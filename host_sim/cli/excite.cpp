@@ -15,7 +15,7 @@
 namespace armcal::cli {
 namespace {
 
-struct Options {
+struct ExciteOptions {
   std::string robot, out, json, from;
   std::string purpose = "train", curve = "fourier", criterion = "condition", search = "gradient";
   std::vector<std::string> separate;
@@ -27,7 +27,7 @@ struct Options {
 
 constexpr int kTrainPeriods = 4, kTestPeriods = 2, kTrainSpeeds = 6, kTestSpeeds = 2;
 
-excitation::Target MakeTarget(const codegen::Robot& robot, const Options& o) {
+excitation::Target MakeTarget(const codegen::Robot& robot, const ExciteOptions& o) {
   using Kind = excitation::Criterion::Kind;
   const codegen::Catalogue records = LoadCatalogue();
   if (!o.separate.empty()) return {robot, records, o.separate, ReadFound(o.from, o.separate)};
@@ -35,7 +35,7 @@ excitation::Target MakeTarget(const codegen::Robot& robot, const Options& o) {
   return {robot, records, o.criterion == "d-optimal" ? Kind::kDOptimal : Kind::kCondition};
 }
 
-excitation::Optimum Search(const excitation::Target& target, const Options& o) {
+excitation::Optimum Search(const excitation::Target& target, const ExciteOptions& o) {
   excitation::OptimiseSettings s;
   s.shape.family = excitation::FamilyNamed(o.curve);
   s.shape.period_s = o.period_s;
@@ -113,7 +113,7 @@ nlohmann::ordered_json Rows(const Eigen::MatrixXd& m) {
   return list;
 }
 
-int Run(const Options& o) {
+int RunExcite(const ExciteOptions& o) {
   const codegen::Model model = LoadModel(o.robot);
   const codegen::Robot& robot = model.robot();
   const excitation::Observation observation(model);
@@ -199,7 +199,7 @@ void AddExcite(CLI::App& app, Action& action) {
                                   "make a trajectory that shows the parameters (collisions are not checked)\n"
                                   "example: armcal excite --robot er20_like --out train.csv\n"
                                   "         armcal excite --robot er20_like --out test.csv --purpose test");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<ExciteOptions>();
   verb->add_option("--robot", o->robot, "robot file, or a name in codegen/robots")->required();
   verb->add_option("--out", o->out, "trajectory file to write: t,q1..qn")->required();
   verb->add_option("--purpose", o->purpose,
@@ -244,7 +244,7 @@ void AddExcite(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_flag("--no-slow", o->no_slow, "leave the slow moves out");
   verb->add_option("--json", o->json, "write the figures here");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunExcite(*o); }; });
 }
 
 }  // namespace armcal::cli

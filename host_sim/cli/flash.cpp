@@ -13,14 +13,14 @@
 namespace armcal::cli {
 namespace {
 
-struct Options {
+struct FlashOptions {
   std::string connect, robot, table, json;
   bool force = false, dry_run = false;
 };
 
 // The words that the file means for this drive. Parameters that the data hardly determined keep the drive's value
 // unless forced.
-std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const Options& o, calibration::TableFile& sent,
+std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptions& o, calibration::TableFile& sent,
                                     std::vector<std::string>& missing) {
   const codegen::Model model = LoadModel(o.robot);
   const calibration::TableFile layout = LayoutOf(drive, model), file = calibration::ReadTable(o.table);
@@ -41,7 +41,7 @@ std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const Options& o
   return calibration::EncodeTable(sent);
 }
 
-int Flash(const Options& o) {
+int Flash(const FlashOptions& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   calibration::TableFile sent;
   std::vector<std::string> missing;
@@ -72,7 +72,7 @@ int Flash(const Options& o) {
   return kOk;
 }
 
-int Verify(const Options& o) {
+int Verify(const FlashOptions& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   calibration::TableFile wanted;
   std::vector<std::string> missing;
@@ -95,7 +95,7 @@ int Verify(const Options& o) {
   return same ? kOk : kMismatch;
 }
 
-CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std::shared_ptr<Options>& o) {
+CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std::shared_ptr<FlashOptions>& o) {
   auto* verb = app.add_subcommand(name, help);
   verb->add_option("--connect", o->connect, "drive, HOST:PORT")->required();
   verb->add_option("--robot", o->robot, "robot file or name: the model the drive was built for")->required();
@@ -108,7 +108,7 @@ CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std
 }  // namespace
 
 void AddFlash(CLI::App& app, Action& action) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<FlashOptions>();
   auto* verb = AddCommon(app, "flash",
                          "store a parameter table in the drive, adopt it and read it back\nexample: armcal flash "
                          "--connect 127.0.0.1:1502 --robot er20_like --table build/table.toml",
@@ -118,7 +118,7 @@ void AddFlash(CLI::App& app, Action& action) {
 }
 
 void AddVerify(CLI::App& app, Action& action) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<FlashOptions>();
   auto* verb = AddCommon(app, "verify",
                          "compare the table in force with a file\nexample: armcal verify --connect 127.0.0.1:1502 "
                          "--robot er20_like --table build/table.toml",

@@ -8,7 +8,7 @@
 namespace armcal::cli {
 namespace {
 
-struct Options {
+struct GenerateOptions {
   std::string robot, out, json;
 };
 
@@ -33,7 +33,7 @@ void PrintStandby(const codegen::Model& model, const codegen::Passport& with) {
   }
 }
 
-int Run(const Options& o) {
+int RunGenerate(const GenerateOptions& o) {
   const codegen::Model model = LoadModel(o.robot);
   const codegen::GeneratedFiles files = codegen::Emit(model);
   const std::filesystem::path folder =
@@ -66,11 +66,11 @@ int Run(const Options& o) {
 void AddGenerate(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand(
       "generate", "make the C++ model of a robot file\nexample: armcal generate --robot er20_like --out build/model");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<GenerateOptions>();
   verb->add_option("--robot", o->robot, "robot file, or a name in codegen/robots")->required();
   verb->add_option("--out", o->out, "folder to write (default: codegen/generated/<robot>)");
   verb->add_option("--json", o->json, "write the figures here");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunGenerate(*o); }; });
 }
 
 }  // namespace armcal::cli

@@ -11,22 +11,21 @@ namespace armcal::cli {
 namespace {
 
 using health::JointHealth;
-using health::Verdict;
 using nlohmann::ordered_json;
 
-struct Options {
+struct HealthOptions {
   std::string connect, json;
 };
 
-const char* NameOf(Verdict v) {
+const char* VerdictText(health::Verdict v) {
   switch (v) {
-    case Verdict::kFits:
+    case health::Verdict::kFits:
       return "fits";
-    case Verdict::kNoLongerFits:
+    case health::Verdict::kNoLongerFits:
       return "no longer fits";
-    case Verdict::kNeverFitted:
+    case health::Verdict::kNeverFitted:
       return "has not fitted since the table was adopted";
-    case Verdict::kTooEarly:
+    case health::Verdict::kTooEarly:
       break;
   }
   return "has moved too little to tell";
@@ -50,10 +49,10 @@ std::string TermText(const health::Term& t) {
 }
 
 std::string Sentence(const JointHealth& h) {
-  std::string text = fmt::format("joint {} {}", h.joint, NameOf(h.verdict));
-  if (h.verdict == Verdict::kTooEarly)
+  std::string text = fmt::format("joint {} {}", h.joint, VerdictText(h.verdict));
+  if (h.verdict == health::Verdict::kTooEarly)
     return text + fmt::format(": {:.0f} samples in motion since the table was adopted", h.rows);
-  if (h.verdict != Verdict::kFits) {
+  if (h.verdict != health::Verdict::kFits) {
     text += h.looks_like.terms.empty() ? ": can't tell what it is" : ": looks like ";
     for (std::size_t i = 0; i < h.looks_like.terms.size(); ++i)
       text += (i > 0 ? ", and " : "") + TermText(h.looks_like.terms[i]);
@@ -73,7 +72,7 @@ ordered_json TermJson(const health::Term& t) {
           {"change", t.value},  {"sd", t.sd},         {"rms_Nm", t.rms_Nm},           {"also_fits", also}};
 }
 
-ordered_json ToJson(const JointHealth& h) {
+ordered_json JointJson(const JointHealth& h) {
   static const char* const words[] = {"fits", "no_longer_fits", "never_fitted", "too_early"};
   ordered_json j{{"joint", h.joint},
                  {"verdict", words[static_cast<int>(h.verdict)]},
@@ -92,7 +91,7 @@ ordered_json ToJson(const JointHealth& h) {
   return j;
 }
 
-int Run(const Options& o) {
+int RunHealth(const HealthOptions& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   ordered_json json{{"verdict", ""}, {"elapsed_s", 0}, {"joints", ordered_json::array()}};
   bool misfit = false, early = false, unnamed = false;
@@ -100,12 +99,12 @@ int Run(const Options& o) {
   for (int joint = 1; joint <= drive.ReadIdentity().axes; ++joint) {
     const JointHealth& h = joints.emplace_back(health::Judge(client::ReadResiduals(drive, joint)));
     fmt::print("{}\n", Sentence(h));
-    const bool bad = h.verdict == Verdict::kNoLongerFits || h.verdict == Verdict::kNeverFitted;
+    const bool bad = h.verdict == health::Verdict::kNoLongerFits || h.verdict == health::Verdict::kNeverFitted;
     misfit = misfit || bad;
     unnamed = unnamed || (bad && h.looks_like.terms.empty());
-    early = early || h.verdict == Verdict::kTooEarly;
+    early = early || h.verdict == health::Verdict::kTooEarly;
     json["elapsed_s"] = h.elapsed_s;
-    json["joints"].push_back(ToJson(h));
+    json["joints"].push_back(JointJson(h));
   }
   const std::vector<int> together = health::ChangedTogether(joints);
   if (!together.empty())
@@ -126,10 +125,10 @@ void AddHealth(CLI::App& app, Action& action) {
       "does each joint still fit the table in force? From the drive's own statistics, without a log\n"
       "exit code 0: all fit, 5: a joint does not, 6: too early to tell\n"
       "example: armcal health --connect 192.168.0.10:502");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<HealthOptions>();
   verb->add_option("--connect", o->connect, "drive, HOST:PORT")->required();
   verb->add_option("--json", o->json, "write the verdicts here");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunHealth(*o); }; });
 }
 
 }  // namespace armcal::cli

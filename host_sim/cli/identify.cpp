@@ -13,7 +13,7 @@
 namespace armcal::cli {
 namespace {
 
-struct Options {
+struct IdentifyOptions {
   std::string robot, channels, table, json, test, method;
   std::vector<std::string> train;
   bool force = false;
@@ -52,7 +52,7 @@ void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
   fmt::print("{}", report::Text(t));
 }
 
-int Run(const Options& o) {
+int RunIdentify(const IdentifyOptions& o) {
   if (o.payload.asked()) {
     if (!o.train.empty() || !o.test.empty() || !o.method.empty())
       throw io::InputError("--with, --without: expected no --train, --test or --method beside them");
@@ -133,7 +133,7 @@ void AddIdentify(CLI::App& app, Action& action) {
                                   "or find the drives' gains by a known payload, or an unknown payload\nexample: "
                                   "armcal identify --robot er20_like --with b.csv.gz --without a.csv.gz --payload "
                                   "known.toml");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<IdentifyOptions>();
   verb->add_option("--robot", o->robot, "robot file or name")->required();
   verb->add_option("--train", o->train, "log(s) to fit");
   verb->add_option("--test", o->test, "held-out log: its error is printed, nothing is fitted to it");
@@ -150,7 +150,7 @@ void AddIdentify(CLI::App& app, Action& action) {
   verb->add_flag("--force", o->force, "let parameters move that the data hardly determine");
   verb->add_option("--json", o->json, "write everything here");
   AddPayloadOptions(*verb, o->payload);
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunIdentify(*o); }; });
 }
 
 }  // namespace armcal::cli

@@ -20,7 +20,7 @@ namespace {
   _exit(127);
 }
 
-int ExitCode(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
+int CodeOf(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
 
 }  // namespace
 
@@ -36,7 +36,7 @@ int RunProgram(const std::vector<std::string>& words, const std::string& log) {
   }
   int status = 0;
   waitpid(child, &status, 0);
-  return ExitCode(status);
+  return CodeOf(status);
 }
 
 Background::Background(const std::vector<std::string>& words) {
@@ -76,7 +76,7 @@ int Background::Wait(std::string* output) {
   waitpid(child_, &status, 0);
   close(pipe_);
   child_ = -1;
-  return ExitCode(status);
+  return CodeOf(status);
 }
 
 void Background::Stop() {

@@ -26,7 +26,7 @@ namespace words = model::words;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-struct Options {
+struct RecordOptions {
   std::string connect, robot, trajectory, out, samples, json;
   int speed_percent = 100, decimation = 0;
 };
@@ -105,7 +105,7 @@ std::string Describe(const Player& p) {
   return "no reason given";
 }
 
-int Run(const Options& o) {
+int RunRecord(const RecordOptions& o) {
   const codegen::Robot robot = codegen::ReadRobot(RobotPath(o.robot));
   const int n = robot.joints(), decimation = o.decimation > 0 ? o.decimation : robot.sample_ticks;
   const excitation::Trajectory trajectory = excitation::ReadTrajectory(o.trajectory, n);
@@ -210,7 +210,7 @@ void AddRecord(CLI::App& app, Action& action) {
       app.add_subcommand("record",
                          "play a trajectory on the (simulated) drive and record its trace\nexample: armcal record "
                          "--connect 127.0.0.1:1502 --robot er20_like --trajectory train.csv --out train_log.csv.gz");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<RecordOptions>();
   verb->add_option("--connect", o->connect, "drive, HOST:PORT")->required();
   verb->add_option("--robot", o->robot, "robot file or name")->required();
   verb->add_option("--trajectory", o->trajectory, "trajectory of armcal excite")->required();
@@ -224,7 +224,7 @@ void AddRecord(CLI::App& app, Action& action) {
                    "ticks averaged into one record (default: the estimator's; 1 keeps gear ripple)")
       ->check(CLI::Range(1, 16));
   verb->add_option("--json", o->json, "write the figures here");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunRecord(*o); }; });
 }
 
 }  // namespace armcal::cli

@@ -7,13 +7,13 @@
 namespace armcal::cli {
 namespace {
 
-struct Options {
+struct SimulateOptions {
   std::string scenario, robot = "er20_like", drive, storage = "build/drive.nor", truth_log;
   int port = 1502;
   bool real_time = false;
 };
 
-int Run(const Options& o) {
+int RunSimulate(const SimulateOptions& o) {
   namespace fs = std::filesystem;
   const fs::path robot = RobotPath(o.robot);
   const fs::path scenario = fs::is_regular_file(o.scenario)
@@ -45,7 +45,7 @@ void AddSimulate(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand(
       "simulate",
       "run the simulated drive (Modbus TCP on 127.0.0.1)\nexample: armcal simulate --scenario stribeck --port 1502");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<SimulateOptions>();
   verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->required();
   verb->add_option("--robot", o->robot, "robot file or name")->capture_default_str();
   verb->add_option("--drive", o->drive, "drive program (default: the one built for the robot)");
@@ -54,7 +54,7 @@ void AddSimulate(CLI::App& app, Action& action) {
   verb->add_option("--truth-log", o->truth_log,
                    "what the torque sensors would read without noise, for the report's floor");
   verb->add_flag("--real-time", o->real_time, "one virtual second a second (default: as fast as the host follows)");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunSimulate(*o); }; });
 }
 
 }  // namespace armcal::cli

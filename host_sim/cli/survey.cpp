@@ -14,7 +14,7 @@
 namespace armcal::cli {
 namespace {
 
-struct Options {
+struct SurveyOptions {
   std::string robot = "er20_like", json, report, data;
   std::vector<std::string> tables;
   std::string feedforward = "set";
@@ -24,7 +24,7 @@ struct Options {
 };
 
 // Folder of measured logs: the option, or the one below ARMCAL_DATA; empty where there is none.
-std::string MeasuredLogs(const Options& o) {
+std::string MeasuredLogs(const SurveyOptions& o) {
   const char* data = std::getenv("ARMCAL_DATA");
   const std::string folder = !o.data.empty() ? o.data : data ? std::string(data) + "/measured" : "";
   if (!folder.empty() && std::filesystem::is_directory(folder)) return folder;
@@ -32,7 +32,7 @@ std::string MeasuredLogs(const Options& o) {
   return "";
 }
 
-int Run(const Options& o) {
+int RunSurvey(const SurveyOptions& o) {
   survey::Settings s;
   s.home = Home().string();
   s.robot = codegen::ReadRobot(RobotPath(o.robot));
@@ -73,7 +73,7 @@ void AddSurvey(CLI::App& app, Action& action) {
       app.add_subcommand("survey",
                          "reproduce the survey's Tables 5 to 12 and Figures 1 to 4, printed figures and better "
                          "methods beside\nexample: armcal survey --table 8 --draws 20 --report survey.html");
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<SurveyOptions>();
   verb->add_option("--table", o->tables, "5 to 12, trajectories, priors, online, figures (default: all)")
       ->check(
           CLI::IsMember({"5", "6", "7", "8", "9", "10", "11", "12", "trajectories", "priors", "online", "figures"}));
@@ -92,7 +92,7 @@ void AddSurvey(CLI::App& app, Action& action) {
   verb->add_option("--data", o->data, "folder of measured logs (default: measured in ARMCAL_DATA)");
   verb->add_option("--json", o->json, "write every table and goal here");
   verb->add_option("--report", o->report, "write the page here (HTML)");
-  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+  verb->callback([o, &action] { action = [o] { return RunSurvey(*o); }; });
 }
 
 }  // namespace armcal::cli

@@ -13,7 +13,7 @@ namespace reg = link::reg;
 
 namespace {
 
-constexpr int kAttempts = 5;
+constexpr int kSnapshots = 5;
 
 ResidualBins TakeBins(const std::uint16_t*& w) {
   ResidualBins bins;
@@ -33,7 +33,7 @@ ResidualBins TakeBins(const std::uint16_t*& w) {
 JointResiduals ReadResiduals(DriveClient& drive, int joint) {
   if ((drive.ReadIdentity().capabilities & reg::kHasResiduals) == 0)
     throw RefusedError(drive.name() + ": keeps no residual statistics", 0, core::Status::kBadAddress);
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kSnapshots; ++attempt) {
     drive.WriteSingle(reg::kResidualSelect, static_cast<std::uint16_t>(joint));
     const std::vector<std::uint16_t> header = drive.ReadInput(reg::kResidualPage, reg::kResidualHeaderCount);
     const std::vector<std::uint16_t> values = drive.ReadInput(reg::kResidualValues, 2 * reg::kResidualValueCount);

@@ -18,8 +18,8 @@ namespace reg = link::reg;
 
 namespace {
 
-constexpr std::size_t kChunk = 120;
-constexpr auto kPoll = std::chrono::milliseconds(5);
+constexpr std::size_t kWordsAtOnce = 120;
+constexpr auto kCommitPoll = std::chrono::milliseconds(5);
 constexpr auto kPatience = std::chrono::seconds(60);  // twice the drive's own limit on a commit
 constexpr std::uint16_t kActive = 5, kFailed = 6;     // transaction_state
 
@@ -42,8 +42,8 @@ class Flash {
   }
 
   void Stage(const FlashProgress& progress) {
-    for (std::size_t done = 0; done < words_.size(); done += kChunk) {
-      const std::size_t part = std::min(kChunk, words_.size() - done);
+    for (std::size_t done = 0; done < words_.size(); done += kWordsAtOnce) {
+      const std::size_t part = std::min(kWordsAtOnce, words_.size() - done);
       drive_.Write(reg::kStaged + static_cast<int>(done), words_.subspan(done, part));
       if (progress) progress(0.8 * static_cast<double>(done + part) / static_cast<double>(words_.size()));
     }
@@ -58,7 +58,7 @@ class Flash {
         throw RefusedError(fmt::format("{}: the table was not taken: {}; the table before it stays in force",
                                        drive_.name(), StatusName(s.transaction_status)),
                            0, s.transaction_status);
-      std::this_thread::sleep_for(kPoll);
+      std::this_thread::sleep_for(kCommitPoll);
     }
     throw LinkError(drive_.name() + ": the drive does not finish saving; its state is unknown");
   }

@@ -16,7 +16,7 @@ using core::GetU32;
 using core::PutU32;
 
 namespace {
-constexpr auto kPoll = std::chrono::milliseconds(2);
+constexpr auto kTracePoll = std::chrono::milliseconds(2);
 }
 
 void ArmTrace(DriveClient& drive, int trace, const TraceRequest& request) {
@@ -71,7 +71,7 @@ TraceRecords TraceReader::TakeAll() {
     // The state is read together with the emptiness of the page, so nothing can arrive after "done and empty".
     const std::size_t taken = TakePage(records);
     if (taken == 0 && (records.state == TraceState::kDone || records.state == TraceState::kOff)) return records;
-    if (taken == 0) std::this_thread::sleep_for(kPoll);
+    if (taken == 0) std::this_thread::sleep_for(kTracePoll);
   }
 }
 

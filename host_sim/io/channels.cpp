@@ -20,7 +20,7 @@ struct Unit {
   double zero = 0;
 };
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kDegree_rad = std::numbers::pi / 180;
 constexpr double kRpm = std::numbers::pi / 30;
 constexpr double kGravity = 9.80665;  // m/s^2, by definition of kgf
 
@@ -30,18 +30,18 @@ constexpr Unit kUnits[] = {
     {"ms", "time", 1e-3},
     {"us", "time", 1e-6},
     {"rad", "position", 1},
-    {"deg", "position", kDegree},
+    {"deg", "position", kDegree_rad},
     {"mrad", "position", 1e-3},
     {"rev", "position", 2 * std::numbers::pi},
     {"m", "position", 1},
     {"mm", "position", 1e-3},
     {"rad/s", "speed", 1},
-    {"deg/s", "speed", kDegree},
+    {"deg/s", "speed", kDegree_rad},
     {"rpm", "speed", kRpm},
     {"m/s", "speed", 1},
     {"mm/s", "speed", 1e-3},
     {"rad/s^2", "acceleration", 1},
-    {"deg/s^2", "acceleration", kDegree},
+    {"deg/s^2", "acceleration", kDegree_rad},
     {"m/s^2", "acceleration", 1},
     {"N*m", "torque", 1},
     {"mN*m", "torque", 1e-3},

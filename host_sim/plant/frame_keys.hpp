@@ -9,9 +9,10 @@
 
 namespace armcal::plant {
 
+inline constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+
 // xyz_m: origin; rpy_deg: rotation about the fixed x, then y, then z axis (Rz Ry Rx). Each may be absent: zero.
 inline KDL::Frame ReadFrame(TomlKeys keys) {
-  constexpr double kRadPerDeg = std::numbers::pi / 180.0;
   KDL::Frame frame;
   if (keys.Has("xyz_m")) {
     const auto xyz = keys.Numbers("xyz_m", 3);

@@ -3,15 +3,12 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <numbers>
 
 #include "host_sim/plant/frame_keys.hpp"
 #include "host_sim/plant/toml_keys.hpp"
 
 namespace armcal::plant {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 Body ReadBody(TomlKeys link) {
   Body body;

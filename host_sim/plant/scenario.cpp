@@ -4,14 +4,12 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 
 #include "host_sim/plant/frame_keys.hpp"
 
 namespace armcal::plant {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr int kMostJoints = 16;  // only a bound for the message; Arm compares with the robot
 
 // A factor 1 - spread must stay positive, or friction and torque constants could vanish.

@@ -12,7 +12,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kPositionNoise_rad = 1e-4;
-constexpr int kDraws = 20;
+constexpr int kLoopDraws = 20;
 const char* const kLog = "closed loop";
 
 struct Contender {
@@ -139,7 +139,7 @@ void ShowInstruments(const Settings& settings, const Motions& motions, Findings&
        "Without a prior J_e is e_d of the standard parameters' smallest answer, a ratio by chance; what noise does and "
        "instruments undo is seen in the base error."}};
   const Bench bench(settings, motions);
-  const int draws = std::min(kDraws, settings.draws);
+  const int draws = std::min(kLoopDraws, settings.draws);
   std::vector<std::vector<Result>> of_draw(static_cast<std::size_t>(draws));
   ForEachDraw(settings, "table 10", draws, [&](int d) {
     const Draw draw = bench.At(d);

@@ -22,14 +22,14 @@ void AddRows(const std::string& prior, const std::string& case_name, const std::
   }
 }
 
-const Outcome* Named(const std::vector<Outcome>& outcomes, const std::string& name) {
+const Outcome* NoisyOf(const std::vector<Outcome>& outcomes, const std::string& name) {
   for (const Outcome& o : outcomes)
     if (o.name == name && !o.noisy.empty()) return &o;
   return nullptr;
 }
 
 void WorstGoals(const std::vector<Outcome>& outcomes, Findings& out) {
-  const Outcome* map = Named(outcomes, "map_barrier");
+  const Outcome* map = NoisyOf(outcomes, "map_barrier");
   if (!map) return;
   const std::string where = "MAP, worst case +-20 %, noise, " + std::to_string(map->noisy.size()) + " draws: ";
   const Statistic e_d = Over(map->noisy, &Score::e_d);
@@ -80,7 +80,7 @@ void ShowPriors(const Settings& settings, const Motions& motions, Findings& out)
   }
   const auto sharp = run(worst, Law::kCoulombViscous, false, 0.1, map);
   AddRows(PriorName(worst), "(7), no noise, sigma / 10", sharp, false, sheet);
-  if (const Outcome* o = Named(sharp, "map_barrier"))
+  if (const Outcome* o = NoisyOf(sharp, "map_barrier"))
     out.goals.push_back({"MAP, worst case +-20 %, no noise: mean e_d", Over(o->clean, &Score::e_d).mean, 0.15, true});
   const PriorError uniform{PriorError::kUniform, 0.2};
   for (const PriorError& prior : {uniform, worst, PriorError{PriorError::kUniform, 0.5}}) {
@@ -89,7 +89,7 @@ void ShowPriors(const Settings& settings, const Motions& motions, Findings& out)
     AddRows(PriorName(prior), "(4), drawn truths, noise", stribeck, true, sheet);
     if (!judged) continue;
     for (const std::string& name : laws)
-      if (const Outcome* o = Named(stribeck, name))
+      if (const Outcome* o = NoisyOf(stribeck, name))
         out.goals.push_back(
             {"Stribeck, drawn truths, noise, " + std::to_string(o->noisy.size()) + " draws, " + o->name + ": mean e_f",
              Over(o->noisy, &Score::e_f).mean, 0.06, true});

@@ -13,7 +13,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kPeriods = 3, kShownJoint = 2, kDraws = 3;
+constexpr int kPeriods = 3, kShownJoint = 2, kTracks = 3;
 constexpr double kStepAt = 1.0 / 3;  // of the run
 
 struct Profile {
@@ -32,7 +32,7 @@ struct Filter {
 const Filter kFilters[] = {{"kalman", 0},         {"forgetting", 0.99},  {"forgetting", 0.993}, {"forgetting", 0.995},
                            {"forgetting", 0.997}, {"forgetting", 0.998}, {"forgetting", 0.999}, {"multiple_model", 0}};
 
-struct Run {
+struct Tracked {
   MatrixXd beta, found;  // [samples x joints]
 };
 
@@ -42,8 +42,8 @@ VectorXd Shape(const Profile& profile, int samples) {
 }
 
 // 30 s of the linear trajectory with all betas changing alike.
-Run Track(const Settings& settings, const Motions& motions, const calibration::Method& method, double mu,
-          const Profile& profile, int draw) {
+Tracked Track(const Settings& settings, const Motions& motions, const calibration::Method& method, double mu,
+              const Profile& profile, int draw) {
   const codegen::Robot arm =
       Variant(settings.robot, Law::kCoulombViscous, Bodies::kStandard, SetStribeck(settings.robot.joints()));
   const codegen::Model truth(arm, settings.records);
@@ -52,12 +52,12 @@ Run Track(const Settings& settings, const Motions& motions, const calibration::M
   const codegen::Model prior(DrawPrior(arm, error, seed), settings.records);
   const codegen::Signals s = Sampled(motions.linear.series, kPeriods * kSamples);
   const VectorXd z = SetParameters(truth), growth = Shape(profile, s.samples());
-  const int n = truth.joints();
-  Run run;
-  run.beta.resize(s.samples(), n), run.found.resize(s.samples(), n);
+  const int joints = truth.joints();
+  Tracked run;
+  run.beta.resize(s.samples(), joints), run.found.resize(s.samples(), joints);
   MatrixXd tau = Torque(truth, s, z);
-  VectorXd sigma(n);
-  for (int j = 0; j < n; ++j) {
+  VectorXd sigma(joints);
+  for (int j = 0; j < joints; ++j) {
     const double beta = z[PlaceOf(truth, "Fv" + std::to_string(j + 1))];
     run.beta.col(j) = beta * growth;
     tau.col(j) += beta * (growth.array() - 1).matrix().cwiseProduct(s.qd.col(j));
@@ -70,14 +70,14 @@ Run Track(const Settings& settings, const Motions& motions, const calibration::M
   const Attempt attempt = Try(method, problem);
   run.found.setConstant(std::nan(""));
   if (attempt.solution && attempt.solution->path.rows() == s.samples())
-    for (int j = 0; j < n; ++j)
+    for (int j = 0; j < joints; ++j)
       run.found.col(j) = attempt.solution->path.col(PlaceOf(truth, "Fv" + std::to_string(j + 1)));
   return run;
 }
 
 std::vector<double> List(const VectorXd& v) { return {v.begin(), v.end()}; }
 
-report::Plot PlotOf(const std::string& title, const std::vector<std::pair<std::string, const Run*>>& runs) {
+report::Plot PlotOf(const std::string& title, const std::vector<std::pair<std::string, const Tracked*>>& runs) {
   report::Plot plot;
   plot.text = {title, "time / s", "viscous friction of joint 3 / N m s/rad", 760, 300};
   const MatrixXd& beta = runs.front().second->beta;
@@ -106,24 +106,24 @@ void ShowTracking(const Settings& settings, const Motions& motions, Evidence& ev
                "rest."}};
   for (const Profile& p : kProfiles) sheet.columns.emplace_back(p.name);
   constexpr int kFilterCount = std::size(kFilters), kProfileCount = std::size(kProfiles);
-  std::vector<Run> runs(kFilterCount * kProfileCount * kDraws);
+  std::vector<Tracked> runs(kFilterCount * kProfileCount * kTracks);
   const auto place = [](int filter, int profile, int draw) {
-    return static_cast<std::size_t>((filter * kProfileCount + profile) * kDraws + draw);
+    return static_cast<std::size_t>((filter * kProfileCount + profile) * kTracks + draw);
   };
   ForEachDraw(settings, "figure 4", static_cast<int>(runs.size()), [&](int k) {
-    const int f = k / (kProfileCount * kDraws), p = k / kDraws % kProfileCount;
-    runs[static_cast<std::size_t>(k)] =
-        Track(settings, motions, calibration::FindMethod(kFilters[f].method), kFilters[f].mu, kProfiles[p], k % kDraws);
+    const int f = k / (kProfileCount * kTracks), p = k / kTracks % kProfileCount;
+    runs[static_cast<std::size_t>(k)] = Track(settings, motions, calibration::FindMethod(kFilters[f].method),
+                                              kFilters[f].mu, kProfiles[p], k % kTracks);
   });
-  std::map<std::pair<std::string, std::string>, Run> shown;  // (profile, filter) -> the first draw
+  std::map<std::pair<std::string, std::string>, Tracked> shown;  // (profile, filter) -> the first draw
   for (int k = 0; k < kFilterCount; ++k) {
     const Filter& f = kFilters[k];
     std::vector<Cell> row{calibration::FindMethod(f.method).title, f.mu > 0 ? Cell(f.mu) : Cell("-")};
     std::map<std::string, double> mean;  // by profile
     for (int p = 0; p < kProfileCount; ++p) {
       std::vector<double> errors;
-      for (int d = 0; d < kDraws; ++d) {
-        const Run& run = runs[place(k, p, d)];
+      for (int d = 0; d < kTracks; ++d) {
+        const Tracked& run = runs[place(k, p, d)];
         if (run.beta.size() > 0)
           errors.push_back(FollowError(run.beta, run.found, 1 / kRate_Hz, settings.levels.settle_s));
       }
@@ -143,7 +143,7 @@ void ShowTracking(const Settings& settings, const Motions& motions, Evidence& ev
   Picture picture{
       "4", "following a changing viscous friction", "Joint 3; (a), (b) slope, (c), (d) second-order change.", {}, ""};
   for (const char* profile : {"slope", "second order"}) {
-    std::vector<std::pair<std::string, const Run*>> kalman, forgetting;
+    std::vector<std::pair<std::string, const Tracked*>> kalman, forgetting;
     for (const auto& [key, run] : shown) {
       if (key.first != profile || run.beta.size() == 0) continue;
       if (key.second == "kalman") kalman.insert(kalman.begin(), {"(19)", &run});

@@ -163,7 +163,7 @@ std::vector<double> FindSlides(Robot robot) {
   return choice.slide_m;
 }
 
-FrameChoice Search(const Robot& robot) {
+FrameChoice SearchFrames(const Robot& robot) {
   FrameChoice choice = LocalFrames(robot);
   choice.slide_m = BestSlides(robot);
   const std::vector<int> base = BaseColumns(robot, choice);
@@ -190,7 +190,7 @@ std::vector<double> BestSlides(const Robot& robot) {
 }
 
 FrameChoice BestFrames(const Robot& robot) {
-  return Remembered<FrameChoice>(Key(robot), [&] { return Search(robot); });
+  return Remembered<FrameChoice>(Key(robot), [&] { return SearchFrames(robot); });
 }
 
 }  // namespace armcal::codegen

@@ -23,7 +23,7 @@ inline __attribute__((always_inline)) void ApplyTo(const double* __restrict a, c
 }
 
 // z = a op b over one block. Lanes differ. One loop an operation: the compiler vectorises those that it can.
-WIDEST_VECTORS void Apply(Op op, const double* a, const double* b, double* z) {
+WIDEST_VECTORS void ApplyToBlock(Op op, const double* a, const double* b, double* z) {
   switch (op) {
     case Op::kNegate:
       return ApplyTo<Op::kNegate>(a, b, z);
@@ -126,7 +126,7 @@ void Tape::ForEachBlock(std::span<const Binding> bindings, int samples, const Vi
     for (const int k : varying) {
       const Node& s = step_[k];
       if (s.op == Op::kInput) std::copy_n(bindings[s.a].column + begin, count, lane(k));
-      else Apply(s.op, lane(s.a), s.b < 0 ? lane(s.a) : lane(s.b), lane(k));
+      else ApplyToBlock(s.op, lane(s.a), s.b < 0 ? lane(s.a) : lane(s.b), lane(k));
     }
     visit(begin, count, root);
   }

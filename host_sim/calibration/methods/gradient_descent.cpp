@@ -18,8 +18,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kLinear = 50000, kNonlinear = 8000;  // steps: some seconds
-constexpr int kMemory = 10;                        // values that a step may be worse than
+constexpr int kLinearSteps = 50000, kNonlinearSteps = 8000;  // some seconds
+constexpr int kMemory = 10;                                  // values that a step may be worse than
 constexpr double kBarrier = 1e-3;    // of the objective at the start, per unit of log det: far below what data change
 constexpr double kSmallStep = 1e-7;  // of the ranges: the projected gradient leads nowhere
 
@@ -63,7 +63,7 @@ Solution GradientDescent(const Problem& problem) {
   VectorXd best_u = u;
   std::vector<double> last = {value};
   double length = 1 / std::max(1e-12, gradient.cwiseAbs().maxCoeff());
-  const int most = problem.model->nonlinear() ? kNonlinear : kLinear;
+  const int most = problem.model->nonlinear() ? kNonlinearSteps : kLinearSteps;
   Solution out;
   out.converged = false;
   for (; out.iterations < most && !Stopped(problem); ++out.iterations) {

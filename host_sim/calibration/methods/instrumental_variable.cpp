@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kIterations = 8;    // three are usual
+constexpr int kLoopRounds = 8;    // three are usual
 constexpr double kUnseen = 1e-9;  // singular value, relative, of directions that (17) cannot see
 
 // The step from z, and the covariance of the estimate behind it.
@@ -62,7 +62,7 @@ VectorXd Step(const Problem& problem, const VectorXd& z, const Linearised& K, co
 }  // namespace
 
 Solution InstrumentalVariable(const Problem& problem) {
-  return IterateOnLoop(problem, "instrumental_variable", kIterations,
+  return IterateOnLoop(problem, "instrumental_variable", kLoopRounds,
                        [&](const std::vector<Dataset>& simulated, const VectorXd& z, Solution& solution) {
                          const Linearised measured = Linearise(problem, z);
                          solution.memory_bytes = 4 * static_cast<std::size_t>(measured.A.size()) * sizeof(double);

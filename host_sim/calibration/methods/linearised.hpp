@@ -14,6 +14,9 @@ struct Linearised {
 };
 Linearised Linearise(const Problem& problem, const Eigen::VectorXd& z);
 
+// Largest change of a coordinate, in its standard deviations, of a method that has settled.
+inline constexpr double kSettled = 1e-3;
+
 // Coordinates that a method may move: rigid columns, columns whose state is "estimated", eta that has a range.
 std::vector<int> FreeCoordinates(const Problem& problem);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "host_sim/calibration/methods/better_methods.hpp"
+#include "host_sim/calibration/methods/linearised.hpp"
 #include "host_sim/io/butterworth.hpp"
 #include "host_sim/io/input_error.hpp"
 
@@ -15,8 +16,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kIterations = 15;
-constexpr double kSettled = 1e-3;  // largest change of a coordinate in its standard deviations
+constexpr int kDecimatedSteps = 15;
 
 // All rows of one log at z, used or not: a filter needs its neighbours.
 std::vector<MatrixXd> AllRows(const Problem& problem, const Dataset& log, const VectorXd& z) {
@@ -78,7 +78,7 @@ Solution ParallelDecimation(const Problem& problem) {
   VectorXd z = problem.start;
   ClampEta(problem, z);
   solution.converged = false;
-  for (; solution.iterations < kIterations && !solution.converged && !Stopped(problem); ++solution.iterations) {
+  for (; solution.iterations < kDecimatedSteps && !solution.converged && !Stopped(problem); ++solution.iterations) {
     const Linearised rows = FilteredRows(problem, z);
     VectorXd next = SolveRegularised(problem, rows.A.transpose() * rows.A,
                                      rows.A.transpose() * (rows.residual + rows.A * z), &solution.covariance);

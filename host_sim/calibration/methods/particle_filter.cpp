@@ -32,7 +32,7 @@ struct Schedule {
   int rounds;
   double say;
 };
-constexpr Schedule kLinear = {1000, 0.9}, kNonlinear = {250, 0.8};
+constexpr Schedule kLinearSchedule = {1000, 0.9}, kNonlinearSchedule = {250, 0.8};
 
 double EffectiveShare(const VectorXd& value, double best, double per_temperature) {
   const Eigen::ArrayXd w = (-per_temperature * (value.array() - best)).exp();
@@ -145,7 +145,7 @@ Solution ParticleFilter(const Problem& problem) {
   const double began = CpuSeconds();
   const SearchSpace space(problem, "particle filter");
   Objective objective(problem, Criterion::kMeanSpread);
-  const Schedule schedule = problem.model->nonlinear() ? kNonlinear : kLinear;
+  const Schedule schedule = problem.model->nonlinear() ? kNonlinearSchedule : kLinearSchedule;
   Cloud cloud(objective, space, schedule.say, problem.seed);
   Solution out;
   double earlier = cloud.best();

@@ -19,8 +19,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kHuber = 1.345, kBisquare = 4.685;
-constexpr int kHuberRounds = 15, kRounds = 40;
-constexpr double kSettled = 1e-3;  // largest change of a coordinate in its standard deviations
+constexpr int kHuberRounds = 15, kAllRounds = 40;
 
 double Weight(double x, bool bisquare) {
   if (!bisquare) return x <= kHuber ? 1 : kHuber / x;
@@ -55,7 +54,7 @@ Solution Robust(const Problem& problem) {
   VectorXd root = VectorXd::Ones(rows.residual.size());  // of the weights; the first round is plain least squares
   solution.converged = false;
   bool bisquare = false;
-  for (; solution.iterations < kRounds && !solution.converged && !Stopped(problem); ++solution.iterations) {
+  for (; solution.iterations < kAllRounds && !solution.converged && !Stopped(problem); ++solution.iterations) {
     const MatrixXd A = root.asDiagonal() * rows.A;
     const VectorXd target = root.cwiseProduct(rows.residual + rows.A * z);
     VectorXd next = SolveRegularised(problem, A.transpose() * A, A.transpose() * target, &solution.covariance);
@@ -72,7 +71,7 @@ Solution Robust(const Problem& problem) {
     const VectorXd scale = RobustScale(rows, problem.model->joints());
     for (Eigen::Index r = 0; r < root.size(); ++r)
       root[r] = std::sqrt(Weight(std::abs(rows.residual[r]) / scale[rows.joint[r]], bisquare)) / scale[rows.joint[r]];
-    if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / kRounds, change);
+    if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / kAllRounds, change);
   }
   solution.z = z;
   const auto left_out = (root.array() == 0).count();

@@ -20,7 +20,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 namespace {
 constexpr double kRatio = 1.8;  // of neighbouring q_k: the mixture errs by at most 0.022
-constexpr int kMostBasis = 10, kGrid = 240, kProfile = 10, kIterations = 60;
+constexpr int kMostBasis = 10, kGrid = 240, kSpeedsTried = 10, kBasisSteps = 60;
 constexpr double kUnknownLog = 1.5;  // prior deviation of log(Fs - Fc) where its mean is zero: a factor of 4.5
 
 // One joint's law: where its parameters stand in z, its basis.
@@ -217,17 +217,17 @@ Solution StribeckBasis(const Problem& problem) {
   VectorXd theta = fit.start();
   double cost = fit.Cost(theta), damping = 1e-3;
   for (std::size_t i = 0; i < laws.size(); ++i)  // where q_s is far off, its slope says nothing
-    for (int k = 0; k < kProfile; ++k)
+    for (int k = 0; k < kSpeedsTried; ++k)
       for (const double amplitude : {0.3, 1.0, 3.0}) {
         const auto a = static_cast<Eigen::Index>(3 * i);
         VectorXd trial = theta;
         trial[a] = fit.start()[a] + std::log(amplitude);
-        trial[a + 1] = fit.Speed(a + 1, (k + 0.5) / kProfile);
+        trial[a + 1] = fit.Speed(a + 1, (k + 0.5) / kSpeedsTried);
         if (const double now = fit.Cost(trial); now < cost) cost = now, theta = trial;
       }
   Solution solution;
   solution.converged = false;
-  for (; solution.iterations < kIterations && !solution.converged; ++solution.iterations)
+  for (; solution.iterations < kBasisSteps && !solution.converged; ++solution.iterations)
     solution.converged = !fit.Step(theta, cost, damping);
   solution.z = problem.start;
   solution.z.head(model.columns()) = reduced.offset - reduced.back * fit.Weights(theta);

@@ -17,9 +17,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kProfile = 5;  // values tried of each eta
-constexpr int kIterations = 30;
-constexpr double kSettled = 1e-6;  // decrease of the cost, in units of chi^2 / 2
+constexpr int kValuesTried = 5;  // values tried of each eta
+constexpr int kProjectionSteps = 30;
+constexpr double kSettledCost = 1e-6;  // decrease of the cost, in units of chi^2 / 2
 
 class Projection {
  public:
@@ -116,9 +116,9 @@ class Projection {
 // The best of some values of each eta in turn, the others held.
 void Profile(const Problem& problem, const Projection& fit, VectorXd& z, double& cost) {
   for (const int c : fit.eta())
-    for (int k = 0; k < kProfile && !Stopped(problem); ++k) {
+    for (int k = 0; k < kValuesTried && !Stopped(problem); ++k) {
       VectorXd trial = z;
-      const double share = (k + 0.5) / kProfile;
+      const double share = (k + 0.5) / kValuesTried;
       trial[c] = fit.logarithmic(c) ? problem.lower[c] * std::pow(problem.upper[c] / problem.lower[c], share)
                                     : problem.lower[c] + share * (problem.upper[c] - problem.lower[c]);
       if (const double now = fit.Evaluate(trial, nullptr, nullptr); now < cost) cost = now, z = trial;
@@ -139,7 +139,7 @@ Solution VariableProjection(const Problem& problem) {
   double cost = fit.Evaluate(z, nullptr, nullptr), damping = 1e-3;
   Profile(problem, fit, z, cost);
   solution.converged = false;
-  for (; solution.iterations < kIterations && !solution.converged && !Stopped(problem); ++solution.iterations) {
+  for (; solution.iterations < kProjectionSteps && !solution.converged && !Stopped(problem); ++solution.iterations) {
     fit.Evaluate(z, &gradient, &hessian);
     solution.converged = true;
     for (int attempt = 0; attempt < 10; ++attempt) {
@@ -148,13 +148,13 @@ Solution VariableProjection(const Problem& problem) {
       VectorXd trial = fit.Moved(z, -damped.ldlt().solve(gradient));
       const double now = fit.Evaluate(trial, nullptr, nullptr);
       if (now < cost) {
-        solution.converged = cost - now < kSettled * (1 + cost);
+        solution.converged = cost - now < kSettledCost * (1 + cost);
         cost = now, z = trial, damping = std::max(1e-9, damping / 10);
         break;
       }
       damping = std::max(1e-6, damping * 10);
     }
-    if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / kIterations, cost);
+    if (problem.progress) problem.progress(static_cast<double>(solution.iterations + 1) / kProjectionSteps, cost);
   }
   solution.z = z;
   const Linearised here = Linearise(problem, z);

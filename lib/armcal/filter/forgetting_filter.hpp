@@ -4,6 +4,7 @@
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
+#include "armcal/filter/whole_rows.hpp"
 #include "armcal/math/givens.hpp"
 
 namespace armcal::filter {
@@ -15,7 +16,7 @@ namespace armcal::filter {
 // The triangle starts from, and never falls below, d = kFloor: a millionth of the prior's weight. The read-out takes
 // that much off the prior, so that it is counted once.
 template <class Layout>
-class ForgettingFilter {
+class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
  public:
   static constexpr int kColumns = Layout::kColumns;
   static constexpr bool kExtended = false;
@@ -74,13 +75,7 @@ class ForgettingFilter {
 
   // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense], zero before kRowBegin[joint].
   // With use = false, or when the report is not kOk, every bit of the triangle stays; the instructions are the same.
-  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use) {
-    BeginRow(joint, front, dense, y, use);
-    int all = kNoSlices;
-    (void)StepRow(all);
-    return report_;
-  }
-  // The same in slices: StepRow, which spends credit (slices.hpp), until it answers true; then report().
+  // Then StepRow, which spends credit (slices.hpp), until it answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     const int begin = Layout::kRowBegin[joint];
     first_ = Layout::kFrontBegin[joint];
@@ -96,11 +91,8 @@ class ForgettingFilter {
     for (int k = begin; k < Layout::kDense; ++k) put(width_ + k - begin, dense[k]);
     put(length_, y);
 
-    report_.status = Judge(largest);
-    report_.accepted = use & (report_.status == core::Status::kOk);
-    report_.status = GatedUnless(use, report_.status);
-    const std::uint32_t mask = math::MaskOf(report_.accepted);
-    for (int k = 0; k <= length_; ++k) row_[k] = math::Masked(row_[k], mask);
+    const std::uint32_t taken = Admit(use, largest, report_);
+    for (int k = 0; k <= length_; ++k) row_[k] = math::Masked(row_[k], taken);
     weight_ = 1.0f;
     next_ = 0;
   }
@@ -134,7 +126,6 @@ class ForgettingFilter {
 
   // Once after the rows of a sample: a front column forgets if its joint moves (bit i of `moving`), a dense column if
   // all move. What stands still keeps all it knows.
-  void EndSample(std::uint32_t moving) { BeginEnd(moving); }
   void BeginEnd(std::uint32_t moving) {
     for (int i = 0; i < Layout::kJoints; ++i)
       Forget(Layout::kFrontBegin[i], Layout::kFrontBegin[i + 1], (moving >> i & 1u) != 0u);
@@ -150,10 +141,8 @@ class ForgettingFilter {
   // columns, or kJoints: the dense ones. Between samples; interface shared by all filters.
   static constexpr bool CanReset(int block) { return block >= 0 && block <= Layout::kJoints; }
   void BeginReset(int block) {
-    const bool joint = block < Layout::kJoints;
-    const int begin = joint ? Layout::kFrontBegin[block] : Layout::kFront;
-    const int end = joint ? Layout::kFrontBegin[block + 1] : kColumns;
-    for (int k = begin; k < end; ++k) d_[k] = kFloor;
+    const ColumnRange columns = ColumnsOfBlock<Layout>(block, kColumns);
+    for (int k = columns.begin; k < columns.end; ++k) d_[k] = kFloor;
   }
   bool StepReset(int& credit) {
     credit -= kEndCost;
@@ -205,10 +194,6 @@ class ForgettingFilter {
       out.sd[k] = math::Sqrt(out.variance[p]);
     }
     return true;
-  }
-  bool StepReadOut(ReadOut& out) const {
-    int credit = kSliceCredit;
-    return StepReadOut(out, credit);
   }
 
   const float* weights() const { return d_; }      // [kColumns] d of each row

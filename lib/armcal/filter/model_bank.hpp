@@ -5,6 +5,7 @@
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
+#include "armcal/filter/whole_rows.hpp"
 
 namespace armcal::filter {
 
@@ -14,7 +15,7 @@ namespace armcal::filter {
 // (H. Blom, Y. Bar-Shalom, 1988), but keeps its own covariance: mixing those, too, would need new factors of all three
 // and follows no better.
 template <class Layout>
-class ModelBank {
+class ModelBank : public WholeRows<ModelBank<Layout>> {
  public:
   static constexpr bool kExtended = false;
   static constexpr int kColumns = Layout::kColumns, kJoints = Layout::kJoints, kMembers = 3;
@@ -57,19 +58,10 @@ class ModelBank {
   }
 
   // Verbs and slices as of the other filters. The report's innovation and variance are the mixture's.
-  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use) {
-    BeginRow(joint, front, dense, y, use);
-    int all = kNoSlices;
-    (void)StepRow(all);
-    return report_;
-  }
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     joint_ = joint;
     const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, nullptr, row_);
-    report_.status = Judge(math::Max(largest, MagnitudeBits(y)));
-    report_.accepted = use & (report_.status == core::Status::kOk);
-    report_.status = GatedUnless(use, report_.status);
-    const std::uint32_t taken = math::MaskOf(report_.accepted);
+    const std::uint32_t taken = Admit(use, math::Max(largest, MagnitudeBits(y)), report_);
     for (int p = Columns::kAt.first[joint]; p < Columns::kSize; ++p) row_[p] = math::Masked(row_[p], taken);
     y_ = math::Masked(y, taken);
     at_ = 0;
@@ -94,11 +86,6 @@ class ModelBank {
   }
   const UpdateReport& report() const { return report_; }
 
-  void EndSample(std::uint32_t moving) {
-    BeginEnd(moving);
-    int all = kNoSlices;
-    (void)StepEnd(all);
-  }
   void BeginEnd(std::uint32_t moving) {
     moving_ = moving;
     weights_.EndSample(moving);
@@ -158,10 +145,6 @@ class ModelBank {
       out.sd[k] = math::Sqrt(variance);
     }
     return true;
-  }
-  bool StepReadOut(ReadOut& out) const {
-    int credit = kSliceCredit;
-    return StepReadOut(out, credit);
   }
 
   float x(int column) const { return MeanAt(Columns::kAt.position[column]); }

@@ -38,6 +38,16 @@ constexpr std::uint32_t JointsOf(int column) {
   return joint < Layout::kJoints ? 1u << joint : (1u << Layout::kJoints) - 1u;
 }
 
+// Columns of a block that can be reset: a joint's front ones, or (kJoints) all others of `columns`.
+struct ColumnRange {
+  int begin, end;
+};
+template <class Layout>
+constexpr ColumnRange ColumnsOfBlock(int block, int columns) {
+  if (block < Layout::kJoints) return {Layout::kFrontBegin[block], Layout::kFrontBegin[block + 1]};
+  return {Layout::kFront, columns};
+}
+
 // x = 0 and the prior's correlation, in any order of the columns. Slopes start as known: zero. Context: background.
 template <class Layout, class Estimate>
 void SetPrior(const Prior<Layout>& prior, Estimate& estimate) {

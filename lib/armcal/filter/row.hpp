@@ -31,6 +31,13 @@ inline core::Status GatedUnless(bool taken, core::Status judged) {
   const unsigned gated = !taken & (judged == core::Status::kOk);
   return static_cast<core::Status>(static_cast<unsigned>(judged) | gated * static_cast<unsigned>(core::Status::kGated));
 }
+// What is known of a row before it is worked in. Returns the mask of its elements: zero unless the row is used.
+inline std::uint32_t Admit(bool use, std::uint32_t largest_magnitude_bits, UpdateReport& report) {
+  report.status = Judge(largest_magnitude_bits);
+  report.accepted = use & (report.status == core::Status::kOk);
+  report.status = GatedUnless(use, report.status);
+  return math::MaskOf(report.accepted);
+}
 
 // h at positions [first, kSize) of a row of `joint` that begins there; eta [kNonlinear] where the order has it. Returns
 // the largest magnitude's bits.

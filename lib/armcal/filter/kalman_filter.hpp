@@ -39,7 +39,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   // Starts at the prior, which must suit and outlive the filter's use of it.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
-    SetPrior(prior, estimate_);
+    estimate_.Start(prior);
     turns_ = 0;
     last_noise_ = 0;
     for (std::uint32_t& word : considered_) word = 0;
@@ -59,10 +59,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   // answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
     const int first = Columns::kAt.first[joint];
-    float* row = estimate_.row();
-    const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, eta, row);
-    const std::uint32_t taken = Admit(use, math::Max(largest, MagnitudeBits(y)), report_);
-    for (int p = first; p < kSize; ++p) row[p] = math::Masked(row[p], taken);
+    const std::uint32_t taken = FillRow<Layout, Columns>(joint, front, dense, eta, y, use, estimate_.row(), report_);
     estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f, prior_->gate_sigma);
   }
   bool StepRow(int& credit) {
@@ -78,25 +75,27 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
 
   // What the rows and the end of a sample spend (slices.hpp). A considered column makes it more.
   int SampleCost() const {
-    int cost = kEndCost + (turns_ > 0 ? Estimate::SumCost(last_noise_) : 0);
-    for (int i = 0; i < Layout::kJoints; ++i) cost += Estimate::RowCost(Columns::kAt.first[i], i) + ConsideredCost();
-    return cost;
+    const int sum = turns_ > 0 ? Estimate::Work::SumCost(Columns::kShape, last_noise_) : 0;
+    return kEndCost + Estimate::kRowsCost + Layout::kJoints * ConsideredCost() + sum;
   }
 
   // Once after the rows of a sample: process noise, for columns whose joints move (bit i of `moving`: joint i), and the
   // floor under the dense D.
   void BeginEnd(std::uint32_t moving) {
-    floor_count_ += HoldFloor(*prior_, estimate_);
+    floor_count_ += estimate_.HoldFloor(*prior_);
     if (turns_ == 0) return;
-    const int p = turn_[next_turn_];
-    const std::uint32_t all = (1u << Layout::kJoints) - 1u,
-                        needed = Columns::IsFront(p) ? 1u << Columns::kAt.joint[p] : all;
-    const float noise = prior_->noise[Columns::kAt.column[p]] * static_cast<float>(turns_);
-    estimate_.BeginUnitSum(p, math::Masked(noise, math::MaskOf((moving & needed) == needed)), LastOf(p));
+    const int p = turn_[next_turn_], k = Columns::kAt.column[p];
+    const std::uint32_t needed = JointsOf<Layout>(k);
+    const float noise = prior_->noise[k] * static_cast<float>(turns_);
+    estimate_.BeginUnitSum(p, math::Masked(noise, math::MaskOf((moving & needed) == needed)), LastOf(k));
     const int following = next_turn_ + 1 < turns_ ? next_turn_ + 1 : 0;
     next_turn_ = moving != 0u ? following : next_turn_;  // at rest the turn does not pass, however long it lasts
   }
-  bool StepEnd(int& credit) { return turns_ == 0 || estimate_.StepSum(credit); }
+  bool StepEnd(int& credit) {
+    if (turns_ > 0 && !estimate_.StepSum(credit)) return false;
+    credit -= kEndCost;
+    return true;
+  }
 
   // What the filter knew of a block's columns no longer counts: their prior's variance is added to what they have. The
   // estimate stays until data move it. block: a joint's front columns, or kJoints: all others, which the block form
@@ -123,11 +122,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     out.next = 0;
   }
   bool StepReadOut(ReadOut& out, int& credit) const {
-    for (; out.next < kSize && credit > 0; ++out.next) {
-      estimate_.AddDiagonal(out.next, out.variance);
-      credit -= estimate_.DiagonalCost(out.next);
-    }
-    if (out.next < kSize) return false;
+    if (!estimate_.AddDiagonal(out.variance, out.next, credit)) return false;
     for (int p = 0; p < kSize; ++p) {
       out.x[Columns::kAt.column[p]] = estimate_.x(p);
       out.sd[Columns::kAt.column[p]] = math::Sqrt(out.variance[p]);
@@ -147,7 +142,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   const Estimate& estimate() const { return estimate_; }
 
  private:
-  static constexpr int kEndCost = 80;
+  static constexpr int kEndCost = 120;
 
   void BeginResetColumn() {
     if (reset_.begin == reset_.end) return;
@@ -156,11 +151,11 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   }
 
   bool AnyConsidered() const { return form == Form::kDense && prior_->any_considered; }
-  int ConsideredCost() const { return AnyConsidered() ? Estimate::SumCost(kSize - 1) : 0; }
+  int ConsideredCost() const { return AnyConsidered() ? Estimate::Work::SumCost(Columns::kShape, kSize - 1) : 0; }
 
   // A sum starts at the last column that may have a turn, whoever's turn it is: the same instructions each time.
-  int LastOf(int p) const {
-    return form == Form::kBlock ? Columns::kAt.front_end[Columns::kAt.joint[p]] - 1 : last_noise_;
+  int LastOf(int column) const {
+    return form == Form::kBlock ? Columns::kAt.front_end[JointOf<Layout>(column)] - 1 : last_noise_;
   }
 
   const Prior<Layout>* prior_ = nullptr;

@@ -53,6 +53,13 @@ TEST(MapReadOut, NearAPriorThatIsNarrow_IsTheLinearReadOut) {
     base[r] += static_cast<double>(c.image->scale[Six::kFront + r]) * c.x[Six::kFront + r];
   estimator::ReadBodies(*linear, base.data(), expected.data());
   EXPECT_LT(Distance(c, got.body, expected.data()), 0.01);
+  // Columns, friction too, are then the filter's own.
+  const Matrix p = Covariance(c.ud.data(), Six::kColumns);
+  for (int k = 0; k < Six::kColumns; ++k) {
+    const double scale = c.image->scale[k], sd = scale * std::sqrt(p(k, k));
+    EXPECT_NEAR(got.column[k], c.image->committed.p[k] + scale * c.x[k], 0.01 * scale) << k;
+    EXPECT_NEAR(got.column_sd[k], sd, 1e-2 * sd) << k;
+  }
 }
 
 TEST(MapReadOut, OfATableWithABodyAtTheBorder_IsPhysical) {

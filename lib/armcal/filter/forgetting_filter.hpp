@@ -90,7 +90,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     weight_ = 1.0f;
     next_ = 0;
   }
-  ARMCAL_NOINLINE bool StepRow(int& credit) {
+  ARMCAL_NOINLINE bool StepRow(int& credit) {  // keeps its registers whatever calls it
     int k = next_, left = credit;
     float weight = weight_;
     float* const row = row_;

@@ -28,11 +28,7 @@ std::size_t Read(void*, std::size_t) { return 0; }
 std::uint32_t Count() { return Register(kDwtCycles); }
 std::uint32_t Spent(std::uint32_t from, std::uint32_t to) { return to - from; }
 void RunContexts(std::uint32_t count, std::uint32_t, void (*tick)(), bool (*background)()) {
-  for (; count != 0; --count) {
-    tick();
-    while (background()) {
-    }
-  }
+  TakeTurns(count, tick, background);
 }
 
 int Run() {

@@ -16,11 +16,7 @@ std::size_t Read(void* bytes, std::size_t capacity) {
 std::uint32_t Count() { return 0; }
 std::uint32_t Spent(std::uint32_t, std::uint32_t) { return 0; }
 void RunContexts(std::uint32_t count, std::uint32_t, void (*tick)(), bool (*background)()) {
-  for (; count != 0; --count) {
-    tick();
-    while (background()) {
-    }
-  }
+  TakeTurns(count, tick, background);
 }
 
 }  // namespace armcal::port::runner

@@ -27,4 +27,13 @@ std::uint32_t Spent(std::uint32_t from, std::uint32_t to);
 // take turns.
 void RunContexts(std::uint32_t count, std::uint32_t period, void (*tick)(), bool (*background)());
 
+// The two taking turns.
+inline void TakeTurns(std::uint32_t count, void (*tick)(), bool (*background)()) {
+  for (; count != 0; --count) {
+    tick();
+    while (background()) {
+    }
+  }
+}
+
 }  // namespace armcal::port::runner

@@ -11,6 +11,7 @@ inline const int planted_fault = [] {
   return number == nullptr ? 0 : std::atoi(number);
 }();
 
-inline bool Planted(int number) { return number == planted_fault; }
+// What the compiler evaluates is always right.
+constexpr bool Planted(int number) { return !__builtin_is_constant_evaluated() && number == planted_fault; }
 
 }  // namespace armcal

@@ -47,11 +47,7 @@ struct Run {
           .Hex(ResultBits(estimates.sd[k]))
           .End();
     for (int e = 0; e < Model::kNonlinear; ++e)
-      port::runner::Line("eta")
-          .Decimal(e)
-          .Hex(ResultBits(estimates.eta[e]))
-          .Hex(ResultBits(estimates.eta_sd[e]))
-          .End();
+      port::runner::Line("eta").Decimal(e).Hex(ResultBits(estimates.eta[e])).Hex(ResultBits(estimates.eta_sd[e])).End();
     for (int i = 0; i < 6; ++i)
       port::runner::Line("joint")
           .Decimal(i + 1)
@@ -76,6 +72,20 @@ std::uint32_t ForEachTick(Each each) {
     }
   }
   return raw.tick;
+}
+
+// All of them side by side along the trace, from the model's own table. The answer is 1 if there is no trace, or if it
+// taught one of them nothing.
+template <class Model, class... Filters>
+int RunAlong(Run<Model, Filters>&... runs) {
+  static estimator::ImageWork<Model> work;
+  static estimator::Image<Model> image;
+  if (!core::IsOk(estimator::BuildImage(estimator::DefaultTable<Model>(), 1, work, image))) return 1;
+  (runs.Start(image), ...);
+  const std::uint32_t ticks = ForEachTick([&](const model::RawSample<6>& raw) { (runs.Tick(raw), ...); });
+  (runs.Finish(), ...);
+  port::runner::Line("ticks").Decimal(ticks).End();
+  return ((runs.estimates.rows_used[0] > 0) && ...) ? 0 : 1;
 }
 
 }  // namespace armcal::target

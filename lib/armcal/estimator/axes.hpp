@@ -1,6 +1,7 @@
-// estimator - what the signal path needs of a generated model; knows no filter.
+// estimator - what the signal path needs of a generated model and of its table; knows no filter.
 #pragma once
 
+#include "armcal/feedforward/committed.hpp"
 #include "armcal/signal/signal_path.hpp"
 
 namespace armcal::estimator {
@@ -21,6 +22,18 @@ signal::Axes<Model::kJoints> AxesOf() {
   }
   axes.tick_rate_Hz = static_cast<float>(Model::kTickRate_Hz);
   return axes;
+}
+
+// What a table says to the signal path.
+template <class Model>
+signal::Settings<Model::kJoints> SettingsOf(const feedforward::Committed<Model>& committed) {
+  signal::Settings<Model::kJoints> settings = {};
+  for (int i = 0; i < Model::kJoints; ++i) {
+    settings.v_min_radps[i] = committed.v_min_radps[i];
+    settings.torque_scale[i] = committed.torque_scale[i];
+  }
+  settings.generation = committed.generation;
+  return settings;
 }
 
 }  // namespace armcal::estimator

@@ -2,17 +2,13 @@
 #pragma once
 
 #include "armcal/core/mailbox.hpp"
-#include "armcal/core/sample_ring.hpp"
-#include "armcal/estimator/axes.hpp"
 #include "armcal/estimator/estimates.hpp"
 #include "armcal/estimator/image.hpp"
+#include "armcal/estimator/intake.hpp"
+#include "armcal/estimator/row_statistics.hpp"
 #include "armcal/estimator/sample_rows.hpp"
 #include "armcal/filter/row.hpp"
 #include "armcal/filter/slices.hpp"
-#include "armcal/monitor/consistency.hpp"
-#include "armcal/monitor/monitor.hpp"
-#include "armcal/monitor/residual_statistics.hpp"
-#include "armcal/signal/signal_path.hpp"
 
 namespace armcal::estimator {
 
@@ -23,26 +19,17 @@ template <class Model, class Filter>
 class Estimator {
  public:
   static constexpr int n = Model::kJoints;
-  static constexpr std::uint32_t kRingSamples = 16;
+  static constexpr std::uint32_t kRingSamples = Intake<Model>::kRingSamples;
   // Called once a sample after its rows: flags carry kUsed where a row changed the estimate.
   using Observer = void (*)(void* context, const model::Sample<n>& sample, const float* tau_model_Nm);
 
-  Estimator() : path_(AxesOf<Model>()) {}
-
   // One control tick. kOk; kFull: a sample became ready and was refused whole because the background is late
   // (counted). Context: tick.
-  core::Status Push(const model::RawSample<n>& raw) {
-    TakeSettings();
-    if (!path_.PushTick(raw)) return core::Status::kOk;
-    return ring_.Push({path_.sample(), path_.generation()});
-  }
+  core::Status Push(const model::RawSample<n>& raw) { return intake_.Push(raw); }
 
   // A sample that a signal path made elsewhere (torque scale and flags already inside); the rest is bit for bit the
   // same. kFull as above. Context: tick, or a host's only thread.
-  core::Status PushSample(const model::Sample<n>& sample) {
-    TakeSettings();
-    return ring_.Push({sample, path_.generation()});
-  }
+  core::Status PushSample(const model::Sample<n>& sample) { return intake_.PushSample(sample); }
 
   // False: the filter's form cannot hold what the table asks for (see filter::Form); a table transaction refuses it.
   static bool Suits(const Image<Model>& image) { return Filter::Suits(image.prior); }
@@ -56,22 +43,14 @@ class Estimator {
     filter_.Restart(image.prior);
     estimates_ = Estimates<Model>{};
     estimates_.generation = image.committed.generation;
-    for (monitor::JointMonitor& m : monitors_) m = monitor::JointMonitor{};
-    consistency_ = monitor::Consistency{};
-    if (residuals_ != nullptr) residuals_->Restart(adopted_tick);
+    statistics_.Restart(adopted_tick);
     rows_.Restart(image, adopted_tick);
     stage_ = Stage::kIdle;
     credit_ = 0;
     resets_due_ = 0;
     slice_ = filter::EqualSlices(filter_.SampleCost() + kSampleCost + n * kRowCost);
     read_out_due_ = true;
-    signal::Settings<n> settings = {};
-    for (int i = 0; i < n; ++i) {
-      settings.v_min_radps[i] = image.committed.v_min_radps[i];
-      settings.torque_scale[i] = image.committed.torque_scale[i];
-    }
-    settings.generation = image.committed.generation;
-    settings_.Post(settings);
+    intake_.Adopt(image.committed);
   }
 
   // Works until `budget` is spent, in elements of a filter's columns: eight instructions each on a Cortex-M4F. A column
@@ -118,11 +97,11 @@ class Estimator {
 
   // Statistics to fill from now on and to restart with each adoption; nullptr: none. They do not depend on the filter,
   // so one of two estimators is enough.
-  void SetResiduals(monitor::ResidualStatistics<n>* residuals) { residuals_ = residuals; }
+  void SetResiduals(monitor::ResidualStatistics<n>* residuals) { statistics_.SetResiduals(residuals); }
 
-  std::uint32_t refused_samples() const { return ring_.refused(); }
-  std::uint32_t pending() const { return ring_.size(); }         // samples waiting for Step; context: any
-  std::uint32_t tick_gaps() const { return path_.gap_count(); }  // restarts of the signal path; context: tick
+  std::uint32_t refused_samples() const { return intake_.refused(); }
+  std::uint32_t pending() const { return intake_.pending(); }      // samples waiting for Step; context: any
+  std::uint32_t tick_gaps() const { return intake_.tick_gaps(); }  // restarts of the signal path; context: tick
   const Filter& filter() const { return filter_; }
   // The filter's finished read-out, for BeginPhysical; nullptr: rows have come in since. Context: background.
   const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
@@ -131,14 +110,6 @@ class Estimator {
   enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReset, kReadOut };
   // What a sample's regressor and a row's whitening and statistics are worth, from counts of six-axis models.
   static constexpr int kSampleCost = n * Model::kDense, kRowCost = 3 * Model::kDense;
-  struct Item {
-    model::Sample<n> sample;
-    std::uint32_t generation;
-  };
-
-  void TakeSettings() {
-    if (settings_.Refresh()) path_.SetSettings(settings_.latest());
-  }
 
   // The next indivisible piece of work; false: there is none.
   bool Advance() {
@@ -176,7 +147,7 @@ class Estimator {
       stage_ = Stage::kReadOut;
       return true;
     }
-    if (!core::IsOk(ring_.Pop(item_))) return false;
+    if (!core::IsOk(intake_.Pop(item_))) return false;
     stands_ = false;
     credit_ -= Filter::kExtended ? 2 * kSampleCost : kSampleCost;
     if (image_ == nullptr || item_.generation != image_->committed.generation) {
@@ -195,7 +166,7 @@ class Estimator {
     while ((resets_due_ >> block & 1u) == 0u) ++block;
     resets_due_ &= ~(1u << block);
     stands_ = false;
-    consistency_ = monitor::Consistency{};  // what surprised the filter no longer counts, either
+    statistics_.ForgetSurprise();
     filter_.BeginReset(block);
     stage_ = Stage::kReset;
   }
@@ -216,19 +187,8 @@ class Estimator {
     const filter::UpdateReport& report = filter_.report();
     item_.sample.flags[i] =
         static_cast<std::uint8_t>((item_.sample.flags[i] & ~model::kUsed) | (report.accepted ? model::kUsed : 0));
-    estimates_.rows_used[i] += report.accepted;
-    estimates_.rows_gated[i] += report.status == core::Status::kGated;
-    estimates_.rows_refused[i] += core::IsRefused(report.status);
-    if (report.accepted) {
-      monitors_[i].Add(report.innovation, report.variance, rows_.row().residual_Nm);
-      consistency_.Add(report.innovation, report.variance);
-    }
-    // Rows that the filter's gate keeps out count as well: they are what a changed arm looks like.
-    const model::Sample<n>& s = item_.sample;
-    if (residuals_ != nullptr) {
-      const float residual_Nm = rows_.row().residual_Nm, load_Nm = rows_.row().load_Nm;
-      residuals_->Add(i, {residual_Nm, s.qd[i], s.q[i], load_Nm, s.temperature_degC[i]}, ((moving_ >> i) & 1u) != 0u);
-    }
+    const auto& row = rows_.row();
+    statistics_.Add(i, report, row.residual_Nm, row.load_Nm, item_.sample, ((moving_ >> i) & 1u) != 0u, estimates_);
     stage_ = ++joint_ == n ? Stage::kEnd : Stage::kRow;
     if (stage_ == Stage::kEnd) EndRows();
   }
@@ -241,8 +201,7 @@ class Estimator {
   }
 
   void FinishSample() {
-    if (residuals_ != nullptr)
-      residuals_->EndSample(item_.sample.tick, static_cast<std::uint32_t>(Model::kTickRate_Hz));
+    statistics_.EndSample(item_.sample.tick);
     estimates_.tick = item_.sample.tick;
     if (observer_ != nullptr) observer_(observer_context_, item_.sample, tau_model_Nm_);
     if (++estimates_.samples % publish_every_ == 0u) read_out_due_ = true;
@@ -252,36 +211,28 @@ class Estimator {
   void Publish() {
     FromPriorUnits(*image_, read_out_, estimates_);
     if constexpr (Filter::kExtended) estimates_.clamps = filter_.clamp_count();
-    for (int i = 0; i < n; ++i) {
-      estimates_.nis[i] = monitors_[i].nis();
-      estimates_.residual_rms_Nm[i] = monitors_[i].residual_rms_Nm();
-    }
-    estimates_.inconsistent = consistency_.inconsistent();
-    estimates_.refused = ring_.refused();
+    statistics_.Publish(estimates_);
+    estimates_.refused = intake_.refused();
     published_.Post(estimates_);
     stands_ = true;
     stage_ = Stage::kIdle;
   }
 
-  signal::SignalPath<n, Model::kSampleTicks> path_;  // the tick's
-  core::Mailbox<signal::Settings<n>> settings_;
-  core::SampleRing<Item, kRingSamples> ring_;
+  Intake<Model> intake_;
   core::Mailbox<Estimates<Model>> published_;
 
   const Image<Model>* image_ = nullptr;  // the background's, from here on
   Filter filter_;
   typename Filter::ReadOut read_out_;
   SampleRows<Model, Filter::kExtended> rows_;
-  monitor::JointMonitor monitors_[n];
-  monitor::Consistency consistency_;
+  RowStatistics<Model> statistics_;
   Estimates<Model> estimates_;
-  Item item_ = {};
+  typename Intake<Model>::Item item_ = {};
   float tau_model_Nm_[n] = {};
   int credit_ = 0, slice_ = filter::kSliceCredit;
   std::uint32_t moving_ = 0, updating_ = 0;  // joints, a bit each; without those on hold
   std::uint32_t resets_due_ = 0;             // blocks, a bit each
   std::uint32_t publish_every_ = 125;
-  monitor::ResidualStatistics<n>* residuals_ = nullptr;
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;
   int joint_ = 0;

@@ -115,7 +115,7 @@ core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, Ima
   for (int link = 0; link < Model::kJoints; ++link) {
     float body[kBlock];
     for (int k = 0; k < kBlock; ++k) body[k] = table.parameter[link * kBlock + k].mean;
-    if (!physical::IsPhysical(body) || !(body[model::kRotor] >= 0.0f)) return Status::kUnphysical;
+    if (!physical::CanExist(body)) return Status::kUnphysical;
   }
 
   // Bodies to base: mean, covariance, which columns are only considered.

@@ -35,10 +35,7 @@ class Supervisor {
     for (int k = 0; k < Model::kColumns; ++k) finite &= math::IsFinite(e.value[k]) && math::IsFinite(e.sd[k]);
     for (int k = 0; k < Model::kBodyParameters; ++k) finite &= math::IsFinite(bodies[k]);
     if (!finite) return core::Status::kNotFinite;
-    for (int link = 0; link < Model::kJoints; ++link) {
-      const float* body = bodies + link * model::kBodyBlock;
-      physical &= physical::IsPhysical(body) && body[model::kRotor] >= 0.0f;
-    }
+    for (int link = 0; link < Model::kJoints; ++link) physical &= physical::CanExist(bodies + link * model::kBodyBlock);
     if (!physical) return core::Status::kUnphysical;
     return e.inconsistent ? core::Status::kHeld : core::Status::kOk;
   }

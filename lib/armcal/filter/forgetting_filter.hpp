@@ -4,6 +4,7 @@
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
+#include "armcal/filter/whole_rows.hpp"
 #include "armcal/math/givens.hpp"
 
 namespace armcal::filter {
@@ -15,7 +16,7 @@ namespace armcal::filter {
 // The triangle starts from, and never falls below, d = kFloor: a millionth of the prior's weight. The read-out takes
 // that much off the prior, so that it is counted once.
 template <class Layout>
-class ForgettingFilter {
+class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
  public:
   static constexpr int kColumns = Layout::kColumns;
   static constexpr bool kExtended = false;
@@ -23,19 +24,14 @@ class ForgettingFilter {
   using Columns = Order<Layout, Form::kBlock, Beside::kNothing>;
 
   // Where the stored rows begin.
-  static constexpr int JointOf(int column) {  // of a front column
-    int i = 0;
-    while (column >= Layout::kFrontBegin[i + 1]) ++i;
-    return i;
-  }
   struct Offsets {
-    int at[kColumns + 1] = {};
+    std::uint16_t at[kColumns + 1] = {};
     constexpr Offsets() {
-      for (int k = 0; k < kColumns; ++k) at[k + 1] = at[k] + RowLength(k);
+      for (int k = 0; k < kColumns; ++k) at[k + 1] = static_cast<std::uint16_t>(at[k] + RowLength(k));
     }
     static constexpr int RowLength(int k) {
       if (k >= Layout::kFront) return kColumns - k;
-      const int joint = JointOf(k);
+      const int joint = JointOf<Layout>(k);
       return Layout::kFrontBegin[joint + 1] - k + Layout::kDense - Layout::kRowBegin[joint];
     }
   };
@@ -43,7 +39,7 @@ class ForgettingFilter {
   static constexpr int kTriangle = kOffsets.at[kColumns];
 
   // What the rows and the end of a sample spend (slices.hpp).
-  int SampleCost() const {
+  static constexpr int SampleCost() {
     int cost = kEndCost;
     for (int i = 0; i < Layout::kJoints; ++i) {
       const int length = Layout::kFrontBegin[i + 1] - Layout::kFrontBegin[i] + Layout::kDense - Layout::kRowBegin[i];
@@ -61,7 +57,7 @@ class ForgettingFilter {
     float sd[kColumns] = {};
     float variance[kColumns] = {};
     UdEstimate<Columns> estimate;
-    int next = 0;
+    int next = 0, next_diagonal = 0;
     bool inside_row = false;
   };
 
@@ -74,13 +70,7 @@ class ForgettingFilter {
 
   // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense], zero before kRowBegin[joint].
   // With use = false, or when the report is not kOk, every bit of the triangle stays; the instructions are the same.
-  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use) {
-    BeginRow(joint, front, dense, y, use);
-    int all = kNoSlices;
-    (void)StepRow(all);
-    return report_;
-  }
-  // The same in slices: StepRow, which spends credit (slices.hpp), until it answers true; then report().
+  // Then StepRow, which spends credit (slices.hpp), until it answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     const int begin = Layout::kRowBegin[joint];
     first_ = Layout::kFrontBegin[joint];
@@ -95,30 +85,23 @@ class ForgettingFilter {
     for (int k = 0; k < width_; ++k) put(k, front[k]);
     for (int k = begin; k < Layout::kDense; ++k) put(width_ + k - begin, dense[k]);
     put(length_, y);
-
-    report_.status = Judge(largest);
-    report_.accepted = use & (report_.status == core::Status::kOk);
-    report_.status = GatedUnless(use, report_.status);
-    const std::uint32_t mask = math::MaskOf(report_.accepted);
-    for (int k = 0; k <= length_; ++k) row_[k] = math::Masked(row_[k], mask);
+    const std::uint32_t taken = Admit(use, largest, report_);
+    for (int k = 0; k <= length_; ++k) row_[k] = math::Masked(row_[k], taken);
     weight_ = 1.0f;
     next_ = 0;
   }
-  bool StepRow(int& credit) {
+  ARMCAL_NOINLINE bool StepRow(int& credit) {  // keeps its registers whatever calls it
     int k = next_, left = credit;
     float weight = weight_;
     float* const row = row_;
     for (; k < length_ && left > 0; ++k) {
-      const int column = ColumnAt(k), rest = length_ - k;
+      const int column = ColumnAt(k), after = ColumnAt(k + 1), rest = length_ - k - 1;
+      weight = math::GivensRows(d_ + column, rows_ + kOffsets.at[column], d_ + after, rows_ + kOffsets.at[after],
+                                row[k], row + k + 1, rest, weight);
+      left -= kColumnCost + rest + 1;
+      if (rest == 0) continue;
       left -= kColumnCost + rest;
-      if (rest > 1) {
-        const int after = ColumnAt(++k);
-        weight = math::GivensRows(d_[column], rows_ + kOffsets.at[column], d_[after], rows_ + kOffsets.at[after],
-                                  row[k - 1], row + k, rest - 1, weight);
-        left -= kColumnCost + rest - 1;
-      } else {
-        weight = math::GivensRow(d_[column], rows_ + kOffsets.at[column], row[k], row + k + 1, rest, weight);
-      }
+      ++k;
     }
     credit = left;
     next_ = k;
@@ -134,12 +117,14 @@ class ForgettingFilter {
 
   // Once after the rows of a sample: a front column forgets if its joint moves (bit i of `moving`), a dense column if
   // all move. What stands still keeps all it knows.
-  void EndSample(std::uint32_t moving) { BeginEnd(moving); }
   void BeginEnd(std::uint32_t moving) {
-    for (int i = 0; i < Layout::kJoints; ++i)
-      Forget(Layout::kFrontBegin[i], Layout::kFrontBegin[i + 1], (moving >> i & 1u) != 0u);
     constexpr std::uint32_t kAll = (1u << Layout::kJoints) - 1u;
-    Forget(Layout::kFront, kColumns, (moving & kAll) == kAll);
+    int k = 0;
+    for (int i = 0; i <= Layout::kJoints; ++i) {
+      const bool moves = i < Layout::kJoints ? (moving >> i & 1u) != 0u : (moving & kAll) == kAll;
+      for (const int end = ColumnsOfBlock<Layout>(i, kColumns).end; k < end; ++k)
+        d_[k] = math::Max(d_[k] * math::Select(moves, prior_->lambda[k], 1.0f), kFloor);
+    }
   }
   bool StepEnd(int& credit) {
     credit -= kEndCost;
@@ -150,10 +135,8 @@ class ForgettingFilter {
   // columns, or kJoints: the dense ones. Between samples; interface shared by all filters.
   static constexpr bool CanReset(int block) { return block >= 0 && block <= Layout::kJoints; }
   void BeginReset(int block) {
-    const bool joint = block < Layout::kJoints;
-    const int begin = joint ? Layout::kFrontBegin[block] : Layout::kFront;
-    const int end = joint ? Layout::kFrontBegin[block + 1] : kColumns;
-    for (int k = begin; k < end; ++k) d_[k] = kFloor;
+    const ColumnRange columns = ColumnsOfBlock<Layout>(block, kColumns);
+    for (int k = columns.begin; k < columns.end; ++k) d_[k] = kFloor;
   }
   bool StepReset(int& credit) {
     credit -= kEndCost;
@@ -174,7 +157,9 @@ class ForgettingFilter {
       for (int k = end - 1; k >= Layout::kFrontBegin[i]; --k) {
         const float* row = rows_ + kOffsets.at[k];
         const float* coupling = row + (end - 1 - k);
-        x[k] = coupling[dense] - math::Dot(row, x + k + 1, end - 1 - k) - math::Dot(coupling, seen, dense);
+        float own = 0.0f;
+        for (int later = k + 1; later < end; ++later) own += *row++ * x[later];
+        x[k] = coupling[dense] - own - math::Dot(coupling, seen, dense);
       }
     }
   }
@@ -182,10 +167,10 @@ class ForgettingFilter {
   // Read-out in slices: the prior's factor takes the triangle's rows as measurements of variance 1 / d.
   // Begin, then Step until it answers true. No update between.
   void BeginReadOut(ReadOut& out) const {
-    SetPrior(*prior_, out.estimate);
+    out.estimate.Start(*prior_);
     for (int p = 0; p < kColumns; ++p) out.estimate.d(p) *= 1.0f / (1.0f - kFloor);
     for (float& v : out.variance) v = 0.0f;
-    out.next = 0;
+    out.next = out.next_diagonal = 0;
     out.inside_row = false;
   }
   bool StepReadOut(ReadOut& out, int& credit) const {
@@ -194,21 +179,13 @@ class ForgettingFilter {
       out.inside_row = !out.estimate.StepRow(nullptr, credit);
       if (out.inside_row) return false;
     }
-    for (; out.next < 2 * kColumns && credit > 0; ++out.next) {
-      out.estimate.AddDiagonal(out.next - kColumns, out.variance);
-      credit -= out.estimate.DiagonalCost(out.next - kColumns);
-    }
-    if (out.next < 2 * kColumns) return false;
+    if (out.next < kColumns || !out.estimate.AddDiagonal(out.variance, out.next_diagonal, credit)) return false;
     for (int k = 0; k < kColumns; ++k) {
       const int p = Columns::kAt.position[k];
       out.x[k] = out.estimate.x(p);
       out.sd[k] = math::Sqrt(out.variance[p]);
     }
     return true;
-  }
-  bool StepReadOut(ReadOut& out) const {
-    int credit = kSliceCredit;
-    return StepReadOut(out, credit);
   }
 
   const float* weights() const { return d_; }      // [kColumns] d of each row
@@ -219,10 +196,6 @@ class ForgettingFilter {
 
   static constexpr int kColumnCost = 6, kRowCost = 24, kEndCost = 2 * kColumns;
 
-  void Forget(int begin, int end, bool moves) {
-    for (int k = begin; k < end; ++k) d_[k] = math::Max(d_[k] * math::Select(moves, prior_->lambda[k], 1.0f), kFloor);
-  }
-
   // Row `column` of the triangle as a measurement of the read-out's estimate.
   void BeginTake(int column, UdEstimate<Columns>& estimate) const {
     const float* stored = rows_ + kOffsets.at[column];
@@ -232,12 +205,14 @@ class ForgettingFilter {
     row[at[column]] = 1.0f;
     int joint = Layout::kJoints, k = column + 1;
     if (column < Layout::kFront) {
-      joint = JointOf(column);
-      for (; k < Layout::kFrontBegin[joint + 1]; ++k) row[at[k]] = *stored++;
+      joint = JointOf<Layout>(column);
+      const int own = Layout::kFrontBegin[joint + 1] - k;
+      Scatter(stored, at + k, own, row);
+      stored += own;
       k = Layout::kFront + Layout::kRowBegin[joint];
     }
-    for (; k < kColumns; ++k) row[at[k]] = *stored++;
-    estimate.BeginRow(at[column], joint, *stored, 1.0f / d_[column], 0.0f);
+    Scatter(stored, at + k, kColumns - k, row);
+    estimate.BeginRow(at[column], joint, stored[kColumns - k], 1.0f / d_[column], 0.0f);
   }
 
   const Prior<Layout>* prior_ = nullptr;

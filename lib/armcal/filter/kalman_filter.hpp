@@ -4,6 +4,7 @@
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
+#include "armcal/filter/whole_rows.hpp"
 
 namespace armcal::filter {
 
@@ -12,7 +13,7 @@ namespace armcal::filter {
 // Noise goes to one column a sample in turn, as much at once as is due until its next turn.
 // The state is [front, dense], and kEta columns after it in an extended filter.
 template <class Layout, Form form = Form::kDense, Beside beside = Beside::kNothing>
-class KalmanFilter {
+class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
  public:
   static constexpr bool kExtended = beside == Beside::kEta;  // rows carry d tau / d eta after the columns
   using Columns = Order<Layout, form, beside>;
@@ -38,7 +39,7 @@ class KalmanFilter {
   // Starts at the prior, which must suit and outlive the filter's use of it.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
-    SetPrior(prior, estimate_);
+    estimate_.Start(prior);
     turns_ = 0;
     last_noise_ = 0;
     for (std::uint32_t& word : considered_) word = 0;
@@ -54,23 +55,11 @@ class KalmanFilter {
 
   // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense], zero before kRowBegin[joint];
   // eta [kNonlinear] in an extended filter. With use = false, or when the report is not kOk, every bit of the estimate
-  // stays as it was; the instructions spent are the same.
-  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use,
-                      const float* eta = nullptr) {
-    BeginRow(joint, front, dense, y, use, eta);
-    int all = kNoSlices;
-    (void)StepRow(all);
-    return report_;
-  }
-  // The same in slices: StepRow, which spends credit (slices.hpp), until it answers true; then report().
+  // stays as it was; the instructions spent are the same. Then StepRow, which spends credit (slices.hpp), until it
+  // answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
     const int first = Columns::kAt.first[joint];
-    float* row = estimate_.row();
-    const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, eta, row);
-    report_.status = Judge(math::Max(largest, MagnitudeBits(y)));
-    const std::uint32_t taken = math::MaskOf(use & (report_.status == core::Status::kOk));
-    for (int p = first; p < kSize; ++p) row[p] = math::Masked(row[p], taken);
-    used_ = taken != 0u;
+    const std::uint32_t taken = FillRow<Layout, Columns>(joint, front, dense, eta, y, use, estimate_.row(), report_);
     estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f, prior_->gate_sigma);
   }
   bool StepRow(int& credit) {
@@ -78,7 +67,7 @@ class KalmanFilter {
     if (!estimate_.StepRow(considered, credit)) return false;
     report_.innovation = estimate_.innovation();
     report_.variance = estimate_.variance();
-    report_.accepted = used_ & estimate_.inside();
+    report_.accepted &= estimate_.inside();
     report_.status = GatedUnless(report_.accepted, report_.status);
     return true;
   }
@@ -86,30 +75,27 @@ class KalmanFilter {
 
   // What the rows and the end of a sample spend (slices.hpp). A considered column makes it more.
   int SampleCost() const {
-    int cost = kEndCost + (turns_ > 0 ? Estimate::SumCost(last_noise_) : 0);
-    for (int i = 0; i < Layout::kJoints; ++i) cost += Estimate::RowCost(Columns::kAt.first[i], i) + ConsideredCost();
-    return cost;
+    const int sum = turns_ > 0 ? Estimate::Work::SumCost(Columns::kShape, last_noise_) : 0;
+    return kEndCost + Estimate::kRowsCost + Layout::kJoints * ConsideredCost() + sum;
   }
 
   // Once after the rows of a sample: process noise, for columns whose joints move (bit i of `moving`: joint i), and the
   // floor under the dense D.
-  void EndSample(std::uint32_t moving) {
-    BeginEnd(moving);
-    int all = kNoSlices;
-    (void)StepEnd(all);
-  }
   void BeginEnd(std::uint32_t moving) {
-    floor_count_ += HoldFloor(*prior_, estimate_);
+    floor_count_ += estimate_.HoldFloor(*prior_);
     if (turns_ == 0) return;
-    const int p = turn_[next_turn_];
-    const std::uint32_t all = (1u << Layout::kJoints) - 1u,
-                        needed = Columns::IsFront(p) ? 1u << Columns::kAt.joint[p] : all;
-    const float noise = prior_->noise[Columns::kAt.column[p]] * static_cast<float>(turns_);
-    estimate_.BeginUnitSum(p, math::Masked(noise, math::MaskOf((moving & needed) == needed)), LastOf(p));
+    const int p = turn_[next_turn_], k = Columns::kAt.column[p];
+    const std::uint32_t needed = JointsOf<Layout>(k);
+    const float noise = prior_->noise[k] * static_cast<float>(turns_);
+    estimate_.BeginUnitSum(p, math::Masked(noise, math::MaskOf((moving & needed) == needed)), LastOf(k));
     const int following = next_turn_ + 1 < turns_ ? next_turn_ + 1 : 0;
     next_turn_ = moving != 0u ? following : next_turn_;  // at rest the turn does not pass, however long it lasts
   }
-  bool StepEnd(int& credit) { return turns_ == 0 || estimate_.StepSum(credit); }
+  bool StepEnd(int& credit) {
+    if (turns_ > 0 && !estimate_.StepSum(credit)) return false;
+    credit -= kEndCost;
+    return true;
+  }
 
   // What the filter knew of a block's columns no longer counts: their prior's variance is added to what they have. The
   // estimate stays until data move it. block: a joint's front columns, or kJoints: all others, which the block form
@@ -118,19 +104,16 @@ class KalmanFilter {
     return block >= 0 && (form == Form::kDense ? block <= Layout::kJoints : block < Layout::kJoints);
   }
   void BeginReset(int block) {
-    const bool joint = block < Layout::kJoints;
-    reset_next_ = joint ? Layout::kFrontBegin[block] : Layout::kFront;
-    reset_end_ =
-        joint ? Layout::kFrontBegin[block + 1] : Layout::kColumns + (beside == Beside::kEta ? Layout::kNonlinear : 0);
+    reset_ = ColumnsOfBlock<Layout>(block, kSize);
     BeginResetColumn();
   }
   bool StepReset(int& credit) {
-    while (reset_next_ < reset_end_ && credit > 0) {
+    while (reset_.begin < reset_.end && credit > 0) {
       if (!estimate_.StepSum(credit)) continue;
-      ++reset_next_;
+      ++reset_.begin;
       BeginResetColumn();
     }
-    return reset_next_ == reset_end_;
+    return reset_.begin == reset_.end;
   }
 
   // Read-out in slices, interface shared by all filters: Begin, then Step until it answers true. No update between.
@@ -139,20 +122,12 @@ class KalmanFilter {
     out.next = 0;
   }
   bool StepReadOut(ReadOut& out, int& credit) const {
-    for (; out.next < kSize && credit > 0; ++out.next) {
-      estimate_.AddDiagonal(out.next, out.variance);
-      credit -= estimate_.DiagonalCost(out.next);
-    }
-    if (out.next < kSize) return false;
+    if (!estimate_.AddDiagonal(out.variance, out.next, credit)) return false;
     for (int p = 0; p < kSize; ++p) {
       out.x[Columns::kAt.column[p]] = estimate_.x(p);
       out.sd[Columns::kAt.column[p]] = math::Sqrt(out.variance[p]);
     }
     return true;
-  }
-  bool StepReadOut(ReadOut& out) const {
-    int credit = kSliceCredit;
-    return StepReadOut(out, credit);
   }
 
   float x(int column) const { return estimate_.x(Columns::kAt.position[column]); }
@@ -167,20 +142,20 @@ class KalmanFilter {
   const Estimate& estimate() const { return estimate_; }
 
  private:
-  static constexpr int kEndCost = 80;
+  static constexpr int kEndCost = 120;
 
   void BeginResetColumn() {
-    if (reset_next_ == reset_end_) return;
-    const int p = Columns::kAt.position[reset_next_];
-    estimate_.BeginUnitSum(p, math::Masked(1.0f, prior_->active[reset_next_]), p);
+    if (reset_.begin == reset_.end) return;
+    const int p = Columns::kAt.position[reset_.begin];
+    estimate_.BeginUnitSum(p, math::Masked(1.0f, prior_->active[reset_.begin]), p);
   }
 
   bool AnyConsidered() const { return form == Form::kDense && prior_->any_considered; }
-  int ConsideredCost() const { return AnyConsidered() ? Estimate::SumCost(kSize - 1) : 0; }
+  int ConsideredCost() const { return AnyConsidered() ? Estimate::Work::SumCost(Columns::kShape, kSize - 1) : 0; }
 
   // A sum starts at the last column that may have a turn, whoever's turn it is: the same instructions each time.
-  int LastOf(int p) const {
-    return form == Form::kBlock ? Columns::kAt.front_end[Columns::kAt.joint[p]] - 1 : last_noise_;
+  int LastOf(int column) const {
+    return form == Form::kBlock ? Columns::kAt.front_end[JointOf<Layout>(column)] - 1 : last_noise_;
   }
 
   const Prior<Layout>* prior_ = nullptr;
@@ -189,9 +164,8 @@ class KalmanFilter {
   std::uint32_t considered_[(kSize + 31) / 32] = {};
   std::uint8_t turn_[kSize] = {};  // positions with noise
   int turns_ = 0, next_turn_ = 0, last_noise_ = 0;
-  int reset_next_ = 0, reset_end_ = 0;  // columns
+  ColumnRange reset_ = {};  // what remains of a reset
   std::uint32_t floor_count_ = 0, clamp_count_ = 0;
-  bool used_ = false;
 };
 
 }  // namespace armcal::filter

@@ -40,7 +40,7 @@ class ModeWeights {
     Average();
   }
 
-  // Of the joints' weights, for what all of them see. Once after Exchange of all joints.
+  // Of the joints' weights, for what all of them see.
   void Average() {
     for (int m = 0; m < kMembers; ++m) {
       float sum = 0.0f;
@@ -49,20 +49,17 @@ class ModeWeights {
     }
   }
 
-  // A mode may have changed: share[to][from] of what member `to` goes on with. The joint's weights move with it unless
-  // `due` is zero.
+  // A mode may have changed: share[to][from] of what member `to` goes on with. A joint's weights move with it unless
+  // `due` is zero; those of kJoints, their mean, do not. All joints after kJoints, then Average.
   void Exchange(int joint, float (&share)[kMembers][kMembers], std::uint32_t due) {
     float next[kMembers];
-    for (int to = 0; to < kMembers; ++to) next[to] = Shares(weight_[joint], to, share[to]);
+    for (int to = 0; to < kMembers; ++to) next[to] = Shares(of(joint), to, share[to]);
+    if (joint == kJoints) return;
     for (int m = 0; m < kMembers; ++m) weight_[joint][m] = math::Select(due != 0u, next[m], weight_[joint][m]);
   }
-  // The same for what all joints see.
-  void DenseShares(float (&share)[kMembers][kMembers]) const {
-    for (int to = 0; to < kMembers; ++to) (void)Shares(dense_, to, share[to]);
-  }
 
-  float at(int joint, int member) const { return weight_[joint][member]; }
-  float dense(int member) const { return dense_[member]; }  // mean over the joints
+  // [kMembers] of a joint; kJoints: their mean.
+  const float* of(int joint) const { return joint < kJoints ? weight_[joint] : dense_; }
 
  private:
   static constexpr float kStay = 0.995f;  // probability that a mode lasts from one exchange to the next

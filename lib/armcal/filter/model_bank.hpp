@@ -5,6 +5,7 @@
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
 #include "armcal/filter/ud_estimate.hpp"
+#include "armcal/filter/whole_rows.hpp"
 
 namespace armcal::filter {
 
@@ -14,7 +15,7 @@ namespace armcal::filter {
 // (H. Blom, Y. Bar-Shalom, 1988), but keeps its own covariance: mixing those, too, would need new factors of all three
 // and follows no better.
 template <class Layout>
-class ModelBank {
+class ModelBank : public WholeRows<ModelBank<Layout>> {
  public:
   static constexpr bool kExtended = false;
   static constexpr int kColumns = Layout::kColumns, kJoints = Layout::kJoints, kMembers = 3;
@@ -25,7 +26,7 @@ class ModelBank {
     float x[kColumns] = {};
     float sd[kColumns] = {};
     float variance[kMembers][Columns::kSize] = {};
-    int next = 0;
+    int member = 0, next = 0;
   };
 
   // Process noise on front columns only, none considered.
@@ -47,7 +48,7 @@ class ModelBank {
       turn_[i] = 0;
     }
     for (Estimate& e : member_) {
-      SetPrior(prior, e);
+      e.Start(prior);
       for (int i = 0; i < kJoints; ++i)
         e.d(Columns::kAt.front_end[i] - 1) = drifting_[i] < 0 ? 0.0f : kFirstSlope * kFirstSlope;
     }
@@ -57,21 +58,9 @@ class ModelBank {
   }
 
   // Verbs and slices as of the other filters. The report's innovation and variance are the mixture's.
-  UpdateReport Update(int joint, const float* front, const float* dense, float y, bool use) {
-    BeginRow(joint, front, dense, y, use);
-    int all = kNoSlices;
-    (void)StepRow(all);
-    return report_;
-  }
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     joint_ = joint;
-    const std::uint32_t largest = FillRow<Layout, Columns>(joint, front, dense, nullptr, row_);
-    report_.status = Judge(math::Max(largest, MagnitudeBits(y)));
-    report_.accepted = use & (report_.status == core::Status::kOk);
-    report_.status = GatedUnless(use, report_.status);
-    const std::uint32_t taken = math::MaskOf(report_.accepted);
-    for (int p = Columns::kAt.first[joint]; p < Columns::kSize; ++p) row_[p] = math::Masked(row_[p], taken);
-    y_ = math::Masked(y, taken);
+    y_ = math::Masked(y, FillRow<Layout, Columns>(joint, front, dense, nullptr, y, use, row_, report_));
     at_ = 0;
     begun_ = false;
   }
@@ -89,83 +78,72 @@ class ModelBank {
       weights_.Add(joint_, at_, e.innovation(), e.variance(), report_.accepted);
     }
     if (at_ < kMembers) return false;
+    credit -= RowCost(joint_);
     Report();
     return true;
   }
   const UpdateReport& report() const { return report_; }
 
-  void EndSample(std::uint32_t moving) {
-    BeginEnd(moving);
-    int all = kNoSlices;
-    (void)StepEnd(all);
-  }
   void BeginEnd(std::uint32_t moving) {
     moving_ = moving;
     weights_.EndSample(moving);
-    for (Estimate& e : member_) floor_count_ += HoldFloor(*prior_, e);
-    at_ = 0;
+    for (Estimate& e : member_) floor_count_ += e.HoldFloor(*prior_);
+    at_ = -1;
     samples_ += moving != 0u;  // at rest nothing changes, however long it lasts
   }
   bool StepEnd(int& credit) {
-    for (; at_ < kJoints && credit > 0; ++at_, credit -= kPredictCost) Predict(at_);
-    if (at_ < kJoints) return false;
-    Mix(math::MaskOf((moving_ != 0u) & (samples_ % kMixEvery == 0u)));
-    return true;
+    for (; at_ <= 2 * kJoints && credit > 0; ++at_) {
+      const int mixed = 2 * kJoints - at_;
+      if (at_ < 0) credit -= kEndCost;
+      else if (at_ < kJoints) Predict(at_), credit -= PredictCost(at_);
+      else Mix(mixed, math::MaskOf((moving_ != 0u) & (samples_ % kMixEvery == 0u))), credit -= MixCost(mixed);
+    }
+    return at_ > 2 * kJoints;
   }
-  int SampleCost() const {
-    int cost = 0;
-    for (int i = 0; i < kJoints; ++i) cost += kMembers * Estimate::RowCost(Columns::kAt.first[i], i) + kPredictCost;
+  static constexpr int SampleCost() {
+    int cost = kMembers * Estimate::kRowsCost + kEndCost + MixCost(kJoints);
+    for (int i = 0; i < kJoints; ++i) cost += RowCost(i) + PredictCost(i) + MixCost(i);
     return cost;
   }
 
   // What the bank knew of a joint's front columns no longer counts: see KalmanFilter::BeginReset.
   static constexpr bool CanReset(int block) { return block >= 0 && block < kJoints; }
-  void BeginReset(int block) {
-    joint_ = block;
-    at_ = 0;
-  }
+  void BeginReset(int block) { joint_ = block, at_ = 0; }
   bool StepReset(int& credit) {
     const int first = Columns::kAt.first[joint_], slope = Columns::kAt.front_end[joint_] - 1;
-    for (; at_ < kMembers && credit > 0; ++at_, credit -= (slope - first) * Estimate::SumCost(slope))
-      for (int p = first; p < slope; ++p) {
-        int all = kNoSlices;
-        member_[at_].BeginUnitSum(p, math::Masked(1.0f, prior_->active[Columns::kAt.column[p]]), p);
-        (void)member_[at_].StepSum(all);
-      }
+    for (; at_ < kMembers && credit > 0; ++at_) {
+      for (int p = first; p < slope; ++p)
+        member_[at_].AddUnit(p, math::Masked(1.0f, prior_->active[Columns::kAt.column[p]]), p);
+      credit -= (slope - first) * Estimate::Work::SumCost(Columns::kShape, slope);
+    }
     return at_ == kMembers;
   }
 
   void BeginReadOut(ReadOut& out) const {
     for (auto& member : out.variance)
       for (float& v : member) v = 0.0f;
-    out.next = 0;
+    out.member = out.next = 0;
   }
   // Mean and standard deviation of the mixture.
   bool StepReadOut(ReadOut& out, int& credit) const {
-    for (; out.next < Columns::kSize && credit > 0; ++out.next) {
-      for (int m = 0; m < kMembers; ++m) member_[m].AddDiagonal(out.next, out.variance[m]);
-      credit -= kMembers * Estimate::DiagonalCost(out.next);
-    }
-    if (out.next < Columns::kSize) return false;
+    for (; out.member < kMembers; ++out.member, out.next = 0)
+      if (!member_[out.member].AddDiagonal(out.variance[out.member], out.next, credit)) return false;
     for (int k = 0; k < kColumns; ++k) {
       const int p = Columns::kAt.position[k];
-      out.x[k] = x(k);
+      const float* weight = weights_.of(JointOf<Layout>(k));
+      out.x[k] = Mean(p, weight);
       float variance = 0.0f;
       for (int m = 0; m < kMembers; ++m) {
         const float apart = member_[m].x(p) - out.x[k];
-        variance += WeightAt(p, m) * (out.variance[m][p] + apart * apart);
+        variance += weight[m] * (out.variance[m][p] + apart * apart);
       }
       out.sd[k] = math::Sqrt(variance);
     }
     return true;
   }
-  bool StepReadOut(ReadOut& out) const {
-    int credit = kSliceCredit;
-    return StepReadOut(out, credit);
-  }
 
-  float x(int column) const { return MeanAt(Columns::kAt.position[column]); }
-  float weight(int joint, int member) const { return weights_.at(joint, member); }
+  float x(int column) const { return Mean(Columns::kAt.position[column], weights_.of(JointOf<Layout>(column))); }
+  float weight(int joint, int member) const { return weights_.of(joint)[member]; }
   std::uint32_t floor_count() const { return floor_count_; }
   const Estimate& estimate(int member) const { return member_[member]; }
 
@@ -179,23 +157,31 @@ class ModelBank {
   static constexpr float kFirstSlope = 4e-4f;
   static constexpr float kOthers = 0.02f;  // walk of the joint's other front columns
   static constexpr std::uint32_t kMixEvery = 10;
-  static constexpr int kPredictCost = kMembers * 100;
 
-  float WeightAt(int p, int m) const {
-    return Columns::IsFront(p) ? weights_.at(Columns::kAt.joint[p], m) : weights_.dense(m);
+  // What a sample's steps spend, as measured: a row beside the members' work, the weights, a prediction, a mix.
+  static constexpr int RowCost(int i) { return 100 + 2 * (Columns::kSize - Columns::kAt.first[i]); }
+  static constexpr int kEndCost = 500;
+  static constexpr int PredictCost(int i) {
+    const int slope = Columns::kAt.front_end[i] - 1;
+    return kMembers * (10 + Estimate::Work::SumCost(Columns::kShape, slope) + (Columns::kSize - slope) * 5 / 4);
   }
-  float MeanAt(int p) const {
+  static constexpr int MixCost(int i) {
+    if (i < kJoints) return 42 + 10 * (Columns::kAt.front_end[i] - Columns::kAt.first[i]);
+    return 150 + 10 * Layout::kDense + Columns::kSize - Layout::kDense;
+  }
+
+  float Mean(int p, const float* weight) const {
     float sum = 0.0f;
-    for (int m = 0; m < kMembers; ++m) sum += WeightAt(p, m) * member_[m].x(p);
+    for (int m = 0; m < kMembers; ++m) sum += weight[m] * member_[m].x(p);
     return sum;
   }
-
   void Report() {
+    const float* weight = weights_.of(joint_);
     float mean = 0.0f, variance = 0.0f;
-    for (int m = 0; m < kMembers; ++m) mean += weights_.at(joint_, m) * member_[m].innovation();
+    for (int m = 0; m < kMembers; ++m) mean += weight[m] * member_[m].innovation();
     for (int m = 0; m < kMembers; ++m) {
       const float apart = member_[m].innovation() - mean;
-      variance += weights_.at(joint_, m) * (member_[m].variance() + apart * apart);
+      variance += weight[m] * (member_[m].variance() + apart * apart);
     }
     report_.innovation = mean;
     report_.variance = variance;
@@ -207,46 +193,41 @@ class ModelBank {
     const int first = Columns::kAt.first[i], slope = Columns::kAt.front_end[i] - 1, width = slope + 1 - first;
     const std::uint32_t moves = math::MaskOf((moving_ >> i & 1u) != 0u);
     const int p = drifting_[i] < 0 ? slope : drifting_[i], turn = first + turn_[i];
-    const int column = turn == slope ? Columns::kAt.column[first] : Columns::kAt.column[turn];
-    const bool walks = (drifting_[i] >= 0) & ((turn == slope) | (prior_->noise[column] > 0.0f));
+    const float noise = prior_->noise[Columns::kAt.column[turn == slope ? first : turn]];
+    const bool walks = (drifting_[i] >= 0) & ((turn == slope) | (noise > 0.0f));
     for (int m = 0; m < kMembers; ++m) {
       Estimate& e = member_[m];
       if (p != slope) {
         e.x(p) += math::Masked(e.x(slope), moves);
         e.u(p, slope) += math::Masked(1.0f, moves);
         for (int later = slope + 1; later < Columns::kSize; ++later)
-          if (Columns::kAt.begin[later] <= p) e.u(p, later) += math::Masked(e.u(slope, later), moves);
+          if (Columns::kShape.Begin(later) <= p) e.u(p, later) += math::Masked(e.u(slope, later), moves);
       }
       const float walk = math::Select(turn == p, kModes[m].walk, kOthers * kModes[m].walk);
       const float step = math::Select(turn == slope, kModes[m].slope, walk);
-      e.BeginUnitSum(turn, math::Masked(step * step * static_cast<float>(width), moves & math::MaskOf(walks)), slope);
-      int all = kNoSlices;
-      (void)e.StepSum(all);
+      e.AddUnit(turn, math::Masked(step * step * static_cast<float>(width), moves & math::MaskOf(walks)), slope);
     }
     const auto following = static_cast<std::uint32_t>(turn_[i] + 1) & math::MaskOf(turn_[i] + 1 < width);
     turn_[i] = static_cast<std::uint8_t>((following & moves) | (turn_[i] & ~moves));
   }
 
-  // x at positions [first, end), by weights of the members before; where `due` is zero it stays.
-  void MixMeans(int first, int end, const float (&share)[kMembers][kMembers], bool dense, std::uint32_t due) {
-    for (int p = first; p < end; ++p) {
+  // The means of what all joints see (kJoints) first, then of each joint's own, joint 0 last. Computed with every
+  // sample, so that all cost the same; zero `due` changes nothing.
+  void Mix(int i, std::uint32_t due) {
+    const bool dense = i == kJoints;
+    float share[kMembers][kMembers];
+    weights_.Exchange(i, share, due);
+    for (int p = dense ? 0 : Columns::kAt.first[i]; p < (dense ? Columns::kSize : Columns::kAt.front_end[i]); ++p) {
       if (dense && Columns::IsFront(p)) continue;
       float before[kMembers];
       for (int m = 0; m < kMembers; ++m) before[m] = member_[m].x(p);
-      for (int to = 0; to < kMembers; ++to)
-        member_[to].x(p) = math::Select(due != 0u, math::Dot(share[to], before, kMembers), before[to]);
+      for (int to = 0; to < kMembers; ++to) {
+        float mixed = 0.0f;
+        for (int m = 0; m < kMembers; ++m) mixed += share[to][m] * before[m];
+        member_[to].x(p) = math::Select(due != 0u, mixed, before[to]);
+      }
     }
-  }
-  // Computed with every sample, so that all cost the same; zero `due` changes nothing.
-  void Mix(std::uint32_t due) {
-    float share[kMembers][kMembers];
-    weights_.DenseShares(share);
-    MixMeans(0, Columns::kSize, share, true, due);
-    for (int i = 0; i < kJoints; ++i) {
-      weights_.Exchange(i, share, due);
-      MixMeans(Columns::kAt.first[i], Columns::kAt.front_end[i], share, false, due);
-    }
-    weights_.Average();
+    if (i == 0) weights_.Average();
   }
 
   const Prior<Layout>* prior_ = nullptr;

@@ -23,6 +23,49 @@ enum class Beside : std::uint8_t {
   kSlopes  // one a joint, after its front columns: d/dt of one of them
 };
 
+// The front columns of the block form that a row touches: those of its joint; {0, 0}: none, or the dense form.
+struct Front {
+  std::uint8_t begin, end;  // positions
+};
+
+// What is known of an order without its layout: one copy of the code that works on a factor serves all filters of a
+// form.
+struct AnyShape {
+  std::uint8_t size, fronts, denses, states;  // positions; columns: front, dense, all that the prior knows
+  const std::uint8_t* position;               // of a column
+  const std::uint8_t* column;                 // at a position
+};
+template <Form form>
+struct Shape;
+template <>
+struct Shape<Form::kDense> : AnyShape {
+  static constexpr int kColumnCost = 6;  // a column's own work besides its elements (slices.hpp), as measured
+  // Element (i, p) is number Origin(p) + i of a Factor, from row Begin(p) on; D is (p, p).
+  constexpr int Origin(int p) const { return 3 * size + p * (p + 1) / 2; }
+  constexpr int Begin(int) const { return 0; }
+  constexpr int Begin(int, Front) const { return 0; }
+  // The next position that a row touches, after or before p; -1: none.
+  constexpr int Above(int p, Front) const { return p + 1; }
+  constexpr int Below(int p, Front) const { return p - 1; }
+};
+template <>
+struct Shape<Form::kBlock> : AnyShape {
+  const std::uint16_t* origin;
+  const std::uint8_t* begin;
+  const std::uint8_t* above;  // the next dense position, after or before
+  const std::int8_t* below;
+
+  static constexpr int kColumnCost = 8;
+  constexpr int Origin(int p) const { return origin[p]; }
+  constexpr int Begin(int p) const { return begin[p]; }
+  constexpr int Begin(int p, Front front) const { return p < front.end ? front.begin : 0; }  // of one that it touches
+  constexpr int Above(int p, Front front) const { return p + 1 < front.end ? p + 1 : above[p]; }
+  constexpr int Below(int p, Front front) const {
+    const int own = (p < front.end ? p : front.end) - 1;
+    return own > below[p] ? own : below[p];
+  }
+};
+
 template <class Layout, Form form, Beside beside>
 struct Order {
   static constexpr Form kForm = form;
@@ -33,13 +76,11 @@ struct Order {
                                                            : 0;
   static constexpr int kSize = Layout::kColumns + kMore;
 
+  // Of all orders, and what the block form needs besides.
   struct Tables {
-    std::uint8_t column[kSize] = {};      // at a position of the factor
-    std::uint8_t position[kSize] = {};    // of a column
-    std::uint8_t joint[kSize] = {};       // of the front column at a position; kJoints: a dense one
-    std::uint8_t begin[kSize] = {};       // first stored row of the column at a position
-    std::uint16_t start[kSize + 1] = {};  // where its elements [begin, position] are stored, D last
-    std::uint8_t first[kJoints] = {};     // position of a joint's first front column, and of its row's first element
+    std::uint8_t position[kSize] = {};
+    std::uint8_t column[kSize] = {};
+    std::uint8_t first[kJoints] = {};  // position of a joint's first front column, and of its row's first element
     std::uint8_t front_end[kJoints] = {};
 
     constexpr Tables() {
@@ -47,41 +88,67 @@ struct Order {
       for (int d = 0; d <= Layout::kDense; ++d) {
         for (int i = 0; i < kJoints; ++i)
           if (Layout::kRowBegin[i] == d) at = PlaceFront(i, at);
-        if (d < Layout::kDense) at = Place(Layout::kFront + d, kJoints, at, 0);
+        if (d < Layout::kDense) at = Place(Layout::kFront + d, at);
       }
       if (beside == Beside::kEta)
-        for (int e = 0; e < kMore; ++e) at = Place(Layout::kColumns + e, kJoints, at, 0);
-      for (int p = 0; p < kSize; ++p) start[p + 1] = static_cast<std::uint16_t>(start[p] + p - begin[p] + 1);
+        for (int e = 0; e < kMore; ++e) at = Place(Layout::kColumns + e, at);
     }
 
    private:
     constexpr int PlaceFront(int i, int at) {
-      const int top = form == Form::kBlock ? at : 0;
       first[i] = static_cast<std::uint8_t>(at);
-      for (int k = Layout::kFrontBegin[i]; k < Layout::kFrontBegin[i + 1]; ++k) at = Place(k, i, at, top);
-      if (beside == Beside::kSlopes) at = Place(Layout::kColumns + i, i, at, top);
+      for (int k = Layout::kFrontBegin[i]; k < Layout::kFrontBegin[i + 1]; ++k) at = Place(k, at);
+      if (beside == Beside::kSlopes) at = Place(Layout::kColumns + i, at);
       front_end[i] = static_cast<std::uint8_t>(at);
       return at;
     }
-    constexpr int Place(int k, int i, int at, int top) {
+    constexpr int Place(int k, int at) {
       column[at] = static_cast<std::uint8_t>(k);
       position[k] = static_cast<std::uint8_t>(at);
-      joint[at] = static_cast<std::uint8_t>(i);
-      begin[at] = static_cast<std::uint8_t>(top);
       return at + 1;
+    }
+  };
+  struct BlockTables {
+    std::uint16_t origin[kSize] = {};
+    std::uint8_t begin[kSize] = {};
+    std::uint8_t above[kSize] = {};
+    std::int8_t below[kSize] = {};
+
+    constexpr BlockTables() {
+      for (int p = 0, elements = 3 * kSize, last = -1; p < kSize; ++p) {
+        for (int i = 0; i < kJoints; ++i)
+          if (p >= kAt.first[i] && p < kAt.front_end[i]) begin[p] = kAt.first[i];
+        origin[p] = static_cast<std::uint16_t>(elements - begin[p]);
+        elements += p - begin[p] + 1;
+        below[p] = static_cast<std::int8_t>(last);
+        if (!IsFront(p)) last = p;
+      }
+      for (int p = kSize - 1, next = kSize; p >= 0; --p) {
+        above[p] = static_cast<std::uint8_t>(next);
+        if (!IsFront(p)) next = p;
+      }
     }
   };
   static_assert(kSize < 128, "positions are stored in a byte");
   static constexpr Tables kAt{};
-  static constexpr int kElements = kAt.start[kSize];
 
-  // Where the rows of a column's elements are counted from: element (i, p) is at kOrigin + i.
-  static constexpr int Origin(int p) { return kAt.start[p] - kAt.begin[p]; }
-  static constexpr bool IsFront(int p) { return kAt.joint[p] != kJoints; }
-  // In the block form the front column at p has nothing in the row of another joint.
-  static constexpr bool Skips(int p, int row_joint) {
-    return form == Form::kBlock && IsFront(p) && kAt.joint[p] != row_joint;
+  static constexpr bool IsFront(int p) {
+    return (kAt.column[p] < Layout::kFront) | (beside == Beside::kSlopes && kAt.column[p] >= Layout::kColumns);
   }
+  static constexpr Front FrontOf(int joint) {  // kJoints: none
+    if (form == Form::kDense || joint == kJoints) return {0, 0};
+    return {kAt.first[joint], kAt.front_end[joint]};
+  }
+  static constexpr BlockTables kBlockAt{};
+
+  static constexpr auto MakeShape() {
+    constexpr int states = Layout::kColumns + (beside == Beside::kEta ? Layout::kNonlinear : 0);
+    constexpr AnyShape any = {kSize, Layout::kFront, Layout::kDense, states, kAt.position, kAt.column};
+    if constexpr (form == Form::kDense) return Shape<form>{any};
+    else return Shape<form>{any, kBlockAt.origin, kBlockAt.begin, kBlockAt.above, kBlockAt.below};
+  }
+  static constexpr Shape<form> kShape = MakeShape();
+  static constexpr int kElements = kShape.Origin(kSize - 1) - 2 * kSize;
 };
 
 }  // namespace armcal::filter

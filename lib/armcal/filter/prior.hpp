@@ -11,7 +11,6 @@
 
 #include <cstdint>
 
-#include "armcal/filter/order.hpp"
 #include "armcal/math/ud.hpp"
 
 namespace armcal::filter {
@@ -29,43 +28,28 @@ struct Prior {
   float gate_sigma = 0.0f;     // innovations beyond are not used; 0: no gate (Kalman form)
 };
 
-// Joint of a front column, and the mask of joints that must move before a column may change by itself:
-// a front column needs its own joint, a dense column all of them.
+// Joint of a front column; kJoints: of another one. The same instructions for all.
 template <class Layout>
-constexpr std::uint32_t JointsOf(int column) {
+constexpr int JointOf(int column) {
   int joint = 0;
   for (int i = 0; i < Layout::kJoints; ++i) joint += column >= Layout::kFrontBegin[i + 1];
+  return joint;
+}
+// The joints that must move before a column may change by itself: a front column needs its own joint, others all.
+template <class Layout>
+constexpr std::uint32_t JointsOf(int column) {
+  const int joint = JointOf<Layout>(column);
   return joint < Layout::kJoints ? 1u << joint : (1u << Layout::kJoints) - 1u;
 }
 
-// x = 0 and the prior's correlation, in any order of the columns. Slopes start as known: zero. Context: background.
-template <class Layout, class Estimate>
-void SetPrior(const Prior<Layout>& prior, Estimate& estimate) {
-  using Columns = typename Estimate::Columns;
-  const auto& at = Columns::kAt.position;
-  estimate.Clear();
-  for (int k = 0; k < Layout::kFront; ++k) estimate.d(at[k]) = math::Masked(1.0f, prior.active[k]);
-  for (int j = 0; j < Layout::kDense; ++j) {
-    const int p = at[Layout::kFront + j];
-    for (int i = 0; i < j; ++i) estimate.u(at[Layout::kFront + i], p) = prior.dense_ud[math::UdIndex(i, j)];
-    estimate.d(p) = prior.dense_ud[math::UdIndex(j, j)];
-  }
-  if constexpr (Columns::kBeside == Beside::kEta)
-    for (int k = Layout::kColumns; k < Columns::kSize; ++k) estimate.d(at[k]) = math::Masked(1.0f, prior.active[k]);
-}
-
-// Dense D below the prior's floor is raised to it. Returns how many. Context: background.
-template <class Layout, class Estimate>
-std::uint32_t HoldFloor(const Prior<Layout>& prior, Estimate& estimate) {
-  using Columns = typename Estimate::Columns;
-  std::uint32_t held = 0;
-  for (int p = 0; p < Columns::kSize; ++p) {
-    if (Columns::IsFront(p)) continue;
-    const float floor = math::Masked(prior.link_floor, prior.active[Columns::kAt.column[p]]);
-    held += estimate.d(p) < floor;
-    estimate.d(p) = math::Max(estimate.d(p), floor);
-  }
-  return held;
+// Columns of a block that can be reset: a joint's front ones, or (kJoints) all others of `columns`.
+struct ColumnRange {
+  int begin, end;
+};
+template <class Layout>
+constexpr ColumnRange ColumnsOfBlock(int block, int columns) {
+  if (block < Layout::kJoints) return {Layout::kFrontBegin[block], Layout::kFrontBegin[block + 1]};
+  return {Layout::kFront, columns};
 }
 
 }  // namespace armcal::filter

@@ -10,6 +10,12 @@ namespace armcal::math {
 
 // Also at -Os, which would call a loop's body four times.
 #define ARMCAL_INLINE __attribute__((always_inline))
+// One copy serves all callers of an image, which keep their registers.
+#ifdef __clang__
+#define ARMCAL_NOINLINE __attribute__((noinline))
+#else
+#define ARMCAL_NOINLINE __attribute__((noinline, noclone))
+#endif
 
 namespace internal {
 template <class T>
@@ -24,56 +30,58 @@ inline void FoldElement(T& x, T& r, T x0, T s) {
   x = rest;
   r = before + s * rest;
 }
-// turn(k) for k < length: the remainder first, then four a turn. Loops are inlined with what they do, so that pointers
+// turn(k) for k < length, four a turn as long as there are four. Loops are inlined with what they do, so that pointers
 // known to be apart stay known.
 template <class Turn>
 ARMCAL_INLINE inline void ByFours(int length, Turn turn) {
   int k = 0;
-  for (const int odd = length & 3; k < odd; ++k) turn(k);
-  for (; k < length; k += 4) {
+  for (; k + 3 < length; k += 4) {
     turn(k);
     turn(k + 1);
     turn(k + 2);
     turn(k + 3);
   }
+  for (; k < length; ++k) turn(k);
 }
 }  // namespace internal
 
 // sum + the sum of a[k] b[k], k < length.
 template <class T>
-ARMCAL_INLINE inline T Dot(const T* __restrict a, const T* __restrict b, int length, T sum = T(0)) {
+ARMCAL_NOINLINE T Dot(const T* __restrict a, const T* __restrict b, int length, T sum = T(0)) {
   internal::ByFours(length, [&](int k) ARMCAL_INLINE { sum += a[k] * b[k]; });
   return sum;
 }
 // The same of two columns a1, a2 with one b.
 template <class T>
-ARMCAL_INLINE inline void Dot(const T* __restrict a1, const T* __restrict a2, const T* __restrict b, int length,
-                              T& sum1, T& sum2) {
-  T s1 = sum1, s2 = sum2;
+struct Two {
+  T first, second;
+};
+template <class T>
+ARMCAL_NOINLINE Two<T> Dots(const T* __restrict a1, const T* __restrict a2, const T* __restrict b, int length, T sum1,
+                            T sum2) {
   internal::ByFours(length, [&](int k) ARMCAL_INLINE {
     const T x = b[k];
-    s1 += a1[k] * x;
-    s2 += a2[k] * x;
+    sum1 += a1[k] * x;
+    sum2 += a2[k] * x;
   });
-  sum1 = s1;
-  sum2 = s2;
+  return {sum1, sum2};
 }
 
 // x += step a. Shapes: [length].
 template <class T>
-ARMCAL_INLINE inline void AddScaled(T* __restrict x, const T* __restrict a, T step, int length) {
-  internal::ByFours(length, [&](int k) ARMCAL_INLINE { x[k] += a[k] * step; });
+void AddScaled(T* __restrict x, const T* __restrict a, T step, int length) {
+  for (int k = 0; k < length; ++k) x[k] += a[k] * step;
 }
 
 // One column of Bierman's measurement update: u += gain shift and gain += u v, both with u and gain as before.
 template <class T>
-ARMCAL_INLINE inline void BiermanColumn(T* __restrict u, T* __restrict gain, T shift, T v, int length) {
+void BiermanColumn(T* __restrict u, T* __restrict gain, T shift, T v, int length) {
   for (int k = 0; k < length; ++k) internal::BiermanElement(u[k], gain[k], shift, v);
 }
 // Column u1, then u2.
 template <class T>
-ARMCAL_INLINE inline void BiermanColumns(T* __restrict u1, T* __restrict u2, T* __restrict gain, T shift1, T v1,
-                                         T shift2, T v2, int length) {
+ARMCAL_NOINLINE void BiermanColumns(T* __restrict u1, T* __restrict u2, T* __restrict gain, T shift1, T v1, T shift2,
+                                    T v2, int length) {
   internal::ByFours(length, [&](int k) ARMCAL_INLINE {
     T sum = gain[k];
     internal::BiermanElement(u1[k], sum, shift1, v1);
@@ -85,13 +93,12 @@ ARMCAL_INLINE inline void BiermanColumns(T* __restrict u1, T* __restrict u2, T* 
 // Takes x0 times r off x, then adds s times what is left of x to r: a square-root-free Givens rotation, and a column of
 // a rank-one sum. r moves by a correction, so that its increments are not lost beside its value.
 template <class T>
-ARMCAL_INLINE inline void Fold(T* __restrict x, T* __restrict r, T x0, T s, int length) {
+void Fold(T* __restrict x, T* __restrict r, T x0, T s, int length) {
   for (int k = 0; k < length; ++k) internal::FoldElement(x[k], r[k], x0, s);
 }
 // With r1, then r2.
 template <class T>
-ARMCAL_INLINE inline void Fold(T* __restrict x, T* __restrict r1, T* __restrict r2, T x1, T s1, T x2, T s2,
-                               int length) {
+ARMCAL_NOINLINE void Fold(T* __restrict x, T* __restrict r1, T* __restrict r2, T x1, T s1, T x2, T s2, int length) {
   internal::ByFours(length, [&](int k) ARMCAL_INLINE {
     T rest = x[k];
     internal::FoldElement(rest, r1[k], x1, s1);

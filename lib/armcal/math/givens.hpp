@@ -20,25 +20,17 @@ T GivensPivot(T& d, T x0, T weight, T& s) {
   return remaining;
 }
 
-// Eliminates x0 of the row (x0, x) of the given weight against the stored row (1, r) with d > 0.
-// Shapes: x, r [length]; x0 is read before, x is what remains of the row. Returns the weight of what remains.
+// Eliminates x0, then what it leaves of x[0], of the row (x0, x) of the given weight against two stored rows with d >
+// 0: (1, r1[0..length]) and after it (1, r2[0..length - 1]); length 0: against the first alone. Shapes: x, r1 [length +
+// 1], r2 [length]; x is what remains of the row. Returns the weight of what remains.
 template <class T>
-T GivensRow(T& d, T* __restrict r, T x0, T* __restrict x, int length, T weight) {
-  T s;
-  const T remaining = GivensPivot(d, x0, weight, s);
-  Fold(x, r, x0, s, length);
-  return remaining;
-}
-
-// The same against two stored rows, (1, r1[0..length]) and after it (1, r2[0..length - 1]), at once.
-// Shapes: x, r1 [length + 1], r2 [length].
-template <class T>
-T GivensRows(T& d1, T* __restrict r1, T& d2, T* __restrict r2, T x0, T* __restrict x, int length, T weight) {
+T GivensRows(T* d1, T* __restrict r1, T* d2, T* __restrict r2, T x0, T* __restrict x, int length, T weight) {
   T s1, s2;
-  weight = GivensPivot(d1, x0, weight, s1);
-  Fold(x, r1, x0, s1, 1);
+  weight = GivensPivot(*d1, x0, weight, s1);
+  internal::FoldElement(x[0], r1[0], x0, s1);
+  if (length == 0) return weight;
   const T x1 = x[0];
-  weight = GivensPivot(d2, x1, weight, s2);
+  weight = GivensPivot(*d2, x1, weight, s2);
   Fold(x + 1, r1 + 1, r2, x0, s1, x1, s2, length);
   return weight;
 }

@@ -2,7 +2,7 @@
 //
 // Packed by columns: element (i, j), i <= j, at j (j + 1) / 2 + i; the diagonal holds D. Size n (n + 1) / 2.
 // Every kernel takes the same instructions whatever the numbers are, allocates nothing and calls nothing. What rows and
-// noise do to a filter's factor is filter/ud_estimate.hpp's. Context: any.
+// noise do to a filter's factor is filter/factor_work.hpp's. Context: any.
 #pragma once
 
 #include "armcal/math/elementary.hpp"

@@ -34,6 +34,12 @@ bool IsPhysical(const T* body) {
   return good;
 }
 
+// The same of a link: a block of 11, its body and after it the rotor inertia of its motor, which is not negative.
+template <class T>
+bool CanExist(const T* link) {
+  return IsPhysical(link) && link[10] >= T(0);  // also false for NaN
+}
+
 // I += m (c'c E - c c') with m = sign x mass. Shapes: c [3], inertia [6].
 template <class T>
 void AddParallelAxis(T m, const T* c, T* inertia) {

@@ -4,24 +4,11 @@
 #include "armcal/filter/extended_kalman_filter.hpp"
 #include "tests/target/trace_run.hpp"
 
-using namespace armcal;          // NOLINT: the program is about all of it
-using namespace armcal::target;  // NOLINT: the bench of these programs
+using namespace armcal;  // NOLINT: the program is about all of it
 using Model = generated::Er20Stribeck;
 
 namespace {
-
-estimator::ImageWork<Model> work;
-estimator::Image<Model> image;
-Run<Model, filter::ExtendedKalmanFilter<Model>> run = {"ekf", {}, {}, {}};
-
+target::Run<Model, filter::ExtendedKalmanFilter<Model>> run = {"ekf", {}, {}, {}};
 }  // namespace
 
-// The answer is 1 if there is no trace, or if it taught the filter nothing.
-int Program() {
-  if (!core::IsOk(estimator::BuildImage(estimator::DefaultTable<Model>(), 1, work, image))) return 1;
-  run.Start(image);
-  const std::uint32_t ticks = ForEachTick([](const model::RawSample<6>& raw) { run.Tick(raw); });
-  run.Finish();
-  port::runner::Line("ticks").Decimal(ticks).End();
-  return run.estimates.rows_used[1] > 0 ? 0 : 1;
-}
+int Program() { return target::RunAlong(run); }

@@ -43,15 +43,15 @@ void Ud(Numbers& numbers, int round) {
 }
 
 void Givens(Numbers& numbers, int round) {
-  float d = 1e-6f, weight = 1.0f, row[n] = {};
+  float d[3] = {1e-6f, 1e-6f}, first[n] = {}, second[n] = {};
   for (int k = 0; k < 50; ++k) {
     Fill(numbers, h, n);
-    weight = math::GivensRow(d, row, numbers.Signed(), h, n, 1.0f);
+    d[2] = math::GivensRows(d, first, d + 1, second, numbers.Signed(), h, n - 1, 1.0f);
   }
-  Print("givens_row", round, row, n);
+  Print("givens_first", round, first, n);
+  Print("givens_second", round, second, n - 1);
   Print("givens_rest", round, h, n);
-  const float both[2] = {d, weight};
-  Print("givens_weights", round, both, 2);
+  Print("givens_weights", round, d, 3);
 }
 
 void Bodies(Numbers& numbers, int round) {

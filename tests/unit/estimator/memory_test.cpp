@@ -11,31 +11,11 @@
 namespace armcal::estimator {
 namespace {
 using namespace test;  // NOLINT: the bench of these tests
-
-// The Coulomb column of joint 2 becomes a counter: 0, 1, 2 ... samples since the start. Row 2 is ready once it is
-// past 3. A state that is fed by the sample's acceleration shows what a sample that is not finite does.
-struct Counting : TwoLink {
-  static constexpr int kStates = 3;
-  static constexpr int kReadyState[kJoints] = {-1, 1};
-  template <class T>
-  static void InitialState(const model::ModelInput<T, 2>& x, const T*, const T*, T* state) {
-    state[0] = state[1] = T(0);
-    state[2] = x.qdd[1];
-  }
-  template <class T>
-  static void Regressor(const model::ModelInput<T, 2>& x, const T* committed, const T* eta, const T* state, T* next,
-                        T* front, T* dense) {
-    TwoLink::Regressor(x, committed, eta, state, next, front, dense);
-    front[3] = state[0];
-    next[0] = state[0] + T(1);
-    next[1] = state[0] > T(3) ? T(1) : T(0);
-    next[2] = x.qdd[1];
-  }
-};
+using armcal::test::CountingTwoLink;
 
 class Memory : public testing::Test {
  protected:
-  using Filter = filter::ForgettingFilter<Counting>;
+  using Filter = filter::ForgettingFilter<CountingTwoLink>;
   struct Row {
     float counter;
     bool used;
@@ -54,7 +34,7 @@ class Memory : public testing::Test {
   }
   void Feed(const Sample& s) { ASSERT_EQ(host_->Feed(s), core::Status::kOk); }
 
-  std::unique_ptr<Host<Counting, Filter>> host_ = std::make_unique<Host<Counting, Filter>>();
+  std::unique_ptr<Host<CountingTwoLink, Filter>> host_ = std::make_unique<Host<CountingTwoLink, Filter>>();
   Motion run_;
   std::vector<Row> seen_;
 };

@@ -119,4 +119,25 @@ struct TwoLink {
   }
 };
 
+// The Coulomb column of joint 2 becomes a counter: 0, 1, 2 ... samples since the start. Row 2 is ready once it is
+// past 3. A state that is fed by the sample's acceleration shows what a sample that is not finite does.
+struct CountingTwoLink : TwoLink {
+  static constexpr int kStates = 3;
+  static constexpr int kReadyState[kJoints] = {-1, 1};
+  template <class T>
+  static void InitialState(const model::ModelInput<T, 2>& x, const T*, const T*, T* state) {
+    state[0] = state[1] = T(0);
+    state[2] = x.qdd[1];
+  }
+  template <class T>
+  static void Regressor(const model::ModelInput<T, 2>& x, const T* committed, const T* eta, const T* state, T* next,
+                        T* front, T* dense) {
+    TwoLink::Regressor(x, committed, eta, state, next, front, dense);
+    front[3] = state[0];
+    next[0] = state[0] + T(1);
+    next[1] = state[0] > T(3) ? T(1) : T(0);
+    next[2] = x.qdd[1];
+  }
+};
+
 }  // namespace armcal::test

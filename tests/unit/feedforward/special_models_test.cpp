@@ -11,23 +11,8 @@ namespace armcal::feedforward {
 namespace {
 
 using core::Status;
+using test::CountingTwoLink;
 using test::TwoLink;
-
-// The offset of joint 1 counts ticks since the start: 0, 1, 2 ...
-struct Counting : TwoLink {
-  static constexpr int kStates = 1;
-  template <class T>
-  static void InitialState(const model::ModelInput<T, 2>&, const T*, const T*, T* state) {
-    state[0] = T(0);
-  }
-  template <class T>
-  static void Regressor(const model::ModelInput<T, 2>& x, const T* committed, const T* eta, const T* state, T* next,
-                        T* front, T* dense) {
-    TwoLink::Regressor(x, committed, eta, state, next, front, dense);
-    front[2] = state[0];
-    next[0] = state[0] + T(1);
-  }
-};
 
 // The coupling between the joints reads a sensor that is not there.
 struct WithoutSensor : TwoLink {
@@ -52,13 +37,13 @@ Committed<Model> Table(int column, float value) {
 const float kQ[2] = {0.4f, -0.9f}, kQd[2] = {0.7f, -1.1f}, kQdd[2] = {2.0f, 3.0f}, kTemp[2] = {30, 30};
 
 TEST(SpecialModels, NextTable_StartsEffectsWithMemoryAnew) {
-  auto ff = std::make_unique<FeedForward<Counting>>();
+  auto ff = std::make_unique<FeedForward<CountingTwoLink>>();
   float tau[2];
   for (int table = 0; table < 2; ++table) {
-    ASSERT_EQ(ff->Offer(Table<Counting>(2, 1.0f), false), Status::kOk);
+    ASSERT_EQ(ff->Offer(Table<CountingTwoLink>(3, 1.0f), false), Status::kOk);
     for (int tick = 0; tick < 5; ++tick) {
       ASSERT_EQ(ff->Evaluate(kQ, kQd, kQdd, kTemp, 0.0f, tau), Status::kOk);
-      EXPECT_EQ(tau[0], static_cast<float>(tick)) << table;
+      EXPECT_EQ(tau[1], static_cast<float>(tick)) << table;
     }
   }
 }

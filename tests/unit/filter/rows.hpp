@@ -130,7 +130,9 @@ template <class Filter>
 typename Filter::ReadOut Read(const Filter& filter) {
   typename Filter::ReadOut out;
   filter.BeginReadOut(out);
-  while (!filter.StepReadOut(out)) {
+  for (bool done = false; !done;) {
+    int credit = kSliceCredit;
+    done = filter.StepReadOut(out, credit);
   }
   return out;
 }

@@ -103,11 +103,10 @@ TEST_F(Ud, ColumnsInPairs_GiveTheBitsOfOneByOne) {
     Fold(gain.data(), u2.data(), -0.8, 0.9, length);
     Fold(pair.data(), v1.data(), v2.data(), 0.6, 0.1, -0.8, 0.9, length);
     EXPECT_TRUE(u1 == v1 && u2 == v2 && gain == pair) << length;
-    double sum1 = 0.5, sum2 = 0.25;
-    Dot(a.data(), b.data(), x.data(), length, sum1, sum2);
-    EXPECT_EQ(sum1, Dot(a.data(), x.data(), length, 0.5));
-    EXPECT_EQ(sum2, Dot(b.data(), x.data(), length, 0.25));
-    EXPECT_NEAR(sum1, 0.5 + a.head(length).dot(x.head(length)), 1e-14);
+    const auto dots = Dots(a.data(), b.data(), x.data(), length, 0.5, 0.25);
+    EXPECT_EQ(dots.first, Dot(a.data(), x.data(), length, 0.5));
+    EXPECT_EQ(dots.second, Dot(b.data(), x.data(), length, 0.25));
+    EXPECT_NEAR(dots.first, 0.5 + a.head(length).dot(x.head(length)), 1e-14);
   }
 }
 
@@ -120,10 +119,12 @@ TEST_F(Ud, GivensRows_GiveTheCholeskyFactorOfTheNormalMatrix) {
   for (int row = 0; row < data.rows(); ++row) {
     Vector x = data.row(row);
     double weight = 1;
-    for (int j = 0; j < n; ++j) {
-      Vector stored = r.row(j).tail(n - j);
-      weight = GivensRow(d(j), stored.data(), x(j), x.data() + j + 1, n - j, weight);
-      r.row(j).tail(n - j) = stored;
+    for (int j = 0; j < n; j += 2) {
+      const int k = std::min(j + 1, n - 1);  // the last one is alone
+      Vector first = r.row(j).tail(n - j), second = r.row(k).tail(n - k);
+      weight = GivensRows(&d(j), first.data(), &d(k), second.data(), x(j), x.data() + j + 1, n - 1 - j, weight);
+      r.row(j).tail(n - j) = first;
+      if (k > j) r.row(k).tail(n - k) = second;
     }
     rss += weight * x(n) * x(n);
   }

@@ -37,6 +37,15 @@ bool PhysicalByEigenvalues(const Vector10& b) {
   return b(0) > 0 && e(0) > 0 && e(0) + e(1) > e(2);
 }
 
+TEST(Physical, LinkWhoseRotorInertiaIsNegativeOrNoNumber_CannotExist) {
+  double link[11] = {2, 0, 0, 0, 1, 0, 0, 1, 0, 1, 0};
+  EXPECT_TRUE(CanExist(link));
+  link[10] = -1e-9;
+  EXPECT_FALSE(CanExist(link));
+  link[10] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(CanExist(link));
+}
+
 TEST(Physical, BodyOfPointMasses_IsPhysicalInFloatAndDouble) {
   std::mt19937 random(3);
   for (int trial = 0; trial < 1000; ++trial) {

@@ -1,6 +1,8 @@
 // physical - a filter's result made by dense double algebra from any amount of data; the tests' bench.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Dense>
 #include <memory>
 #include <random>
@@ -88,5 +90,72 @@ struct Case {
     return status;
   }
 };
+
+template <class Model>
+using ReadOut = MapReadOut<Model, double>;
+
+// A drawn truth, `size` times the prior's spread, and 300 rows of it. In prior units a row of `weight` says in each
+// column as much as the prior for 1, a million times more for 1000. What the truth says need not be physical.
+template <class Model>
+std::unique_ptr<Case<Model>> Draw(unsigned seed, double weight, double size) {
+  auto c = std::make_unique<Case<Model>>();
+  EXPECT_EQ(c->Build(), core::Status::kOk);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  const Eigen::SelfAdjointEigenSolver<Matrix> prior(Covariance(c->ud.data(), Model::kColumns));
+  const Vector z = Vector::NullaryExpr(Model::kColumns, [&] { return normal(random); });
+  const Vector root = prior.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Vector truth = size * prior.eigenvectors() * (root.asDiagonal() * z);
+  Matrix h(300, Model::kColumns);
+  for (int k = 0; k < Model::kColumns; ++k)
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c->image->prior.active[k] ? weight * normal(random) : 0;
+  c->Take(h, h * truth + Vector::NullaryExpr(h.rows(), [&] { return normal(random); }));
+  return c;
+}
+
+// A hundred rows of noise about the prior.
+template <class Model>
+void TakeNoise(Case<Model>& c, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  Matrix h = Matrix::Zero(100, Model::kColumns);
+  for (int k = 0; k < Model::kColumns; ++k)
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c.image->prior.active[k] ? 0.3 * normal(random) : 0;
+  c.Take(h, Vector::NullaryExpr(h.rows(), [&] { return normal(random); }));
+}
+
+template <class Model>
+const typename ReadOut<Model>::Result& Solve(ReadOut<Model>& read_out, const Case<Model>& c, bool warm = false) {
+  EXPECT_EQ(c.HandOver(read_out, warm), core::Status::kOk);
+  while (!read_out.Step()) {
+  }
+  return read_out.result();
+}
+
+// Largest difference of two sets of bodies' central coordinates, in prior standard deviations.
+template <class Model>
+double Distance(const Case<Model>& c, const double* a, const double* b) {
+  double worst = 0;
+  for (int at = 0; at < Model::kBodyParameters; at += 11) {
+    double ca[11], cb[11];
+    ToCentral(a + at, ca);
+    ToCentral(b + at, cb);
+    ca[10] = a[at + 10], cb[10] = b[at + 10];
+    for (int k = 0; k < 11; ++k)
+      if (const double sd = c.work->rigid.sd[at + k]; sd > 0) worst = std::max(worst, std::abs(ca[k] - cb[k]) / sd);
+  }
+  return worst;
+}
+
+template <class Model>
+bool PhysicalInATable(const double* body) {
+  bool good = true;
+  for (int at = 0; at < Model::kBodyParameters; at += 11) {
+    float entry[11];
+    std::copy(body + at, body + at + 11, entry);
+    good &= CanExist(entry);
+  }
+  return good;
+}
 
 }  // namespace armcal::physical::test

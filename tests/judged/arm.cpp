@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace armcal::judged {
 
@@ -13,7 +12,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kSmooth_radps = 0.005;  // of the declared tanh
 
 struct Size {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include "host_sim/plant/random.hpp"
 
 namespace armcal::judged {
+
+inline constexpr double kPi = std::numbers::pi;
 
 struct Motion {
   Eigen::VectorXd t;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 
 namespace armcal::judged {
 
@@ -13,8 +12,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 using Maker = std::function<void(const Arm& arm, plant::Random& random, Effect& effect)>;
 using Curve = std::function<ArrayXd(const Motion& m, const MatrixXd& links, int j)>;

@@ -9,18 +9,15 @@
 #include <random>
 #include <string>
 
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
 namespace armcal::calibration {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using tests::Er20Model;
 using Wide = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-
-const codegen::Model& Er20() {
-  static const codegen::Model model(codegen::ReadRobot("codegen/robots/er20_like.toml"),
-                                    codegen::ReadCatalogue("codegen/effects"));
-  return model;
-}
 
 // Independent numbers for every joint, sample and signal; nothing in them is a motion.
 Dataset RandomNumbers(int samples, unsigned seed) {
@@ -48,7 +45,7 @@ VectorXd RandomWeight(unsigned seed) {
 // The textbook way: all used rows stacked, then QR with column pivoting. What the product must never store.
 template <class Matrix>
 Matrix Stack(const Dataset& d, const VectorXd& weight, Matrix& right) {
-  const codegen::Model& m = Er20();
+  const codegen::Model& m = Er20Model();
   std::vector<MatrixXd> row;
   m.Regressor(d.s, std::vector<double>(m.columns(), 0.0), {}, row);
   Matrix A(d.used.sum(), m.columns());
@@ -71,7 +68,7 @@ double Distance(const VectorXd& x, const VectorXd& expected, const VectorXd& nor
 }
 
 Solved Batch(const std::vector<const Dataset*>& logs, const VectorXd& weight) {
-  return BatchLeastSquares(Er20(), logs, weight, VectorXd::Zero(Er20().columns()), {});
+  return BatchLeastSquares(Er20Model(), logs, weight, VectorXd::Zero(Er20Model().columns()), {});
 }
 
 TEST(BatchLeastSquares, RandomNumbers_EqualPivotedQrOfTheStackedRows) {
@@ -82,7 +79,7 @@ TEST(BatchLeastSquares, RandomNumbers_EqualPivotedQrOfTheStackedRows) {
     const MatrixXd A = Stack(d, weight, y);
     const Solved s = Batch({&d}, weight);
     EXPECT_FALSE(s.orthogonal);
-    EXPECT_EQ(s.rank, Er20().columns());
+    EXPECT_EQ(s.rank, Er20Model().columns());
     // Condition of these rows, squared, is below 1e5: 1e-16 x 1e5 x the length of the sums.
     EXPECT_LT(Distance(s.x, A.colPivHouseholderQr().solve(y), A.colwise().norm()), 1e-10) << samples;
   }
@@ -111,18 +108,18 @@ TEST(BatchLeastSquares, ColumnsAlmostAlike_AreFactorisedAndKeepDigitsThatNormalE
   Wide wide_y;
   const Wide wide = Stack(d, weight, wide_y);
   // A torque that the model explains: then the error is that of the arithmetic, not of a large misfit.
-  const VectorXd truth = VectorXd::LinSpaced(Er20().columns(), 1, 2);
+  const VectorXd truth = VectorXd::LinSpaced(Er20Model().columns(), 1, 2);
   MatrixXd y;
   const MatrixXd A = Stack(d, weight, y);
   std::vector<MatrixXd> row;
-  Er20().Regressor(d.s, std::vector<double>(truth.size(), 0.0), {}, row);
+  Er20Model().Regressor(d.s, std::vector<double>(truth.size(), 0.0), {}, row);
   for (int j = 0; j < 6; ++j) d.tau.col(j) = row[j] * truth;
   Stack(d, weight, wide_y);
   const VectorXd expected = wide.colPivHouseholderQr().solve(wide_y).cast<double>(), norm = A.colwise().norm();
   const Solved s = Batch({&d}, weight);
   EXPECT_TRUE(s.orthogonal);
   EXPECT_GT(s.condition, kNormalLimit);
-  EXPECT_EQ(s.rank, Er20().columns());
+  EXPECT_EQ(s.rank, Er20Model().columns());
   Stack(d, weight, y);
   const double streamed = Distance(s.x, expected, norm),
                normal = Distance(SolveNormal(A.transpose() * A, A.transpose() * y).x, expected, norm);
@@ -139,7 +136,7 @@ TEST(BatchLeastSquares, AJointThatTurnsOneWay_GivesTheSmallestFitThatPredictsThe
   const MatrixXd A = Stack(d, weight, y);
   const Solved s = Batch({&d}, weight);
   EXPECT_TRUE(s.orthogonal);
-  EXPECT_EQ(s.rank, Er20().columns() - 1);
+  EXPECT_EQ(s.rank, Er20Model().columns() - 1);
   const MatrixXd fit = A * A.completeOrthogonalDecomposition().solve(y);
   EXPECT_LT((A * s.x - fit).norm(), 1e-9 * fit.norm());
   EXPECT_TRUE(s.x.allFinite());

@@ -22,6 +22,11 @@ inline const codegen::Catalogue& Records() {
   static const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");
   return records;
 }
+inline codegen::Robot Er20() { return codegen::ReadRobot("codegen/robots/er20_like.toml"); }
+inline const codegen::Model& Er20Model() {
+  static const codegen::Model model(Er20(), Records());
+  return model;
+}
 
 class SyntheticArm {
  public:

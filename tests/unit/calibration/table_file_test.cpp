@@ -12,14 +12,10 @@ namespace {
 
 using io::test::ErrorOf;
 using io::test::TemporaryFolder;
-
-const codegen::Model& Er20() {
-  static const codegen::Model model(codegen::ReadRobot("codegen/robots/er20_like.toml"), tests::Records());
-  return model;
-}
+using tests::Er20Model;
 
 TableFile Changed() {
-  TableFile t = DefaultTable(Er20());
+  TableFile t = DefaultTable(Er20Model());
   t.note = "for a test";
   t.bumpless = true, t.blend_ms = 250;
   t.forgetting[1] = 0.9995;
@@ -70,7 +66,7 @@ TEST(TableFile, WrittenAndRead_IsTheSameTable) {
 TEST(TableFile, EncodedAndDecoded_IsTheSameTableInFloat) {
   const TableFile t = Changed();
   const auto words = EncodeTable(t);
-  const TableFile back = DecodeTable(words, DefaultTable(Er20()));
+  const TableFile back = DecodeTable(words, DefaultTable(Er20Model()));
   ExpectSame(t, back, 1e-7);  // half a unit of float's last place is 6e-8
   EXPECT_EQ(EncodeTable(back), words);
 }
@@ -79,7 +75,7 @@ TEST(TableFile, TheDefaultWords_AreThoseOfTheGeneratedModel) {
   using Table = estimator::Table<generated::Er20Like>;
   std::vector<std::uint16_t> expected(Table::kWords);
   model::Encode(estimator::DefaultTable<generated::Er20Like>(), expected.data());
-  EXPECT_EQ(EncodeTable(DefaultTable(Er20())), expected);
+  EXPECT_EQ(EncodeTable(DefaultTable(Er20Model())), expected);
 }
 
 TEST(TableFile, TheHostsWords_AreWhatTheFirmwareDecodes) {
@@ -96,17 +92,17 @@ TEST(TableFile, TheHostsWords_AreWhatTheFirmwareDecodes) {
 }
 
 TEST(TableFile, AnotherSchemaOrSize_IsRefused) {
-  auto words = EncodeTable(DefaultTable(Er20()));
+  auto words = EncodeTable(DefaultTable(Er20Model()));
   words.pop_back();
-  EXPECT_NE(ErrorOf([&] { (void)DecodeTable(words, DefaultTable(Er20())); }), "");
-  words = EncodeTable(DefaultTable(Er20()));
+  EXPECT_NE(ErrorOf([&] { (void)DecodeTable(words, DefaultTable(Er20Model())); }), "");
+  words = EncodeTable(DefaultTable(Er20Model()));
   words[1] ^= 1;
-  EXPECT_NE(ErrorOf([&] { (void)DecodeTable(words, DefaultTable(Er20())); }), "");
+  EXPECT_NE(ErrorOf([&] { (void)DecodeTable(words, DefaultTable(Er20Model())); }), "");
 }
 
 TEST(TableFile, CarriedOver_ByNameIntoAnotherLayout) {
   const TableFile from = Changed();
-  TableFile to = DefaultTable(Er20());
+  TableFile to = DefaultTable(Er20Model());
   std::rotate(to.row.begin() + 66, to.row.begin() + 70, to.row.end());  // another order
   TableRow added = to.row.back();
   added.name = "stribeck.dFs2", added.mean = 4.5;
@@ -122,7 +118,7 @@ TEST(TableFile, CarriedOver_ByNameIntoAnotherLayout) {
 
 TEST(TableFile, BadFiles_AreRefusedNamingFileAndKey) {
   const TemporaryFolder folder;
-  WriteTable(folder / "good.toml", DefaultTable(Er20()));
+  WriteTable(folder / "good.toml", DefaultTable(Er20Model()));
   std::ifstream in(folder / "good.toml");
   const std::string good((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
   const auto with = [&](const std::string& from, const std::string& to) {

@@ -13,9 +13,8 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using tests::Er20;
 using tests::SyntheticArm;
-
-codegen::Robot Er20() { return codegen::ReadRobot("codegen/robots/er20_like.toml"); }
 
 // Largest error in standard deviations, and the share of parameters within two.
 struct Honesty {

@@ -7,6 +7,7 @@
 #include "host_sim/calibration/closed_loop.hpp"
 #include "host_sim/calibration/method.hpp"
 #include "host_sim/calibration/methods/better_methods.hpp"
+#include "host_sim/calibration/methods/linearised.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::tests {
@@ -29,6 +30,14 @@ inline calibration::Problem ProblemOf(const SyntheticArm& arm, std::vector<const
   calibration::Problem p = calibration::MakeProblem(arm.model(), std::move(train));
   for (int j = 0; j < arm.model().joints(); ++j) p.sigma_Nm[j] = arm.noise_Nm(j);
   return p;
+}
+
+inline calibration::Solution LeastSquares(const calibration::Problem& p) {
+  const calibration::Linearised at = calibration::Linearise(p, p.start);
+  calibration::Solution s;
+  s.z = calibration::SolveRegularised(p, at.A.transpose() * at.A, at.A.transpose() * (at.residual + at.A * p.start),
+                                      &s.covariance);
+  return s;
 }
 
 inline Eigen::VectorXd Truth(const SyntheticArm& arm) { return arm.truth().head(arm.model().columns()); }

@@ -13,13 +13,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tests::SyntheticArm;
 
-Solution LeastSquares(const Problem& p) {
-  const Linearised at = Linearise(p, p.start);
-  Solution s;
-  s.z = SolveRegularised(p, at.A.transpose() * at.A, at.A.transpose() * (at.residual + at.A * p.start), &s.covariance);
-  return s;
-}
-
 int Column(const codegen::Model& model, const std::string& name) {
   for (int c = 0; c < model.columns(); ++c)
     if (model.column_name(c) == name) return c;
@@ -84,11 +77,11 @@ TEST(Robust, TwoPercentOfOutliers_DoNotMoveTheEstimate) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> u(0, 1);
   const double clean = tests::TorqueError(arm, d, Robust(p).z);
-  EXPECT_LT(clean, 1.15 * tests::TorqueError(arm, d, LeastSquares(p).z));  // 95 % efficient, and one draw's luck
+  EXPECT_LT(clean, 1.15 * tests::TorqueError(arm, d, tests::LeastSquares(p).z));  // 95 % efficient, and one draw's luck
   for (int k = 0; k < d.samples(); ++k)
     for (int j = 0; j < 6; ++j)
       if (u(random) < 0.02) d.tau(k, j) += 30 * arm.noise_Nm(j);  // one-sided: an average would not cancel them
-  const Solution robust = Robust(p), plain = LeastSquares(p);
+  const Solution robust = Robust(p), plain = tests::LeastSquares(p);
   printf("robust: %d rounds, %.3f s\n", robust.iterations, robust.seconds);
   EXPECT_TRUE(robust.converged) << robust.remark;
   EXPECT_LT(tests::WorstDeviation(arm, robust), 4.5);  // 48 Gaussian errors, deviations 5 % too small

@@ -12,11 +12,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tests::SyntheticArm;
 
-VectorXd LeastSquares(const Problem& p) {
-  const Linearised at = Linearise(p, p.start);
-  return SolveRegularised(p, at.A.transpose() * at.A, at.A.transpose() * (at.residual + at.A * p.start), nullptr);
-}
-
 TEST(InstrumentalVariable, NoiseInPosition_BiasesLeastSquaresAndNotTheInstrument) {
   SyntheticArm arm(tests::TwoLinkWithControl(), 1);
   const Dataset reference = arm.Run(10, 2);
@@ -30,7 +25,7 @@ TEST(InstrumentalVariable, NoiseInPosition_BiasesLeastSquaresAndNotTheInstrument
     const Solution iv = InstrumentalVariable(p);
     EXPECT_TRUE(iv.converged) << iv.remark;
     EXPECT_LE(iv.iterations, 5);
-    biased += LeastSquares(p) / kDraws, clean += iv.z / kDraws;
+    biased += tests::LeastSquares(p).z / kDraws, clean += iv.z / kDraws;
   }
   // A mean over draws keeps the bias alone. 3e-4 rad at 125 Hz is 7 rad/s^2 of noise in qdd.
   const double least_squares = tests::TorqueError(arm, reference, biased);
@@ -50,7 +45,7 @@ TEST(InstrumentalVariable, WithThePrior_SolvesForStandardParametersToo) {
   const Solution iv = InstrumentalVariable(p);
   EXPECT_TRUE(iv.converged) << iv.remark;
   EXPECT_LT(tests::TorqueError(arm, reference, iv.z), 0.25);
-  EXPECT_LT(tests::TorqueError(arm, reference, iv.z), tests::TorqueError(arm, reference, LeastSquares(p)));
+  EXPECT_LT(tests::TorqueError(arm, reference, iv.z), tests::TorqueError(arm, reference, tests::LeastSquares(p).z));
 }
 
 TEST(Didim, FindsTheParametersWithoutMeasuredPositions) {
@@ -102,7 +97,8 @@ TEST(FourierFit, AsAMethod_UndoesTheBiasOfNoisyPositions) {
   Problem p = tests::ProblemOf(arm, {&d});
   p.covariance.resize(0, 0);
   const Solution s = Solve(FindMethod("fourier_fit"), p);
-  EXPECT_LT(tests::TorqueError(arm, reference, s.z), 0.2 * tests::TorqueError(arm, reference, LeastSquares(p)));
+  EXPECT_LT(tests::TorqueError(arm, reference, s.z),
+            0.2 * tests::TorqueError(arm, reference, tests::LeastSquares(p).z));
   EXPECT_NE(s.remark.find("period 10 s"), std::string::npos) << s.remark;
 }
 

@@ -17,8 +17,6 @@ double At(const std::string& record, int column, const Values& inputs, const Val
   return EffectRun(record, joints).Column(column, row, log, eta)[0];
 }
 
-double Sign(double x) { return (x > 0) - (x < 0); }
-
 // Cox and de Boor's recursion: spline i of degree d on unit knots.
 double CoxDeBoor(double u, int i, int d) {
   if (d == 0) return u >= i && u < i + 1 ? 1 : 0;

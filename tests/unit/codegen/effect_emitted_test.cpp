@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 using M = generated::EveryEffect;
 constexpr int n = M::kJoints, kSamples = 150;
 
-const codegen::Model& Graph() {
+const codegen::Model& EveryEffectModel() {
   static const codegen::Model m = EveryEffect();
   return m;
 }
@@ -42,7 +42,7 @@ VectorXd Coordinates(double seed) {  // some value for every filter coordinate
 
 VectorXd Eta() {
   VectorXd eta(M::kNonlinear);
-  for (int k = 0; k < M::kNonlinear; ++k) eta[k] = Graph().table()[M::kParameters - M::kNonlinear + k].mean;
+  for (int k = 0; k < M::kNonlinear; ++k) eta[k] = EveryEffectModel().table()[M::kParameters - M::kNonlinear + k].mean;
   return eta;
 }
 
@@ -103,24 +103,24 @@ void Compare(const std::vector<std::vector<T>>& emitted, const std::vector<Matri
 
 template <class T>
 void CompareWithGraph(double share) {
-  ASSERT_EQ(M::kColumns, Graph().columns());
-  ASSERT_EQ(M::kNonlinear, Graph().nonlinear());
+  ASSERT_EQ(M::kColumns, EveryEffectModel().columns());
+  ASSERT_EQ(M::kNonlinear, EveryEffectModel().nonlinear());
   const codegen::Signals s = Motion();
   const VectorXd committed = Coordinates(0.2), p = Coordinates(0.9), eta = Eta();
   const Emitted<T> emitted(s, committed, p, As<T>(eta));
   std::vector<MatrixXd> rows, slopes;
   const auto base = As<double>(committed), at = As<double>(p), e = As<double>(eta);
-  Graph().Regressor(s, base, e, rows);
-  Graph().Jacobian(s, base, at, e, slopes);
+  EveryEffectModel().Regressor(s, base, e, rows);
+  EveryEffectModel().Jacobian(s, base, at, e, slopes);
   auto columns = emitted.column;  // the rigid ones are compared elsewhere
   for (int i = 0; i < n; ++i)
     for (int c = 0; c < M::kColumns; ++c) {
-      if (!Graph().is_rigid(c) && (c >= M::kFront || Graph().column_joint(c) == i)) continue;
+      if (!EveryEffectModel().is_rigid(c) && (c >= M::kFront || EveryEffectModel().column_joint(c) == i)) continue;
       rows[i].col(c).setZero();
       for (auto& at_sample : columns) at_sample[i * M::kColumns + c] = T(0);
     }
-  Compare<T>(columns, rows, share, [](int k) { return Graph().column_name(k); });
-  Compare<T>(emitted.jacobian, slopes, 4 * share, [](int k) { return Graph().unknowns()[k].name; });
+  Compare<T>(columns, rows, share, [](int k) { return EveryEffectModel().column_name(k); });
+  Compare<T>(emitted.jacobian, slopes, 4 * share, [](int k) { return EveryEffectModel().unknowns()[k].name; });
 }
 
 // The same operations in another order: some hundred roundings, in states up to 150 samples deep.
@@ -151,7 +151,7 @@ TEST(EmittedEffects, Jacobian_EqualsComplexStepsOfTheEmittedCode) {
       for (int i = 0; i < n; ++i)
         ASSERT_NEAR(emitted.jacobian[k][i * M::kNonlinear + e], slope(k, i),
                     1e-10 * slope.cwiseAbs().maxCoeff() + 1e-30)
-            << Graph().unknowns()[e].name << " in row " << i << ", sample " << k;
+            << EveryEffectModel().unknowns()[e].name << " in row " << i << ", sample " << k;
   }
   EXPECT_EQ(seen, M::kNonlinear);
 }

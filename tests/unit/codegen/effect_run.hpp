@@ -14,6 +14,8 @@
 
 namespace armcal::tests {
 
+inline double Sign(double x) { return (x > 0) - (x < 0); }
+
 inline const std::map<std::string, codegen::EffectRecord>& Records() {
   static const auto c = codegen::ReadCatalogue("codegen/effects");
   return c;

@@ -13,8 +13,6 @@ namespace {
 
 constexpr double kDt = 0.008;
 
-double Sign(double x) { return (x > 0) - (x < 0); }
-
 // Classical Runge-Kutta, n steps: error ~ (rate h)^4, below 1e-10 for the rates and steps used here.
 double Integrate(const std::function<double(double)>& slope, double y, double length, int n) {
   const double h = length / n;

@@ -11,17 +11,13 @@
 #include "codegen/generated/kuka_kr300/model.hpp"
 #include "codegen/generated/two_link/model.hpp"
 #include "codegen/src/generator/emit.hpp"
+#include "tests/unit/codegen/checked_in.hpp"
 
 namespace armcal::tests {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-codegen::Model Load(const std::string& robot) {
-  return codegen::Model(codegen::ReadRobot("codegen/robots/" + robot + ".toml"),
-                        codegen::ReadCatalogue("codegen/effects"));
-}
 
 std::string FileText(const std::string& path) {
   std::ifstream in(path);

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 
+#include "tests/unit/codegen/checked_in.hpp"
 #include "tests/unit/codegen/rigid_oracle.hpp"
 
 namespace armcal::tests {
@@ -13,8 +14,7 @@ namespace {
 using codegen::Node;
 using codegen::Op;
 
-constexpr double kTolerance = 1e-12;  // the one of the real tests
-constexpr int kStates = 20;           // they look at thousands; what twenty see, thousands see, too
+constexpr int kStates = 20;  // the real tests look at thousands; what twenty see, thousands see, too
 
 class PlantedFault : public testing::Test {
  protected:
@@ -30,8 +30,6 @@ class PlantedFault : public testing::Test {
   }
   int planted_ = 0, caught_ = 0, least_ = 1;
 };
-
-codegen::Robot Read(const std::string& name) { return codegen::ReadRobot("codegen/robots/" + name + ".toml"); }
 
 // The graph's base regressor with one node spoilt.
 enum class Spoil { kFlipSign, kDropSecond, kSwapSinCos, kOnePercent };

@@ -4,7 +4,7 @@
 #include <memory>
 #include <random>
 
-#include "codegen/src/generator/model.hpp"
+#include "tests/unit/codegen/checked_in.hpp"
 #include "tests/unit/codegen/kdl_arm.hpp"
 
 namespace armcal::tests {
@@ -14,10 +14,6 @@ using codegen::Model;
 using codegen::Signals;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-Model Load(const std::string& robot) {
-  return Model(codegen::ReadRobot("codegen/robots/" + robot + ".toml"), codegen::ReadCatalogue("codegen/effects"));
-}
 
 Signals RandomStates(int samples, int n, unsigned seed, double speed = 2) {
   std::mt19937_64 random(seed);

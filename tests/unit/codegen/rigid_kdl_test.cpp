@@ -1,15 +1,11 @@
 // tests - the rigid regressor in base coordinates against KDL: every robot here, any chain, any gravity.
 #include <gtest/gtest.h>
 
+#include "tests/unit/codegen/checked_in.hpp"
 #include "tests/unit/codegen/rigid_oracle.hpp"
 
 namespace armcal::tests {
 namespace {
-
-// Round-off: some thousand operations in double on either side, the map printed with 14 digits.
-constexpr double kTolerance = 1e-12;
-
-codegen::Robot Read(const std::string& name) { return codegen::ReadRobot("codegen/robots/" + name + ".toml"); }
 
 class CheckedInRobot : public testing::TestWithParam<const char*> {};
 

@@ -83,6 +83,9 @@ inline std::vector<double> InputValues(const codegen::Graph& graph, const State&
   return x;
 }
 
+// Of ErrorAgainstKdl by round-off: some thousand operations in double on either side, the map printed with 14 digits.
+inline constexpr double kTolerance = 1e-12;
+
 // Something that claims to know the torque of an arm with these bodies.
 using TorqueOf = std::function<VectorXd(const State&, const std::vector<Body>&)>;
 

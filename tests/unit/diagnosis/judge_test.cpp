@@ -13,17 +13,17 @@ namespace {
 using calibration::Dataset;
 using Eigen::VectorXd;
 
-constexpr int kJoint = 1;  // whose torque changes; 0-based
+constexpr int kChangedJoint = 1;  // whose torque changes; 0-based
 
 void Contact(Dataset& d, double from, double length_s, double size_Nm) {
   for (int k = 0; k < d.samples(); ++k)
     if (const double u = (d.s.t[k] - from) / length_s; u > 0 && u < 1)
-      d.tau(k, kJoint) += size_Nm * std::sin(std::numbers::pi * u);
+      d.tau(k, kChangedJoint) += size_Nm * std::sin(std::numbers::pi * u);
 }
 
 void Drift(Dataset& d, double begin_Nm, double end_Nm, double constant_s) {
   for (int k = 0; k < d.samples(); ++k)
-    d.tau(k, kJoint) += end_Nm + (begin_Nm - end_Nm) * std::exp(-d.s.t[k] / constant_s);
+    d.tau(k, kChangedJoint) += end_Nm + (begin_Nm - end_Nm) * std::exp(-d.s.t[k] / constant_s);
 }
 
 struct Judged {
@@ -36,7 +36,7 @@ struct Judged {
     held_out = diagnosis->Judge(test);
   }
   const std::vector<Term>& terms() const { return diagnosis->finding().terms; }
-  double Error(const Eigen::MatrixXd& residual) const { return calibration::Rms(test, residual, true)[kJoint]; }
+  double Error(const Eigen::MatrixXd& residual) const { return calibration::Rms(test, residual, true)[kChangedJoint]; }
   tests::SyntheticArm arm;
   Dataset train, test;
   std::unique_ptr<Diagnosis> diagnosis;
@@ -54,7 +54,7 @@ TEST(HeldOutLog, AContactOfTheTrainingLog_HasNoPartInIt) {
   const Judged clean({}, {});
   EXPECT_TRUE(clean.terms().empty());
   EXPECT_NEAR(touched.Error(touched.held_out.after), clean.Error(clean.held_out.after),
-              0.002 * clean.arm.noise_Nm(kJoint));
+              0.002 * clean.arm.noise_Nm(kChangedJoint));
 }
 
 // Neither for nor against: a contact in the held-out log stands in both errors alike, wherever the training log had
@@ -64,7 +64,7 @@ TEST(HeldOutLog, AContactOfItsOwn_RefutesNothing_AndIsNotExplained) {
   const Judged j(at(6), at(13));
   ASSERT_EQ(j.terms().size(), 1u);
   EXPECT_TRUE(j.terms()[0].confirmed);
-  EXPECT_GT(j.Error(j.held_out.after), 1.2 * j.arm.noise_Nm(kJoint));
+  EXPECT_GT(j.Error(j.held_out.after), 1.2 * j.arm.noise_Nm(kChangedJoint));
   EXPECT_NEAR(j.Error(j.held_out.after), j.Error(j.held_out.before), 0.01 * j.Error(j.held_out.before));
 }
 
@@ -76,7 +76,7 @@ TEST(HeldOutLog, ADrift_IsFollowedFromWhereverItBegins) {
   EXPECT_TRUE(j.terms()[0].confirmed);
   EXPECT_FALSE(j.terms()[0].training_only);
   EXPECT_FALSE(j.held_out.tracking.empty());
-  const double noise = j.arm.noise_Nm(kJoint);
+  const double noise = j.arm.noise_Nm(kChangedJoint);
   EXPECT_GT(j.Error(j.held_out.before), 2 * noise);
   EXPECT_LT(j.Error(j.held_out.after), 1.1 * noise);
 }
@@ -85,11 +85,11 @@ TEST(HeldOutLog, ADrift_IsFollowedFromWhereverItBegins) {
 // predicted better without it.
 TEST(HeldOutLog, RefutesATermThatTheOthersAreBetterWithout) {
   const auto ripple = [](Dataset& d) {
-    for (int k = 0; k < d.samples(); ++k) d.tau(k, kJoint) += 0.3 * std::cos(12 * d.s.q(k, kJoint));
+    for (int k = 0; k < d.samples(); ++k) d.tau(k, kChangedJoint) += 0.3 * std::cos(12 * d.s.q(k, kChangedJoint));
   };
   const auto ripple_and_offset = [&](Dataset& d) {
     ripple(d);
-    d.tau.col(kJoint).array() += 0.06;
+    d.tau.col(kChangedJoint).array() += 0.06;
   };
   const Judged j(ripple_and_offset, ripple);
   ASSERT_GE(j.terms().size(), 2u);
@@ -99,14 +99,14 @@ TEST(HeldOutLog, RefutesATermThatTheOthersAreBetterWithout) {
     if (!t.refuted) continue;
     // The offset has an RMS of 0.06 N m and is no part of the noise: with it the squares of both add up (3 %: this
     // run's noise is a draw); without it the noise is left, and what the base parameters took up of the offset.
-    const double noise = j.arm.noise_Nm(kJoint);
-    EXPECT_EQ(t.refuted->joint, kJoint);
+    const double noise = j.arm.noise_Nm(kChangedJoint);
+    EXPECT_EQ(t.refuted->joint, kChangedJoint);
     EXPECT_TRUE(t.refuted->beside_others);
-    EXPECT_NEAR(t.refuted->with[kJoint], std::hypot(noise, 0.06), 0.03 * noise);
-    EXPECT_LT(t.refuted->without[kJoint], 1.1 * noise);
-    EXPECT_DOUBLE_EQ(t.refuted->factor, t.refuted->with[kJoint] / t.refuted->without[kJoint]);
+    EXPECT_NEAR(t.refuted->with[kChangedJoint], std::hypot(noise, 0.06), 0.03 * noise);
+    EXPECT_LT(t.refuted->without[kChangedJoint], 1.1 * noise);
+    EXPECT_DOUBLE_EQ(t.refuted->factor, t.refuted->with[kChangedJoint] / t.refuted->without[kChangedJoint]);
   }
-  EXPECT_LT(j.Error(j.held_out.after), 1.1 * j.arm.noise_Nm(kJoint));
+  EXPECT_LT(j.Error(j.held_out.after), 1.1 * j.arm.noise_Nm(kChangedJoint));
 }
 
 // Friction rises while the joint warms up, in the training log. The other one warms up alike, and there it falls: of
@@ -117,8 +117,8 @@ TEST(HeldOutLog, LeavesOfKindsThatFitAlike_TheOneOfTheRun) {
     d.s.temp.resize(d.samples(), d.joints());
     for (int k = 0; k < d.samples(); ++k) {
       d.s.temp.row(k).setConstant(25 + 15 * rising(d, k));
-      const double change_Nm = 0.5 * (falls ? 1 - rising(d, k) : rising(d, k)), qd = d.s.qd(k, kJoint);
-      d.tau(k, kJoint) += qd > 0 ? change_Nm : qd < 0 ? -change_Nm : 0;
+      const double change_Nm = 0.5 * (falls ? 1 - rising(d, k) : rising(d, k)), qd = d.s.qd(k, kChangedJoint);
+      d.tau(k, kChangedJoint) += qd > 0 ? change_Nm : qd < 0 ? -change_Nm : 0;
     }
   };
   const Judged j([&](Dataset& d) { warm(d, false); }, [&](Dataset& d) { warm(d, true); });
@@ -128,8 +128,8 @@ TEST(HeldOutLog, LeavesOfKindsThatFitAlike_TheOneOfTheRun) {
   EXPECT_EQ(j.terms()[1].record->name, "time_varying_coulomb");
   EXPECT_TRUE(j.terms()[1].confirmed);
   EXPECT_FALSE(j.held_out.tracking.empty());
-  EXPECT_LT(j.Error(j.held_out.after), 1.1 * j.arm.noise_Nm(kJoint));
-  EXPECT_GT(j.Error(j.held_out.before), 1.3 * j.arm.noise_Nm(kJoint));
+  EXPECT_LT(j.Error(j.held_out.after), 1.1 * j.arm.noise_Nm(kChangedJoint));
+  EXPECT_GT(j.Error(j.held_out.before), 1.3 * j.arm.noise_Nm(kChangedJoint));
 }
 
 // What was put into the log is what is taken off: effects of the arm and events of this log alike.
@@ -137,7 +137,7 @@ TEST(TrainingLog, WithoutItsTerms_IsThatOfTheDeclaredArm) {
   const Judged clean({}, {});
   for (const Judged::Change& change :
        {Judged::Change([](Dataset& d) { Contact(d, 6, 0.4, 1.5); }), Judged::Change([](Dataset& d) {
-          for (int k = 0; k < d.samples(); ++k) d.tau(k, kJoint) += 0.3 * std::cos(12 * d.s.q(k, kJoint));
+          for (int k = 0; k < d.samples(); ++k) d.tau(k, kChangedJoint) += 0.3 * std::cos(12 * d.s.q(k, kChangedJoint));
         })}) {
     const Judged changed(change, change);
     ASSERT_FALSE(changed.terms().empty());
@@ -149,14 +149,14 @@ TEST(TrainingLog, WithoutItsTerms_IsThatOfTheDeclaredArm) {
 
 // An offset of the training log alone: beside no other term it is held against the declared model.
 TEST(HeldOutLog, SaysThatTheDeclaredModelIsBetter) {
-  const Judged j([](Dataset& d) { d.tau.col(kJoint).array() += 0.1; }, {});
+  const Judged j([](Dataset& d) { d.tau.col(kChangedJoint).array() += 0.1; }, {});
   ASSERT_EQ(j.terms().size(), 1u);
   ASSERT_TRUE(j.terms()[0].refuted);
   const Refutation& why = *j.terms()[0].refuted;
-  EXPECT_EQ(why.joint, kJoint);
+  EXPECT_EQ(why.joint, kChangedJoint);
   EXPECT_FALSE(why.beside_others);
-  EXPECT_EQ(why.without[kJoint], j.Error(j.held_out.before));
-  EXPECT_GT(why.with[kJoint], 1.005 * why.without[kJoint]);
+  EXPECT_EQ(why.without[kChangedJoint], j.Error(j.held_out.before));
+  EXPECT_GT(why.with[kChangedJoint], 1.005 * why.without[kChangedJoint]);
 }
 
 // Where the drift's shape fits the other run worse than nothing, it is refuted, and nothing is said to be followed.
@@ -164,7 +164,7 @@ TEST(HeldOutLog, SaysThatItFollows_OnlyWhatItConfirms) {
   for (const double size_Nm : {0.0, 0.3, 1.0}) {
     const Judged j([=](Dataset& d) { Drift(d, 0, 1.2, 6); },
                    [=](Dataset& d) {
-                     for (int k = 0; k < d.samples(); ++k) d.tau(k, kJoint) += k % 2 ? size_Nm : -size_Nm;
+                     for (int k = 0; k < d.samples(); ++k) d.tau(k, kChangedJoint) += k % 2 ? size_Nm : -size_Nm;
                    });
     bool follows = false;
     for (const Term& t : j.terms()) follows = follows || (t.confirmed && t.record->kind_class == "run_state");

@@ -11,7 +11,7 @@ using namespace test;  // NOLINT: the bench of these tests
 using filter::ForgettingFilter;
 using filter::KalmanFilter;
 
-constexpr int kSamples = 40 * 125;
+constexpr int kFortySeconds = 40 * 125;
 
 std::vector<Sample> Record(int count) {
   Motion run;
@@ -34,7 +34,7 @@ TYPED_TEST(Batch, FortySeconds_AreTheBatchSolutionWithinATenthOfSigma) {
   for (const int k : {24, 27, 28, 29})
     host->table.parameter[k].state = model::ParameterState::kEstimated;  // all effects
   ASSERT_EQ(host->Adopt(), core::Status::kOk);
-  const std::vector<Sample> samples = Record(kSamples);
+  const std::vector<Sample> samples = Record(kFortySeconds);
   for (const Sample& s : samples) ASSERT_EQ(host->Feed(s), core::Status::kOk);
   const Oracle<TwoLink> oracle(host->table, host->b0(), samples);
   const Estimates<TwoLink>& e = host->Read();
@@ -53,7 +53,7 @@ TEST(Accuracy, Forgetting_IsTheGatedQrRecursionWithinATenthOfSigma) {
   host->table.forgetting[1] = 0.998f;
   ASSERT_EQ(host->Adopt(), core::Status::kOk);
   std::vector<double> lambda(host->image.prior.lambda, host->image.prior.lambda + kColumns);
-  const std::vector<Sample> samples = Record(kSamples);
+  const std::vector<Sample> samples = Record(kFortySeconds);
   for (const Sample& s : samples) ASSERT_EQ(host->Feed(s), core::Status::kOk);
   const Oracle<TwoLink> oracle(host->table, host->b0(), samples, lambda);
   EXPECT_LT(oracle.Distance(host->Read().value), 0.1);
@@ -96,8 +96,8 @@ TEST(Accuracy, KalmanWithNoise_FollowsAFrictionThatChanges) {
   for (const int k : {22, 23, 25, 26}) host->table.parameter[k].process_noise = 1e-4f;
   ASSERT_EQ(host->Adopt(), core::Status::kOk);
   Motion run;
-  for (int k = 0; k < kSamples; ++k) {
-    if (k == kSamples / 2) run.truth(1) = 6;  // viscous friction of joint 1
+  for (int k = 0; k < kFortySeconds; ++k) {
+    if (k == kFortySeconds / 2) run.truth(1) = 6;  // viscous friction of joint 1
     ASSERT_EQ(host->Feed(run.Next()), core::Status::kOk);
   }
   const Estimates<TwoLink>& e = host->Read();

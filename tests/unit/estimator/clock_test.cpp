@@ -20,7 +20,7 @@ struct Drifting : TwoLink {
   }
 };
 
-constexpr int kSamples = 2000, kBefore = 1000;  // of the clock's passage
+constexpr int kAround = 2000, kBefore = 1000;  // samples around the clock's passage
 constexpr std::uint32_t kPassages[] = {1u << 24, 1u << 31, 0u /* 2^32 */};
 
 std::uint32_t StartBefore(std::uint32_t passage) {
@@ -30,7 +30,7 @@ std::uint32_t StartBefore(std::uint32_t passage) {
 template <class Filter>
 struct Clock : testing::Test {
   static constexpr int kOffset = TwoLink::kBodyParameters + 2;
-  // Estimates after kSamples, the clock at adoption being `start`.
+  // Estimates after kAround, the clock at adoption being `start`.
   static Estimates<Drifting> Run(std::uint32_t start, monitor::ResidualStatistics<2>* statistics = nullptr) {
     auto host = std::make_unique<Host<Drifting, Filter>>();
     host->table.parameter[kOffset].state = model::ParameterState::kEstimated;
@@ -38,7 +38,7 @@ struct Clock : testing::Test {
     EXPECT_EQ(BuildImage<Drifting>(host->table, 1, host->work, host->image), Status::kOk);
     host->estimator.Adopt(host->image, start);
     Motion run;
-    for (int k = 0; k < kSamples; ++k) {
+    for (int k = 0; k < kAround; ++k) {
       Sample s = run.Next();
       s.tick += start;
       EXPECT_EQ(host->Feed(s), Status::kOk);
@@ -46,8 +46,8 @@ struct Clock : testing::Test {
     return host->Read();
   }
 };
-using Filters = testing::Types<filter::ForgettingFilter<Drifting>, filter::KalmanFilter<Drifting>>;
-TYPED_TEST_SUITE(Clock, Filters);
+using DriftingFilters = testing::Types<filter::ForgettingFilter<Drifting>, filter::KalmanFilter<Drifting>>;
+TYPED_TEST_SUITE(Clock, DriftingFilters);
 
 TYPED_TEST(Clock, WhateverItPasses_TheEstimatesAreTheSameBits) {
   const Estimates<Drifting> zero = this->Run(0);

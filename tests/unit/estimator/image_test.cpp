@@ -12,9 +12,9 @@
 
 namespace armcal::estimator {
 namespace {
+using armcal::test::TwoLink;
 using core::Status;
 using model::ParameterState;
-using test::TwoLink;
 
 constexpr int kFrontEntry = TwoLink::kBodyParameters;
 

@@ -13,7 +13,7 @@ namespace armcal::estimator {
 namespace {
 using namespace test;  // NOLINT: the bench of these tests
 using Model = generated::Er20Like;
-using Sample = model::Sample<6>;
+using SixAxisSample = model::Sample<6>;
 
 // A truth drawn from the table's own prior.
 Vector DrawTruth(const Table<Model>& table, const Vector& b0) {
@@ -25,13 +25,13 @@ Vector DrawTruth(const Table<Model>& table, const Vector& b0) {
   return b0 + eigen.eigenvectors() * (eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * z);
 }
 
-std::vector<Sample> Record(const Vector& truth, int count) {
+std::vector<SixAxisSample> Record(const Vector& truth, int count) {
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
-  std::vector<Sample> samples(count);
+  std::vector<SixAxisSample> samples(count);
   const double tone[6] = {0.9, 1.1, 1.3, 1.9, 2.3, 2.9}, size[6] = {1.0, 0.5, 0.7, 0.9, 0.9, 1.2};
   for (int k = 0; k < count; ++k) {
-    Sample& s = samples[k];
+    SixAxisSample& s = samples[k];
     s.tick = k * Model::kSampleTicks;
     const double t = s.tick * 1e-3;
     for (int i = 0; i < 6; ++i) {
@@ -56,8 +56,8 @@ std::vector<Sample> Record(const Vector& truth, int count) {
 
 template <class Filter>
 class SixAxis : public testing::Test {};
-using Filters = testing::Types<filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>>;
-TYPED_TEST_SUITE(SixAxis, Filters);
+using SixAxisFilters = testing::Types<filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>>;
+TYPED_TEST_SUITE(SixAxis, SixAxisFilters);
 
 TYPED_TEST(SixAxis, FortySeconds_AreTheBatchSolutionWithinATenthOfSigma) {
   auto host = std::make_unique<Host<Model, TypeParam>>();
@@ -65,8 +65,8 @@ TYPED_TEST(SixAxis, FortySeconds_AreTheBatchSolutionWithinATenthOfSigma) {
   for (model::ParameterEntry& p : host->table.parameter) p.process_noise = 0;
   ASSERT_EQ(host->Adopt(), core::Status::kOk);
   const Vector truth = DrawTruth(host->table, host->b0());
-  const std::vector<Sample> samples = Record(truth, 40 * 125);
-  for (const Sample& s : samples) ASSERT_EQ(host->Feed(s), core::Status::kOk);
+  const std::vector<SixAxisSample> samples = Record(truth, 40 * 125);
+  for (const SixAxisSample& s : samples) ASSERT_EQ(host->Feed(s), core::Status::kOk);
   const Oracle<Model> oracle(host->table, host->b0(), samples);
   const Estimates<Model>& e = host->Read();
   EXPECT_LT(oracle.Distance(e.value), 0.1);
@@ -86,7 +86,7 @@ TEST(SixAxis, PhysicalReadOut_OfBothFilters_IsTheSameArmAndNearerToTheTruthThanT
   ASSERT_EQ(kalman->Adopt(), core::Status::kOk);
   ASSERT_EQ(forgetting->Adopt(), core::Status::kOk);
   const Vector truth = DrawTruth(kalman->table, kalman->b0());
-  for (const Sample& s : Record(truth, 10 * 125)) {
+  for (const SixAxisSample& s : Record(truth, 10 * 125)) {
     ASSERT_EQ(kalman->Feed(s), core::Status::kOk);
     ASSERT_EQ(forgetting->Feed(s), core::Status::kOk);
   }

@@ -43,9 +43,10 @@ class Supervised : public testing::Test {
   Motion run_;
 };
 
-using Filters = testing::Types<filter::KalmanFilter<TwoLink>, filter::KalmanFilter<TwoLink, filter::Form::kBlock>,
-                               filter::ForgettingFilter<TwoLink>, filter::ModelBank<TwoLink>>;
-TYPED_TEST_SUITE(Supervised, Filters);
+using SupervisedFilters =
+    testing::Types<filter::KalmanFilter<TwoLink>, filter::KalmanFilter<TwoLink, filter::Form::kBlock>,
+                   filter::ForgettingFilter<TwoLink>, filter::ModelBank<TwoLink>>;
+TYPED_TEST_SUITE(Supervised, SupervisedFilters);
 
 TYPED_TEST(Supervised, Hold_KeepsEveryBitOfTheEstimate_AndCountsTheRows) {
   this->Run(500);

@@ -13,18 +13,18 @@ namespace {
 using namespace test;  // NOLINT: the bench of these tests
 using Model = generated::Er20Like;
 using Bank = Host<Model, filter::ModelBank<Model>>;
-using Sample = model::Sample<6>;
-constexpr int n = Model::kJoints, kSamples = 30 * 125, kSettled = 5 * 125;
+using SixAxisSample = model::Sample<6>;
+constexpr int kJoints = Model::kJoints, kRun = 30 * 125, kSettled = 5 * 125;
 int Fv(int joint) { return Model::kFrontBegin[joint] + 1; }
 
 // 30 s of periodic motion, friction 20 % and bodies most of a standard deviation off the table.
 struct Drift {
   std::unique_ptr<Bank> host = std::make_unique<Bank>();
-  std::vector<Sample> samples;
+  std::vector<SixAxisSample> samples;
   std::vector<Matrix> regressor;
   std::vector<Vector> viscous;  // true, by sample
 
-  Drift(double (*growth)(double share_of_run), int seed) : samples(kSamples) {
+  Drift(double (*growth)(double share_of_run), int seed) : samples(kRun) {
     EXPECT_EQ(host->Adopt(), core::Status::kOk);
     std::mt19937 random(seed);
     std::normal_distribution<double> normal;
@@ -37,14 +37,14 @@ struct Drift {
     truth.tail(Model::kRigid) +=
         0.7 * rigid.eigenvectors() * (rigid.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * z);
     for (int k = 0; k < Model::kFront; ++k) truth(k) *= off(random);
-    const double size[n] = {1.1, 0.6, 0.8, 1.3, 1.0, 1.4};
-    double phase[n][4];
+    const double size[kJoints] = {1.1, 0.6, 0.8, 1.3, 1.0, 1.4};
+    double phase[kJoints][4];
     for (auto& joint : phase)
       for (double& a : joint) a = angle(random);
-    for (int k = 0; k < kSamples; ++k) {
-      Sample& s = samples[k];
+    for (int k = 0; k < kRun; ++k) {
+      SixAxisSample& s = samples[k];
       s.tick = k * Model::kSampleTicks;
-      for (int i = 0; i < n; ++i) {
+      for (int i = 0; i < kJoints; ++i) {
         double motion[3] = {};
         for (int h = 1; h <= 4; ++h) {
           const double w = 0.2 * M_PI * h, a = size[i] / h, at = w * 0.008 * k + phase[i][h - 1];
@@ -58,12 +58,13 @@ struct Drift {
         const bool moving = std::abs(s.qd[i]) > Model::kAxes[i].v_min_radps;
         s.flags[i] = static_cast<std::uint8_t>(model::kValid | (moving ? model::kMoving : 0));
       }
-      Vector now = truth, beta(n);
-      for (int i = 0; i < n; ++i) beta(i) = now(Fv(i)) *= growth(static_cast<double>(k) / kSamples);
+      Vector now = truth, beta(kJoints);
+      for (int i = 0; i < kJoints; ++i) beta(i) = now(Fv(i)) *= growth(static_cast<double>(k) / kRun);
       viscous.push_back(beta);
       regressor.push_back(Regressor<Model>(s));
       const Vector tau = regressor.back() * now;
-      for (int i = 0; i < n; ++i) s.tau[i] = static_cast<float>(tau(i) + Model::kAxes[i].sigma_Nm * normal(random));
+      for (int i = 0; i < kJoints; ++i)
+        s.tau[i] = static_cast<float>(tau(i) + Model::kAxes[i].sigma_Nm * normal(random));
     }
   }
 
@@ -71,12 +72,12 @@ struct Drift {
   double OfBank() {
     host->estimator.SetPublishEvery(1u << 30);
     double square = 0;
-    for (int k = 0; k < kSamples; ++k) {
+    for (int k = 0; k < kRun; ++k) {
       EXPECT_EQ(host->Feed(samples[k]), core::Status::kOk);
-      for (int i = 0; i < n && k >= kSettled; ++i) {
+      for (int i = 0; i < kJoints && k >= kSettled; ++i) {
         const double found =
             host->image.committed.p[Fv(i)] + host->image.scale[Fv(i)] * host->estimator.filter().x(Fv(i));
-        square += std::pow(found / viscous[k](i) - 1, 2) / (n * (kSamples - kSettled));
+        square += std::pow(found / viscous[k](i) - 1, 2) / (kJoints * (kRun - kSettled));
       }
     }
     return std::sqrt(square);
@@ -95,8 +96,8 @@ struct Drift {
       for (int k = 0; k < m; ++k) p(i, k) = p0(active[i], active[k]);
     }
     double square = 0;
-    for (int k = 0; k < kSamples; ++k) {
-      for (int j = 0; j < n; ++j) {
+    for (int k = 0; k < kRun; ++k) {
+      for (int j = 0; j < kJoints; ++j) {
         if (!(samples[k].flags[j] & model::kMoving)) continue;
         Vector h(m);
         for (int i = 0; i < m; ++i) h(i) = regressor[k](j, active[i]);
@@ -108,7 +109,7 @@ struct Drift {
       p = Matrix((p + p.transpose()) / (2 * mu));
       for (int i = 0, at = 0; i < m && k >= kSettled; ++i)
         if (active[i] < Model::kFront && active[i] == Fv(at))
-          square += std::pow(x(i) / viscous[k](at++) - 1, 2) / (n * (kSamples - kSettled));
+          square += std::pow(x(i) / viscous[k](at++) - 1, 2) / (kJoints * (kRun - kSettled));
     }
     return std::isfinite(square) ? std::sqrt(square) : std::numeric_limits<double>::infinity();
   }

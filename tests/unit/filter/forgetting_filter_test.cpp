@@ -12,39 +12,37 @@ namespace armcal::filter {
 namespace {
 using namespace test;  // NOLINT: the bench of these tests
 
-constexpr std::uint32_t kAll = 7;
-using Filter = ForgettingFilter<Small>;
-constexpr int n = Small::kColumns;
+using SmallForgetting = ForgettingFilter<Small>;
 
 // Every bit that the filter keeps from row to row.
-std::vector<float> Kept(const Filter& filter) {
-  std::vector<float> all(filter.weights(), filter.weights() + n);
-  all.insert(all.end(), filter.triangle(), filter.triangle() + Filter::kTriangle);
+std::vector<float> Kept(const SmallForgetting& filter) {
+  std::vector<float> all(filter.weights(), filter.weights() + Small::kColumns);
+  all.insert(all.end(), filter.triangle(), filter.triangle() + SmallForgetting::kTriangle);
   return all;
 }
 
 // The recursion [sqrt(lambda) R; rows] in double by Householder QR. Rows of R belong to columns because the column
 // order is the filter's, so the same blocks can forget under the same gates.
 struct Recursion {
-  Matrix r = Matrix::Zero(n, n + 1);
+  Matrix r = Matrix::Zero(Small::kColumns, Small::kColumns + 1);
   void Add(const Matrix& rows) {
-    Matrix a(n + rows.rows(), n + 1);
+    Matrix a(Small::kColumns + rows.rows(), Small::kColumns + 1);
     a << r, rows;
     const Eigen::HouseholderQR<Matrix> qr(a);
-    r = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+    r = qr.matrixQR().topRows(Small::kColumns).triangularView<Eigen::Upper>();
   }
   void Forget(const Prior<Small>& prior, std::uint32_t moving) {
-    for (int k = 0; k < n; ++k) {
+    for (int k = 0; k < Small::kColumns; ++k) {
       const std::uint32_t needed = JointsOf<Small>(k);
       if ((moving & needed) == needed) r.row(k) *= std::sqrt(static_cast<double>(prior.lambda[k]));
     }
   }
   Posterior Solve(const Prior<Small>& prior) const {
-    return SolveBatch(PriorCovariance(prior), r.leftCols(n), r.col(n));
+    return SolveBatch(PriorCovariance(prior), r.leftCols(Small::kColumns), r.col(Small::kColumns));
   }
 };
 Matrix Augmented(const Row& row) {
-  Matrix a(1, n + 1);
+  Matrix a(1, Small::kColumns + 1);
   a << Full<Small>(row).transpose(), row.y;
   return a;
 }
@@ -52,7 +50,7 @@ Matrix Augmented(const Row& row) {
 TEST(ForgettingFilter, LambdaOne_IsTheBatchSolution_AndTheKalmanForm) {
   Bench bench;
   bench.size = 3;
-  Filter filter;
+  SmallForgetting filter;
   KalmanFilter<Small> kalman;
   filter.Restart(bench.prior);
   kalman.Restart(bench.prior);
@@ -62,10 +60,10 @@ TEST(ForgettingFilter, LambdaOne_IsTheBatchSolution_AndTheKalmanForm) {
     EXPECT_TRUE(kalman.Update(r.joint, r.front, r.dense, r.y, true).accepted);
   }
   const Posterior oracle = SolveBatch(bench.prior, rows);
-  const Filter::ReadOut out = Read(filter);
+  const SmallForgetting::ReadOut out = Read(filter);
   EXPECT_LT(Distance<Small>(out.x, oracle), 0.01);
   const auto other = Read(kalman);
-  for (int k = 0; k < n; ++k) {
+  for (int k = 0; k < Small::kColumns; ++k) {
     EXPECT_NEAR(out.sd[k] / oracle.sd(k), 1, 1e-3);
     EXPECT_NEAR((out.x[k] - other.x[k]) / oracle.sd(k), 0, 0.01);
   }
@@ -74,8 +72,8 @@ TEST(ForgettingFilter, LambdaOne_IsTheBatchSolution_AndTheKalmanForm) {
 TEST(ForgettingFilter, GatedForgetting_IsTheGatedQrRecursion) {
   Bench bench;
   bench.size = 2;
-  for (int k = 0; k < n; ++k) bench.prior.lambda[k] = k < Small::kFront ? 0.99f : 0.997f;
-  Filter filter;
+  for (int k = 0; k < Small::kColumns; ++k) bench.prior.lambda[k] = k < Small::kFront ? 0.99f : 0.997f;
+  SmallForgetting filter;
   filter.Restart(bench.prior);
   Recursion recursion;
   for (int s = 0; s < 3000; ++s) {
@@ -102,7 +100,7 @@ TEST(ForgettingFilter, PlantedFault_MovesItAwayFromTheOracle) {
     Bench bench;
     bench.size = 3;
     for (float& lambda : bench.prior.lambda) lambda = 0.999f;
-    Filter filter;
+    SmallForgetting filter;
     filter.Restart(bench.prior);
     Recursion recursion;
     for (int s = 0; s < 400; ++s) {
@@ -130,10 +128,10 @@ TEST(ForgettingFilter, PlantedFault_MovesItAwayFromTheOracle) {
 
 TEST(ForgettingFilter, Report_IsTheInnovationOfTheDataAlone) {
   Bench bench;
-  Filter filter;
+  SmallForgetting filter;
   filter.Restart(bench.prior);
-  Matrix information = 1e-6 * Matrix::Identity(n, n);
-  Vector right = Vector::Zero(n);
+  Matrix information = 1e-6 * Matrix::Identity(Small::kColumns, Small::kColumns);
+  Vector right = Vector::Zero(Small::kColumns);
   int checked = 0;
   for (const Row& r : bench.Rows(60)) {
     const Vector h = Full<Small>(r);
@@ -151,7 +149,7 @@ TEST(ForgettingFilter, Report_IsTheInnovationOfTheDataAlone) {
 
 TEST(ForgettingFilter, GatedOrRefusedRow_LeavesEveryBit) {
   Bench bench;
-  Filter filter;
+  SmallForgetting filter;
   filter.Restart(bench.prior);
   for (const Row& r : bench.Rows(50)) filter.Update(r.joint, r.front, r.dense, r.y, true);
   const std::vector<float> before = Kept(filter);
@@ -169,7 +167,7 @@ TEST(ForgettingFilter, GatedOrRefusedRow_LeavesEveryBit) {
 TEST(ForgettingFilter, OneHourOfRest_LeavesEveryBit) {
   Bench bench;
   for (float& lambda : bench.prior.lambda) lambda = 0.99f;
-  Filter filter;
+  SmallForgetting filter;
   filter.Restart(bench.prior);
   for (const Row& r : bench.Rows(500)) filter.Update(r.joint, r.front, r.dense, r.y, true);
   const std::vector<float> before = Kept(filter);
@@ -185,9 +183,9 @@ TEST(ForgettingFilter, Solve_IsWhatTheDataAloneSay) {
   Bench bench;
   bench.size = 3;
   for (float& lambda : bench.prior.lambda) lambda = 0.998f;
-  Filter filter;
+  SmallForgetting filter;
   filter.Restart(bench.prior);
-  float x[n];
+  float x[Small::kColumns];
   filter.Solve(x);
   for (const float v : x) EXPECT_EQ(v, 0.0f);
   Recursion recursion;
@@ -201,13 +199,15 @@ TEST(ForgettingFilter, Solve_IsWhatTheDataAloneSay) {
     recursion.Forget(bench.prior, kAll);
   }
   filter.Solve(x);
-  const Vector oracle = recursion.r.leftCols(n).triangularView<Eigen::Upper>().solve(recursion.r.col(n));
-  for (int k = 0; k < n; ++k) EXPECT_NEAR(x[k], oracle(k), 1e-4) << k;  // sd about 0.01; float32 loses 1e-6 of 1
+  const Vector oracle =
+      recursion.r.leftCols(Small::kColumns).triangularView<Eigen::Upper>().solve(recursion.r.col(Small::kColumns));
+  for (int k = 0; k < Small::kColumns; ++k)
+    EXPECT_NEAR(x[k], oracle(k), 1e-4) << k;  // sd about 0.01; float32 loses 1e-6 of 1
 }
 
 TEST(ForgettingFilter, AnySlices_GiveTheSameBits) {
   Bench bench;
-  Filter whole, sliced;
+  SmallForgetting whole, sliced;
   whole.Restart(bench.prior);
   sliced.Restart(bench.prior);
   for (const Row& r : bench.Rows(100)) {
@@ -222,11 +222,11 @@ TEST(ForgettingFilter, AnySlices_GiveTheSameBits) {
 
 TEST(ForgettingFilter, WithoutData_ReadsThePrior) {
   Bench bench;
-  Filter filter;
+  SmallForgetting filter;
   filter.Restart(bench.prior);
   for (int s = 0; s < 100000; ++s) filter.EndSample(kAll);
-  const Filter::ReadOut out = Read(filter);
-  for (int k = 0; k < n; ++k) {
+  const SmallForgetting::ReadOut out = Read(filter);
+  for (int k = 0; k < Small::kColumns; ++k) {
     EXPECT_EQ(out.x[k], 0.0f);
     EXPECT_NEAR(out.sd[k], 1.0f, 1e-5f);  // the floor counts as a millionth and was taken off
   }

@@ -11,8 +11,7 @@ namespace armcal::filter {
 namespace {
 using namespace test;  // NOLINT: the bench of these tests
 
-constexpr std::uint32_t kAll = 7;
-using Filter = KalmanFilter<Small>;
+using SmallKalman = KalmanFilter<Small>;
 
 template <class Any>
 class EitherForm : public testing::Test {};
@@ -114,14 +113,14 @@ TEST(KalmanFilter, ConsideredColumns_CountAndDoNotMove) {
   }
   Vector considered = Vector::Zero(Small::kColumns);
   considered(1) = considered(6) = 1;
-  Filter filter;
+  SmallKalman filter;
   filter.Restart(bench.prior);
   Textbook textbook(bench.prior);
   for (const Row& r : bench.Rows(300)) {
     filter.Update(r.joint, r.front, r.dense, r.y, true);
     textbook.Update(Full<Small>(r), r.y, considered);
   }
-  const Filter::ReadOut out = Read(filter);
+  const SmallKalman::ReadOut out = Read(filter);
   EXPECT_EQ(out.x[1], 0.0f);
   EXPECT_EQ(out.x[6], 0.0f);
   for (int k = 0; k < Small::kColumns; ++k) {
@@ -137,10 +136,10 @@ TEST(KalmanFilter, ProcessNoise_HasTheStatedMeanRate_AndWaitsForMotion) {
   bench.prior.noise[0] = 1e-3f;
   bench.prior.noise[3] = 2e-3f;
   bench.prior.noise[8] = 4e-3f;
-  Filter filter;
+  SmallKalman filter;
   filter.Restart(bench.prior);
   for (int s = 0; s < 300; ++s) filter.EndSample(kAll);
-  Filter::ReadOut out = Read(filter);
+  SmallKalman::ReadOut out = Read(filter);
   EXPECT_NEAR(out.sd[0] * out.sd[0], 1 + 0.3, 1e-4);
   EXPECT_NEAR(out.sd[3] * out.sd[3], 1 + 0.6, 1e-4);
   EXPECT_NEAR(out.sd[8] * out.sd[8], 1 + 1.2, 1e-4);
@@ -259,7 +258,7 @@ TEST(KalmanFilter, BlockForm_IsTheDenseOneInLessRoom_AndSaysWhatItCannotHold) {
   using Block = KalmanFilter<Small, Form::kBlock>;
   Bench bench;
   for (int k = 0; k < Small::kFront; ++k) bench.prior.noise[k] = 1e-4f;
-  Filter dense;
+  SmallKalman dense;
   Block block;
   dense.Restart(bench.prior);
   block.Restart(bench.prior);
@@ -278,7 +277,7 @@ TEST(KalmanFilter, BlockForm_IsTheDenseOneInLessRoom_AndSaysWhatItCannotHold) {
   EXPECT_TRUE(Block::Suits(bench.prior));
   bench.prior.noise[Small::kFront] = 1e-6f;
   EXPECT_FALSE(Block::Suits(bench.prior));
-  EXPECT_TRUE(Filter::Suits(bench.prior));
+  EXPECT_TRUE(SmallKalman::Suits(bench.prior));
   bench.prior.noise[Small::kFront] = 0;
   bench.prior.considered[1] = true;
   EXPECT_FALSE(Block::Suits(bench.prior));

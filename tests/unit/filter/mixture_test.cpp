@@ -8,13 +8,12 @@ namespace armcal::filter {
 namespace {
 using namespace test;  // NOLINT: the bench of these tests
 
-using Filter = ModelBank<Small>;
-constexpr std::uint32_t kAll = 7;
+using SmallBank = ModelBank<Small>;
 constexpr int kDrifting = 4, kSlope = Small::kColumns + 2;  // of joint 2
 
 struct Mixture : testing::Test {
   Bench bench;
-  Filter filter;
+  SmallBank filter;
   Mixture() {
     bench.size = 3;
     for (const int k : {1, kDrifting}) bench.prior.noise[k] = 1e-5f;
@@ -28,7 +27,7 @@ struct Mixture : testing::Test {
   }
   // By columns, slopes after all others.
   Matrix Covariance(int member) const {
-    constexpr int n = Filter::Estimate::kSize;
+    constexpr int n = SmallBank::Estimate::kSize;
     Matrix p = Matrix::Zero(n, n);
     for (int k = 0; k < n; ++k) {
       float u[n];
@@ -38,7 +37,9 @@ struct Mixture : testing::Test {
     }
     return p;
   }
-  double At(int member, int column) const { return filter.estimate(member).x(Filter::Columns::kAt.position[column]); }
+  double At(int member, int column) const {
+    return filter.estimate(member).x(SmallBank::Columns::kAt.position[column]);
+  }
 };
 
 // x' = F x and P' = F P F' + Q; Q is diagonal, so beside the diagonal only F counts.
@@ -46,14 +47,14 @@ TEST_F(Mixture, EachMembersColumn_TakesItsSlope_AndTheirCovariancesWithAllOthers
   double largest = 0;  // share of the slope's covariance
   for (int s = 1; s < 300; ++s) {
     Rows();
-    Matrix before[Filter::kMembers];
-    double x[Filter::kMembers];
-    for (int m = 0; m < Filter::kMembers; ++m) {
+    Matrix before[SmallBank::kMembers];
+    double x[SmallBank::kMembers];
+    for (int m = 0; m < SmallBank::kMembers; ++m) {
       before[m] = Covariance(m);
       x[m] = At(m, kDrifting) + At(m, kSlope);
     }
     filter.EndSample(kAll);
-    for (int m = 0; m < Filter::kMembers; ++m) {
+    for (int m = 0; m < SmallBank::kMembers; ++m) {
       const Matrix after = Covariance(m);
       const auto scale = [&](int i, int j) { return 1e-5 * std::sqrt(after(i, i) * after(j, j)); };
       if (s % 10 != 0) {  // at every tenth sample the members exchange their means
@@ -77,9 +78,9 @@ TEST_F(Mixture, ReadOut_HasTheMeanAndVarianceOfTheMembersTogether) {
     Rows();
     filter.EndSample(kAll);
     if (s < 1000) continue;
-    const Filter::ReadOut out = Read(filter);
+    const SmallBank::ReadOut out = Read(filter);
     double mean = 0, square = 0, within = 0;
-    for (int m = 0; m < Filter::kMembers; ++m) {
+    for (int m = 0; m < SmallBank::kMembers; ++m) {
       const double weight = filter.weight(2, m), x = At(m, kDrifting), variance = Covariance(m)(kDrifting, kDrifting);
       mean += weight * x;
       within += weight * variance;

@@ -9,11 +9,10 @@ namespace armcal::filter {
 namespace {
 using namespace test;  // NOLINT: the bench of these tests
 
-constexpr std::uint32_t kAll = 7;
-using Filter = ModelBank<Small>;
+using SmallBank = ModelBank<Small>;
 
 struct Bank : Bench {
-  Filter filter;
+  SmallBank filter;
   Bank() {
     size = 3;
     for (const int k : {1, 4}) prior.noise[k] = 1e-5f;  // columns of joint 0 and joint 2 that may change
@@ -28,7 +27,7 @@ struct Bank : Bench {
   }
   std::vector<std::vector<unsigned char>> Kept() const {
     std::vector<std::vector<unsigned char>> all;
-    for (int m = 0; m < Filter::kMembers; ++m) all.push_back(EstimateBytes(filter.estimate(m)));
+    for (int m = 0; m < SmallBank::kMembers; ++m) all.push_back(EstimateBytes(filter.estimate(m)));
     return all;
   }
 };
@@ -103,9 +102,9 @@ TEST(ModelBank, AnySlices_GiveTheSameBits) {
 
 TEST(ModelBank, SaysWhatItCannotHold) {
   Bank bank;
-  EXPECT_TRUE(Filter::Suits(bank.prior));
+  EXPECT_TRUE(SmallBank::Suits(bank.prior));
   bank.prior.noise[Small::kFront] = 1e-6f;
-  EXPECT_FALSE(Filter::Suits(bank.prior));
+  EXPECT_FALSE(SmallBank::Suits(bank.prior));
 }
 
 }  // namespace

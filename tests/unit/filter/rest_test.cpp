@@ -11,8 +11,6 @@ namespace armcal::filter {
 namespace {
 using namespace test;  // NOLINT: the bench of these tests
 
-constexpr std::uint32_t kAll = 7;
-
 // Every second sample rests: if a turn passed at rest, two of the four columns would get all the noise.
 TEST(Rest, BetweenMotions_TakesNoColumnsTurnOfProcessNoise) {
   Bench bench;

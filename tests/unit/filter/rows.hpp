@@ -16,6 +16,7 @@ struct Small {
   static constexpr int kFrontBegin[4] = {0, 2, 2, 5};
   static constexpr int kRowBegin[3] = {0, 2, 4};
 };
+inline constexpr std::uint32_t kAll = 7;  // every joint of it moves
 
 struct Row {
   int joint;

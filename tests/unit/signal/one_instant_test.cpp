@@ -6,8 +6,8 @@
 namespace armcal::signal {
 namespace {
 
-constexpr int kTicks = 8;
-using Path = SignalPath<1, kTicks>;
+constexpr int kWindow = 8;  // ticks of a sample
+using OneAxisPath = SignalPath<1, kWindow>;
 
 const Axes<1> kAxes = {{1.0f}, {0}, {1.0f}, {1}, {1}, 1000.0f};
 
@@ -23,7 +23,7 @@ model::RawSample<1> Ramp(std::uint32_t tick) {
 }
 
 TEST(OneInstant, TorqueAndTemperature_AreAveragedOverTheTicksOfThePosition) {
-  Path path(kAxes);
+  OneAxisPath path(kAxes);
   int samples = 0;
   for (std::uint32_t tick = 0; tick < 400; ++tick) {
     if (!path.PushTick(Ramp(tick))) continue;
@@ -34,18 +34,18 @@ TEST(OneInstant, TorqueAndTemperature_AreAveragedOverTheTicksOfThePosition) {
     EXPECT_EQ(s.tau[0], mean);
     EXPECT_EQ(s.temperature_degC[0], mean);
   }
-  EXPECT_EQ(samples, 400 / kTicks - 4);
+  EXPECT_EQ(samples, 400 / kWindow - 4);
 }
 
 TEST(OneInstant, NewSettings_StartANewHistory) {
-  Path path(kAxes);
+  OneAxisPath path(kAxes);
   for (std::uint32_t tick = 0; tick < 100; ++tick) static_cast<void>(path.PushTick(Ramp(tick)));
   path.SetSettings({{0.01f}, {2.0f}, 7u});
   std::uint32_t first = 0;
   for (std::uint32_t tick = 100; tick < 200 && first == 0; ++tick)
     if (path.PushTick(Ramp(tick))) first = path.sample().tick;
   // The next window begins at 104; the first sample is the third of five windows from there.
-  EXPECT_EQ(first, 104u + 2 * kTicks);
+  EXPECT_EQ(first, 104u + 2 * kWindow);
   EXPECT_EQ(path.sample().tau[0], 2.0f * (static_cast<float>(first) + 3.5f));
   EXPECT_EQ(path.generation(), 7u);
 }

@@ -5,6 +5,7 @@
 
 #include "armcal/table/table_store.hpp"
 #include "tests/unit/table/nor_flash.hpp"
+#include "tests/unit/table/tables.hpp"
 
 namespace {
 
@@ -13,17 +14,11 @@ using core::Status;
 using table::TableStore;
 using test::Cut;
 using test::Geometry;
+using test::kSchema;
+using test::kWords;
 using test::NorFlash;
-using Words = std::vector<std::uint16_t>;
-
-constexpr std::uint32_t kSchema = 0xABCD1234;
-constexpr std::uint32_t kWords = 60;
-
-Words Table(int number) {
-  Words words(kWords);
-  for (std::size_t i = 0; i < words.size(); ++i) words[i] = static_cast<std::uint16_t>(4001 * number + 257 * i);
-  return words;
-}
+using test::Table;
+using test::Words;
 
 // Powers up, loads, and tries to save `number`. Returns what was loaded (empty if nothing).
 Words BootAndSave(NorFlash& flash, int number) {
@@ -37,7 +32,7 @@ Words BootAndSave(NorFlash& flash, int number) {
   return loaded;
 }
 
-Words Boot(NorFlash& flash) {
+Words PowerUpAndLoad(NorFlash& flash) {
   flash.PowerUp();
   TableStore store(flash.storage(), kSchema, kWords);
   Words loaded(kWords);
@@ -70,12 +65,12 @@ void CutOnce(const Geometry& g, int tables) {
     flash.PowerUp();
     flash.CutAt(cut);
     BootAndSave(flash, tables + 1);
-    const Words found = Boot(flash);
+    const Words found = PowerUpAndLoad(flash);
     const Words before = tables == 0 ? Words{} : Table(tables);
     ASSERT_TRUE(found == before || found == Table(tables + 1))
         << "operation " << cut.operation << " byte " << cut.bytes;
     BootAndSave(flash, 9);
-    ASSERT_EQ(Boot(flash), Table(9)) << "the store must recover";
+    ASSERT_EQ(PowerUpAndLoad(flash), Table(9)) << "the store must recover";
     ASSERT_FALSE(flash.misused());
   }
 }
@@ -94,10 +89,10 @@ TEST_P(PowerCut, Store_AfterASecondCutDuringRecovery_LoadsOldOrNew) {
       flash.PowerUp();
       flash.CutAt(cuts[a]);
       BootAndSave(flash, 3);
-      const Words middle = Boot(flash);
+      const Words middle = PowerUpAndLoad(flash);
       flash.CutAt(cuts[b]);
       BootAndSave(flash, 4);
-      const Words found = Boot(flash);
+      const Words found = PowerUpAndLoad(flash);
       ASSERT_TRUE(found == middle || found == Table(4)) << a << " then " << b;
     }
   }
@@ -115,7 +110,7 @@ TEST(PowerCutOracle, OfARecordWhosePayloadWasTornAfterTheCommit_SeesIt) {
   BootAndSave(flash, 1);
   BootAndSave(flash, 2);
   flash.cells()[256 + 40] ^= 0x10;  // what a torn byte under a valid commit word looks like
-  const Words found = Boot(flash);
+  const Words found = PowerUpAndLoad(flash);
   EXPECT_EQ(found, Table(1)) << "the checksum, not the commit word alone, must decide";
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/unit/table/nor_flash.hpp"
+#include "tests/unit/table/tables.hpp"
 
 namespace {
 
@@ -13,19 +14,14 @@ using namespace armcal;
 using core::Status;
 using table::SlotState;
 using table::TableStore;
+using test::kSchema;
+using test::kWords;
 using test::NorFlash;
+using test::Table;
+using test::Words;
 
-constexpr std::uint32_t kSchema = 0xABCD1234, kOther = 0x55550000;
-constexpr std::uint32_t kWords = 50;
+constexpr std::uint32_t kOther = 0x55550000;
 const test::Geometry kNor{2, 512, 8, 0xFF};
-
-using Words = std::vector<std::uint16_t>;
-
-Words Table(int number, std::uint32_t count = kWords) {
-  Words words(count);
-  for (std::size_t i = 0; i < words.size(); ++i) words[i] = static_cast<std::uint16_t>(1000 * number + 7 * i);
-  return words;
-}
 
 Status Finish(TableStore& store) {
   Status status;

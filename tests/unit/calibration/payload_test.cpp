@@ -7,14 +7,15 @@
 
 #include "host_sim/calibration/body_barrier.hpp"
 #include "host_sim/calibration/payload.hpp"
-#include "host_sim/io/input_error.hpp"
 #include "tests/unit/calibration/laden_arm.hpp"
+#include "tests/unit/io/temporary_folder.hpp"
 
 namespace armcal::calibration {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using io::test::ErrorOf;
 using tests::LadenArm;
 
 // Half the arm's rating; its centre is off the flange's axis.
@@ -32,15 +33,6 @@ VectorXd Values(const plant::Body& b) {
   VectorXd v(10);
   v << b.mass_kg, VectorXd::Map(b.center_m.data(), 3), VectorXd::Map(b.inertia_kgm2.data(), 6);
   return v;
-}
-
-std::string ErrorOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const io::InputError& e) {
-    return e.what();
-  }
-  return "";
 }
 
 // By the definition: positive mass, principal moments about the centre positive, none above the other two's sum.

@@ -56,20 +56,19 @@ function(armcal_host_library name)
   target_link_libraries(${name} PUBLIC armcal_host_rules ${A_LIBS})
 endfunction()
 
-# Oracles are in double. Linked last: lib's rules, which a test gets from the rooms it links, would have the last word.
+# Tests are many, and nearly all take longer to compile than to run: optimised little. Oracles are in double. Linked last: lib's rules,
+# which a test gets from the rooms it links, would have the last word.
 add_library(armcal_test_rules INTERFACE)
-target_compile_options(armcal_test_rules INTERFACE -Wno-double-promotion)
+target_compile_options(armcal_test_rules INTERFACE -O1 -Wno-double-promotion)
 
 # The test executables labelled fast: what the sanitizer build makes.
 add_custom_target(fast_tests)
 
-# armcal_test(NAME SOURCES ... [LIBS ...] [LABELS fast|all|long]): one GoogleTest executable, one CTest entry. Tests are
-# many, and nearly all take longer to compile than to run: optimised little.
+# armcal_test(NAME SOURCES ... [LIBS ...] [LABELS fast|all|long]): one GoogleTest executable, one CTest entry.
 function(armcal_test name)
   cmake_parse_arguments(A "" "LABELS;TIMEOUT" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${A_SOURCES})
   target_link_libraries(${name} PRIVATE armcal_host_rules ${A_LIBS} armcal_test_rules GTest::gtest_main)
-  target_compile_options(${name} PRIVATE -O1)
   add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   if(NOT A_LABELS)
     set(A_LABELS fast)

@@ -39,7 +39,7 @@ function(armcal_find_tool out wait_for)
     if(NOT TARGET armcal_host_tool)
       ExternalProject_Add(armcal_host_tool
         SOURCE_DIR ${ARMCAL_CHECKOUT} BINARY_DIR ${folder} PREFIX ${folder}.state
-        CONFIGURE_COMMAND ${CMAKE_COMMAND} -G ${CMAKE_GENERATOR} -S ${ARMCAL_CHECKOUT} -B ${folder} -DCMAKE_BUILD_TYPE=Release
+        CONFIGURE_COMMAND ${CMAKE_COMMAND} -G ${CMAKE_GENERATOR} -S ${ARMCAL_CHECKOUT} -B ${folder} -DCMAKE_BUILD_TYPE=Release -DCMAKE_UNITY_BUILD=ON
         BUILD_COMMAND ${CMAKE_COMMAND} --build ${folder} --target armcal
         BUILD_ALWAYS ON INSTALL_COMMAND "" BUILD_BYPRODUCTS ${ARMCAL_TOOL})
     endif()

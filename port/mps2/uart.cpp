@@ -45,11 +45,11 @@ void StartUart1(std::uint32_t baud) {
 Serial Uart1() { return {nullptr, Read, Write}; }
 
 void OnUart1() {
+  Uart().interrupt = 2u;  // before the bytes: one that comes while they are taken has to ask again, or nobody takes it
   while ((Uart().state & 2u) != 0) {
     // A full ring counts the byte that it refuses; the frame's checksum will fail.
     (void)received.Push(static_cast<std::uint8_t>(Uart().data));
   }
-  Uart().interrupt = 2u;
 }
 
 }  // namespace armcal::port::mps2

@@ -13,11 +13,13 @@ import shutil
 import struct
 import subprocess
 import sys
+import termios
 import time
 import tty
 import zlib
 
 SECONDS = 60  # for anything to come true: an emulated board shares its processor with others
+REPLY_SECONDS = 2  # then the master asks again, as Modbus wants it: a pause inside a frame drops it
 
 
 def crc16(data):
@@ -33,6 +35,10 @@ class Refused(Exception):
     """The drive answered with this exception code."""
 
 
+class NoReply(Exception):
+    """What came, if anything, is no whole frame."""
+
+
 class Line:
     """Address 1 on a serial line; one request, one reply."""
 
@@ -44,24 +50,35 @@ class Line:
         data = b""
         while len(data) < count:
             if not select.select([self.file], [], [], max(0.0, deadline - time.monotonic()))[0]:
-                raise SystemExit(f"no reply: {len(data)} of {count} bytes")
+                raise NoReply(f"{len(data)} of {count} bytes")
             data += os.read(self.file, count - len(data))
         return data
 
-    def ask(self, pdu):
+    def ask_once(self, pdu):
         frame = b"\x01" + pdu
+        termios.tcflush(self.file, termios.TCIFLUSH)
         os.write(self.file, frame + crc16(frame))
-        deadline = time.monotonic() + SECONDS
-        head = self.take(3, deadline)
-        if head[1] & 0x80:
-            rest = self.take(2, deadline)
+        deadline = time.monotonic() + REPLY_SECONDS
+        reply = self.take(3, deadline)
+        if reply[1] & 0x80:
+            reply += self.take(2, deadline)
         else:
-            rest = self.take(head[2] + 2 if head[1] in (3, 4) else 5, deadline)
-        reply = head + rest
-        assert crc16(reply[:-2]) == reply[-2:], f"checksum of {reply.hex()}"
-        if head[1] & 0x80:
-            raise Refused(head[2])
+            reply += self.take(reply[2] + 2 if reply[1] in (3, 4) else 5, deadline)
+        if crc16(reply[:-2]) != reply[-2:]:
+            raise NoReply(f"checksum of {reply.hex()}")
+        if reply[1] & 0x80:
+            raise Refused(reply[2])
         return reply[2:-2]
+
+    def ask(self, pdu):
+        deadline = time.monotonic() + SECONDS
+        while True:
+            try:
+                return self.ask_once(pdu)
+            except NoReply as missing:
+                if time.monotonic() > deadline:
+                    raise SystemExit(f"no reply to {pdu[:5].hex()}: {missing}")
+                print(f"asking {pdu[:5].hex()} again: {missing}")
 
     def read(self, function, first, count):
         words = []

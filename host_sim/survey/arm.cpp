@@ -88,6 +88,14 @@ codegen::Robot Variant(const codegen::Robot& file, Law law, Bodies bodies, const
   return robot;
 }
 
+codegen::Robot StribeckArm(const codegen::Robot& file, const Stribeck& stribeck) {
+  codegen::Robot robot = Variant(file, Law::kStribeck, Bodies::kBase, stribeck);
+  robot.name = "stribeck_arm";
+  for (codegen::Joint& joint : robot.joint)
+    joint.v_min_radps = 0.01;  // the law shows near standstill; no stiction here
+  return robot;
+}
+
 codegen::Catalogue Records(codegen::Catalogue records, const Payload& payload) {
   codegen::EffectRecord& stribeck = records.at("stribeck");
   stribeck.linear[0].rows["j"] = std::string(kGaussian) + "*sgn(qd)";

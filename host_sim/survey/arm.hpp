@@ -39,6 +39,9 @@ enum class Bodies { kStandard, kBase };
 // every body parameter that the torque depends on, as in the survey; kBase: an independent choice.
 codegen::Robot Variant(const codegen::Robot& file, Law law, Bodies bodies, const Stribeck& stribeck);
 
+// (4) with base parameters: the arm for which the firmware's extended filter is compiled here.
+codegen::Robot StribeckArm(const codegen::Robot& file, const Stribeck& stribeck);
+
 // The records that Variant uses: those given, with (4)'s delta_s fixed at 2, (9)'s payload declared, and one for
 // kGradient.
 codegen::Catalogue Records(codegen::Catalogue records, const Payload& payload = {});

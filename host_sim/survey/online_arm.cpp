@@ -4,35 +4,45 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <stribeck_arm/model.hpp>
 
 #include "armcal/estimator/physical_read_out.hpp"
+#include "armcal/filter/extended_kalman_filter.hpp"
 #include "codegen/generated/er20_like/model.hpp"
+#include "codegen/src/generator/emit.hpp"
 #include "host_sim/calibration/table_file.hpp"
 #include "host_sim/io/input_error.hpp"
 
 namespace armcal::survey {
 
 using Eigen::VectorXd;
-using Arm = generated::Er20Like;
 
 namespace {
 
-constexpr int n = Arm::kJoints;
+// Standard deviations over the mean of what CAD hardly knows: those of Fs / Fc uniform in 1.1 .. 1.5 about 1.25, and of
+// the logarithm of a speed that is log-uniform in 0.05 .. 0.2 rad/s.
+constexpr double kBreakaway = 0.46, kSpeed = 0.4;
 
+template <class Arm>
 estimator::Table<Arm> TableOf(const codegen::Model& prior, const VectorXd& sigma_Nm) {
   calibration::TableFile file = calibration::DefaultTable(prior);
-  for (int j = 0; j < n; ++j) file.joint[j].sigma_Nm = sigma_Nm[j];
+  for (int j = 0; j < Arm::kJoints; ++j) file.joint[j].sigma_Nm = sigma_Nm[j];
+  for (calibration::TableRow& row : file.row) {
+    if (row.name.starts_with("stribeck.dFs")) row.sd = kBreakaway * row.mean;
+    if (row.name.starts_with("stribeck.vs")) row.sd = kSpeed * row.mean, row.state = "estimated";
+  }
   estimator::Table<Arm> table;
   if (file.schema != Arm::kSchema ||
       !core::IsOk(model::Decode(calibration::EncodeTable(file).data(), Arm::kSchema, table)))
-    throw io::InputError(prior.robot().path + ": not the robot file of er20_like, for which the estimator is compiled");
+    throw io::InputError(prior.robot().path + ": not the arm for which the estimator is compiled");
   return table;
 }
 
-model::Sample<n> SampleOf(const calibration::Dataset& log, const codegen::Robot& robot, int k) {
-  model::Sample<n> s;
+template <class Arm>
+model::Sample<Arm::kJoints> SampleOf(const calibration::Dataset& log, const codegen::Robot& robot, int k) {
+  model::Sample<Arm::kJoints> s;
   s.tick = static_cast<std::uint32_t>(k * Arm::kSampleTicks);
-  for (int j = 0; j < n; ++j) {
+  for (int j = 0; j < Arm::kJoints; ++j) {
     s.q[j] = static_cast<float>(log.s.q(k, j));
     s.qd[j] = static_cast<float>(log.s.qd(k, j));
     s.qdd[j] = static_cast<float>(log.s.qdd(k, j));
@@ -42,7 +52,7 @@ model::Sample<n> SampleOf(const calibration::Dataset& log, const codegen::Robot&
   return s;
 }
 
-template <class Filter>
+template <class Arm, class Filter>
 OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm) {
   struct Drive {
     estimator::ImageWork<Arm> work;
@@ -53,7 +63,7 @@ OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, c
   };
   const auto began = std::chrono::steady_clock::now();
   const auto drive = std::make_unique<Drive>();
-  const core::Status built = estimator::BuildImage(TableOf(prior, sigma_Nm), 1, drive->work, drive->image);
+  const core::Status built = estimator::BuildImage(TableOf<Arm>(prior, sigma_Nm), 1, drive->work, drive->image);
   if (!core::IsOk(built)) throw io::InputError(prior.robot().path + ": expected bodies that can exist");
   auto& arm = drive->estimator;
   arm.SetPublishEvery(1u << 30);
@@ -63,7 +73,7 @@ OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, c
     }
   };
   for (int k = 0; k < log.samples(); ++k) {
-    (void)arm.PushSample(SampleOf(log, prior.robot(), k));
+    (void)arm.PushSample(SampleOf<Arm>(log, prior.robot(), k));
     work();
   }
   arm.RequestReadOut();
@@ -82,8 +92,16 @@ OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, c
   calibration::Solution& s = out.solution;
   s.converged = core::IsOk(begun) && found.converged;
   s.bodies = Eigen::Map<const VectorXd>(found.body, Arm::kBodyParameters);
-  s.z = Eigen::Map<const VectorXd>(found.column, Arm::kColumns);
-  s.covariance = Eigen::Map<const VectorXd>(found.column_sd, Arm::kColumns).cwiseAbs2().asDiagonal();
+  // Nonlinear parameters are the filter's own; the read-out is of what is linear.
+  VectorXd sd(Arm::kColumns + Arm::kNonlinear);
+  s.z.resize(sd.size());
+  s.z.head(Arm::kColumns) = Eigen::Map<const VectorXd>(found.column, Arm::kColumns);
+  sd.head(Arm::kColumns) = Eigen::Map<const VectorXd>(found.column_sd, Arm::kColumns);
+  for (int e = 0; e < Arm::kNonlinear; ++e) {
+    s.z[Arm::kColumns + e] = static_cast<double>(drive->estimates.eta[e]);
+    sd[Arm::kColumns + e] = static_cast<double>(drive->estimates.eta_sd[e]);
+  }
+  s.covariance = sd.cwiseAbs2().asDiagonal();
   s.iterations = found.steps;
   s.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   s.memory_bytes = sizeof(Drive);
@@ -92,16 +110,31 @@ OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, c
 
 }  // namespace
 
-std::string Name(OnlineFilter filter) { return filter == OnlineFilter::kKalman ? "Kalman" : "forgetting"; }
+std::string Name(OnlineFilter filter) {
+  constexpr const char* kName[] = {"forgetting", "Kalman", "extended Kalman"};
+  return kName[static_cast<int>(filter)];
+}
 
-bool CompiledFor(const codegen::Model& model) { return calibration::DefaultTable(model).schema == Arm::kSchema; }
+bool CompiledFor(const codegen::Model& model, OnlineFilter filter) {
+  const bool stribeck = filter == OnlineFilter::kExtended;
+  return codegen::Schema(model) == (stribeck ? generated::StribeckArm::kSchema : generated::Er20Like::kSchema);
+}
 
 bool Moves(double speed_radps, const codegen::Joint& joint) { return std::abs(speed_radps) > joint.v_min_radps; }
 
 OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm,
                          OnlineFilter filter) {
-  return filter == OnlineFilter::kKalman ? Run<filter::KalmanFilter<Arm>>(prior, log, sigma_Nm)
-                                         : Run<filter::ForgettingFilter<Arm>>(prior, log, sigma_Nm);
+  using generated::Er20Like;
+  using generated::StribeckArm;
+  switch (filter) {
+    case OnlineFilter::kForgetting:
+      return Run<Er20Like, filter::ForgettingFilter<Er20Like>>(prior, log, sigma_Nm);
+    case OnlineFilter::kKalman:
+      return Run<Er20Like, filter::KalmanFilter<Er20Like>>(prior, log, sigma_Nm);
+    case OnlineFilter::kExtended:
+      break;
+  }
+  return Run<StribeckArm, filter::ExtendedKalmanFilter<StribeckArm>>(prior, log, sigma_Nm);
 }
 
 }  // namespace armcal::survey

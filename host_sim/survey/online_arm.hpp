@@ -1,4 +1,5 @@
-// survey - the firmware's own estimator, float32, on a log; compiled for the one arm of the survey; knows no truth.
+// survey - the firmware's own estimator, float32, on a log; compiled for the survey's arm with (7) and with (4);
+// knows no truth.
 #pragma once
 
 #include "host_sim/calibration/dataset.hpp"
@@ -6,7 +7,7 @@
 
 namespace armcal::survey {
 
-enum class OnlineFilter { kForgetting, kKalman };
+enum class OnlineFilter { kForgetting, kKalman, kExtended };  // kExtended: of the arm with (4)
 std::string Name(OnlineFilter filter);
 
 struct OnlineResult {
@@ -15,11 +16,12 @@ struct OnlineResult {
   bool inconsistent = false;          // monitor::Consistency, or estimator::PriorIsTooNarrow
 };
 
-// The estimator is compiled for one arm: true if this is its model.
-bool CompiledFor(const codegen::Model& model);
+// True if the filter is compiled for this model.
+bool CompiledFor(const codegen::Model& model, OnlineFilter filter);
 
 // prior: its table is where the filter starts, with sigma_Nm of a sample's row. Rows below a joint's v_min are left
-// out, as on a drive. io::InputError: another arm, or a prior whose bodies cannot exist.
+// out, as on a drive. What CAD knows of breakaway and Stribeck speed is wide: see online_arm.cpp. io::InputError:
+// another arm, or a prior whose bodies cannot exist.
 OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset& log, const Eigen::VectorXd& sigma_Nm,
                          OnlineFilter filter);
 

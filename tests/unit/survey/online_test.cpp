@@ -12,6 +12,7 @@ namespace {
 
 const char* const kWorst = "worst case +-20 %";
 const char* const kUniform = "uniform +-20 %";
+const char* const kStribeck = "(4), uniform +-20 %";
 
 // 200 in the long test: see CMakeLists.txt. The limits are the same; they leave room for the means of fewer.
 int Draws() {
@@ -30,6 +31,7 @@ class Online : public testing::Test {
     settings.seed = 3;
     Motions motions;
     motions.linear.series = StudyLinear();
+    motions.nonlinear.series = StudyNonlinear();
     motions.other = Validation(File(), AllRecords(), 5);
     Findings found;
     ShowOnline(settings, motions, found);
@@ -66,6 +68,12 @@ TEST_F(Online, BaseParameters_AreNearWhatTheRowsAllow) {
   for (const std::string filter : {"Kalman", "forgetting"})
     EXPECT_LE(At(kWorst, filter, "over Cramer-Rao"), 1.15) << filter;
   EXPECT_LE(At(kUniform, "Kalman", "over Cramer-Rao"), 1.15);
+}
+
+TEST_F(Online, StribeckFrictionOfAnyDraw_IsFoundByTheExtendedFilter) {
+  EXPECT_LE(At(kStribeck, "extended Kalman", "e_f"), 0.06);
+  EXPECT_GE(At(kStribeck, "extended Kalman", "share e_f < .2"), 0.98);
+  EXPECT_LE(At(kStribeck, "extended Kalman", "J_e"), 0.30);
 }
 
 TEST_F(Online, Intervals_HoldWhatTheySay) {

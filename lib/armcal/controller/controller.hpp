@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "armcal/controller/set_point.hpp"
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/estimator/image.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
@@ -16,12 +17,6 @@
 #include "armcal/table/table_store.hpp"
 
 namespace armcal::controller {
-
-// Where the axes shall be. Shapes: [n], rad (m), rad/s, rad/s^2.
-template <int n>
-struct SetPoint {
-  float q[n], qd[n], qdd[n];
-};
 
 // One motion controller: lives as long as the power is on; some 80 KB for six joints. Filters: one or two of those
 // that estimator::Estimator takes; the first is served as filter A, the second as filter B.

@@ -35,7 +35,7 @@ void FromPriorUnits(const Image<Model>& image, const ReadOut& out, Estimates<Mod
     estimates.value[k] = image.committed.p[k] + image.scale[k] * out.x[k];
     estimates.sd[k] = image.scale[k] * out.sd[k];
   }
-  constexpr bool kExtended = sizeof out.x / sizeof out.x[0] > Model::kColumns;
+  constexpr bool kExtended = sizeof(out.x) > Model::kColumns * sizeof(float);
   for (int e = 0; e < Model::kNonlinear; ++e) {
     estimates.eta[e] = image.committed.eta[e];
     if constexpr (kExtended) {

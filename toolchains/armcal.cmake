@@ -82,6 +82,25 @@ function(armcal_test name)
   endif()
 endfunction()
 
+# armcal_emitted_models(NAME SOURCES ... FOLDERS ...): models that a program of these sources writes while building; it
+# is called with the folders, which lie in the build folder. Link NAME to include <folder/model.hpp>.
+function(armcal_emitted_models name)
+  cmake_parse_arguments(A "" "" "SOURCES;FOLDERS" ${ARGN})
+  add_executable(emit_${name} ${A_SOURCES})
+  target_link_libraries(emit_${name} PRIVATE armcal_codegen)
+  file(GLOB inputs CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/codegen/effects/*.toml)
+  list(APPEND inputs ${PROJECT_SOURCE_DIR}/codegen/robots/er20_like.toml)
+  list(TRANSFORM A_FOLDERS PREPEND ${CMAKE_CURRENT_BINARY_DIR}/)
+  set(headers ${A_FOLDERS})
+  list(TRANSFORM headers APPEND /model.hpp)
+  add_custom_command(OUTPUT ${headers} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} COMMAND emit_${name} ${A_FOLDERS}
+                     DEPENDS emit_${name} ${inputs})
+  add_custom_target(${name}_files DEPENDS ${headers})
+  add_library(${name} INTERFACE)
+  add_dependencies(${name} ${name}_files)
+  target_include_directories(${name} INTERFACE ${CMAKE_CURRENT_BINARY_DIR})
+endfunction()
+
 # add every subfolder that has a CMakeLists.txt
 function(armcal_add_rooms)
   file(GLOB rooms CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/*/CMakeLists.txt)

@@ -3,7 +3,6 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "host_sim/cli/verb.hpp"
-#include "host_sim/io/files.hpp"
 
 namespace armcal::cli {
 namespace {
@@ -38,8 +37,7 @@ int RunGenerate(const GenerateOptions& o) {
   const codegen::GeneratedFiles files = codegen::Emit(model);
   const std::filesystem::path folder =
       o.out.empty() ? Home() / "codegen" / "generated" / model.robot().name : std::filesystem::path(o.out);
-  std::filesystem::create_directories(folder);
-  for (const auto& [name, text] : files.text) io::AtomicWrite((folder / name).string(), text);
+  codegen::WriteFiles(files, folder);
   const auto& c = files.passport;
   fmt::print(
       "{}: {} joints, {} filter coordinates ({} front, {} rigid base, {} shared), {} table parameters, schema {:08X}\n",

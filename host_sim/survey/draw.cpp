@@ -79,4 +79,10 @@ Stribeck DrawStribeck(int joints, std::uint64_t seed) {
   return s;
 }
 
+Stribeck BelievedStribeck(int joints) {
+  Stribeck s = SetStribeck(joints);
+  s.fs_over_fc.setConstant(1.25);
+  return s;
+}
+
 }  // namespace armcal::survey

@@ -24,5 +24,7 @@ codegen::Robot DrawPrior(const codegen::Robot& truth, const PriorError& error, s
 
 // A truth for (4): qs log-uniform in 0.05 .. 0.2 rad/s, Fs / Fc in 1.1 .. 1.5, per joint.
 Stribeck DrawStribeck(int joints, std::uint64_t seed);
+// The middle of that range: what is believed before the draw.
+Stribeck BelievedStribeck(int joints);
 
 }  // namespace armcal::survey

@@ -133,7 +133,7 @@ std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, 
     std::unique_ptr<Truth> drawn;
     if (draws.random_truth) {
       drawn = MakeTruth(settings, motions, draws.law, DrawStribeck(joints, SeedOf(draws.seed, d, 3)));
-      believed.fs_over_fc.setConstant(1.25);
+      believed = BelievedStribeck(joints);
     }
     const Truth& truth = drawn ? *drawn : *set;
     const codegen::Robot cad = Variant(settings.robot, draws.law, Bodies::kStandard, believed);

@@ -17,8 +17,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kBelievedFsOverFc = 1.25;
-
 // What is drawn, and what the filter is told about it.
 struct Protocol {
   std::string name;
@@ -42,27 +40,15 @@ codegen::Robot DrawTable(const codegen::Robot& truth, const Protocol& protocol, 
     const double sign = protocol.error.kind == PriorError::kWorst ? std::copysign(1.0, u) : u;
     joint.motor.rotor_inertia_kgm2 *= 1 + protocol.error.width * sign;
   }
-  for (std::size_t e = 0; e < robot.effect.size(); ++e) {  // of (4) CAD knows the middle of the range
-    codegen::EffectUse& use = robot.effect[e];
-    use.nonlinear = truth.effect[e].nonlinear;
-    use.mean["dFs"] = (kBelievedFsOverFc - 1) * robot.joint[use.joints[0]].nominal["Fc"];
-  }
   robot.link_relative_sd *= protocol.told;
   robot.friction_relative_sd *= protocol.told;
   return robot;
 }
 
-// (4): a truth, and what is believed of every truth before its draw.
 std::unique_ptr<Truth> DrawTruth(const Settings& settings, const Motions& motions, std::uint64_t seed) {
-  const int joints = settings.robot.joints();
-  return std::make_unique<Truth>(
-      codegen::Model(StribeckArm(settings.robot, DrawStribeck(joints, seed)), settings.records),
-      Sampled(motions.nonlinear.series), Sampled(motions.other));
-}
-codegen::Robot BelievedStribeck(const codegen::Robot& file) {
-  Stribeck believed = SetStribeck(file.joints());
-  believed.fs_over_fc.setConstant(kBelievedFsOverFc);
-  return StribeckArm(file, believed);
+  const Stribeck drawn = DrawStribeck(settings.robot.joints(), seed);
+  return std::make_unique<Truth>(codegen::Model(StribeckArm(settings.robot, drawn), settings.records),
+                                 Sampled(motions.nonlinear.series), Sampled(motions.other));
 }
 
 // Torque that no model here knows: a wave over each joint's position, twenty to a turn of one radian.
@@ -105,14 +91,16 @@ double CramerRao(const Truth& truth) {
 std::vector<Drawn> RunProtocol(const Settings& settings, const Motions& motions, const Truth& set,
                                const Protocol& protocol) {
   std::vector<Drawn> out(static_cast<std::size_t>(settings.draws));
+  const Stribeck believed = BelievedStribeck(settings.robot.joints());
   const MatrixXd hidden = Ripple(set, settings.levels, protocol.ripple);
   ForEachDraw(settings, "online, " + protocol.name, settings.draws, [&](int d) {
     const std::uint64_t seed = (settings.seed + 23) * 1000003 + 4 * static_cast<std::uint64_t>(d);
     std::unique_ptr<Truth> own;
     if (protocol.filter == OnlineFilter::kExtended) own = DrawTruth(settings, motions, seed + 3);
     const Truth& truth = own ? *own : set;
-    const codegen::Robot cad = own ? BelievedStribeck(settings.robot) : truth.model.robot();
-    const codegen::Model prior(DrawTable(cad, protocol, seed), settings.records);
+    codegen::Robot table = DrawTable(settings.robot, protocol, seed);
+    if (own) table = StribeckArm(table, believed);  // in the middle of its range, about the drawn friction
+    const codegen::Model prior(table, settings.records);
     const MatrixXd measured = truth.tau + hidden + Noise(truth.train.samples(), truth.sigma_Nm, seed + 2);
     const OnlineResult got = RunOnTarget(prior, Measured(truth.train, measured), truth.sigma_Nm, protocol.filter);
     Drawn& drawn = out[static_cast<std::size_t>(d)];
@@ -153,7 +141,8 @@ void ShowOnline(const Settings& settings, const Motions& motions, Findings& out)
        "left out; with the robot file's limits of 0.02 and 0.06 less is seen of the law.",
        "base error: torque on another trajectory, truth against estimate; Cramer-Rao: the least that the same rows "
        "allow without a prior."}};
-  const codegen::Model stribeck(BelievedStribeck(settings.robot), settings.records);
+  const codegen::Model stribeck(StribeckArm(settings.robot, BelievedStribeck(settings.robot.joints())),
+                                settings.records);
   if (!CompiledFor(truth.model, OnlineFilter::kKalman) || !CompiledFor(stribeck, OnlineFilter::kExtended)) {
     sheet.notes = {"The estimators in this program are compiled for er20_like."};
     out.sheets.push_back(sheet);

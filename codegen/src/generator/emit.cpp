@@ -5,6 +5,7 @@
 
 #include "codegen/src/generator/emit_text.hpp"
 #include "codegen/src/generator/state_path.hpp"
+#include "host_sim/io/files.hpp"
 
 namespace armcal::codegen {
 namespace {
@@ -120,6 +121,11 @@ GeneratedFiles Emit(const Model& m) {
       "#pragma once\n\n#include \"model.hpp\"\n\nnamespace armcal::generated {\nusing SelectedModel = " +
       TypeName(m.robot().name) + ";\n}  // namespace armcal::generated\n";
   return files;
+}
+
+void WriteFiles(const GeneratedFiles& files, const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  for (const auto& [name, text] : files.text) io::AtomicWrite(folder / name, text);
 }
 
 }  // namespace armcal::codegen

@@ -1,6 +1,7 @@
 // generator - prints a model as C++, its register and column description; knows no file system.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <string>
 
@@ -24,6 +25,9 @@ struct GeneratedFiles {
 
 // Byte-reproducible: no clock, no user, no path.
 GeneratedFiles Emit(const Model& model);
+
+// Into a folder, made if need be; each file whole or not at all. Throws io::InputError: a file cannot be written.
+void WriteFiles(const GeneratedFiles& files, const std::filesystem::path& folder);
 
 // The schema hash alone: equal for two models only if their tables mean the same.
 std::uint32_t Schema(const Model& model);

@@ -14,11 +14,6 @@ using core::PutU32;
 using core::Status;
 using Words = std::uint16_t;
 
-Status Copy(const Words* from, Words offset, Words count, Words* to) {
-  std::memcpy(to, from + offset, 2u * count);
-  return Status::kOk;
-}
-
 Status ReadFloats(void* context, Words offset, Words count, Words* words) {
   const float* values = *static_cast<const float**>(context);
   for (unsigned i = 0; i < count; ++i) {
@@ -30,7 +25,7 @@ Status ReadFloats(void* context, Words offset, Words count, Words* words) {
 }
 
 Status ReadScratch(void* context, Words offset, Words count, Words* words) {
-  return Copy(static_cast<const Words*>(context), offset, count, words);
+  return CopyWords(static_cast<const Words*>(context), offset, count, words);
 }
 
 Status WriteScratch(void* context, Words offset, Words count, const Words* words) {
@@ -103,7 +98,7 @@ Status Device::ReadIdentity(Words offset, Words count, Words* words) {
   PutU32(w + 22, identity_.tick_rate_Hz);
   w[24] = identity_.sample_ticks;
   w[25] = reg::kPageDataCount;
-  return Copy(w, offset, count, words);
+  return CopyWords(w, offset, count, words);
 }
 
 Status Device::ReadStatus(Words offset, Words count, Words* words) {
@@ -136,7 +131,7 @@ Status Device::ReadStatus(Words offset, Words count, Words* words) {
     PutU32(w + 32 + 4 * filter, live_.rows_used[filter]);
     PutU32(w + 34 + 4 * filter, live_.rows_gated[filter]);
   }
-  return Copy(w, offset, count, words);
+  return CopyWords(w, offset, count, words);
 }
 
 Status Device::ReadCommand(Words offset, Words count, Words* words) {
@@ -147,7 +142,7 @@ Status Device::ReadCommand(Words offset, Words count, Words* words) {
   PutU32(w + 4, c.schema);
   w[6] = c.words;
   PutU32(w + 8, c.crc);
-  return Copy(w, offset, count, words);
+  return CopyWords(w, offset, count, words);
 }
 
 Status Device::WriteCommand(Words, Words, const Words* w) {
@@ -159,7 +154,7 @@ Status Device::WriteCommand(Words, Words, const Words* w) {
 
 Status Device::ReadUnlock(Words offset, Words count, Words* words) {
   const Words w[2] = {0, static_cast<Words>(unlocked_ ? 1 : 0)};
-  return Copy(w, offset, count, words);
+  return CopyWords(w, offset, count, words);
 }
 
 Status Device::WriteUnlock(Words, Words, const Words* words) {
@@ -169,7 +164,7 @@ Status Device::WriteUnlock(Words, Words, const Words* words) {
 }
 
 Status Device::ReadStaged(Words offset, Words count, Words* words) {
-  return Copy(transaction_.staged(), offset, count, words);
+  return CopyWords(transaction_.staged(), offset, count, words);
 }
 
 Status Device::WriteStaged(Words offset, Words count, const Words* words) {
@@ -178,7 +173,7 @@ Status Device::WriteStaged(Words offset, Words count, const Words* words) {
 }
 
 Status Device::ReadActive(Words offset, Words count, Words* words) {
-  return Copy(transaction_.active(), offset, count, words);
+  return CopyWords(transaction_.active(), offset, count, words);
 }
 
 }  // namespace armcal::link

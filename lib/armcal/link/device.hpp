@@ -30,7 +30,7 @@ struct LiveStatus {
   std::uint32_t enabled_axes = 0;
   std::uint32_t clamp_count = 0;
   std::uint32_t sample_gaps = 0;
-  std::uint16_t health = 0;  // bit k: filter k's deviations are smaller than its innovations
+  std::uint16_t health = 0;         // bit k: filter k's deviations are smaller than its innovations
   std::uint32_t rows_used[2] = {};  // filter A, B
   std::uint32_t rows_gated[2] = {};
 };

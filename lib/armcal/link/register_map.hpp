@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 
 #include "armcal/core/status.hpp"
 #include "armcal/link/registers.hpp"
@@ -37,6 +38,13 @@ struct LastError {
   core::Status status = core::Status::kOk;
   std::uint32_t request = 0;
 };
+
+// What a block's read answers from words that lie there.
+inline core::Status CopyWords(const std::uint16_t* from, std::uint16_t offset, std::uint16_t count,
+                              std::uint16_t* words) {
+  std::memcpy(words, from + offset, 2u * count);
+  return core::Status::kOk;
+}
 
 // The exception code of a Status: the one place where the two meet. 0 for ok and limited.
 std::uint8_t ExceptionOf(core::Status status);

@@ -73,8 +73,7 @@ inline constexpr std::uint32_t kUnlockKey = 0x6B6C6E75;  // "unlk"
 
 // Capability bits.
 inline constexpr std::uint32_t kHasFilterA = 1, kHasFilterB = 2, kHasRawTrace = 4, kHasSampleTrace = 8;
-inline constexpr std::uint32_t kHasFeedForward = 16, kHasMonitor = 32, kHasResiduals = 64,
-                               kHasLearning = 128;
+inline constexpr std::uint32_t kHasFeedForward = 16, kHasMonitor = 32, kHasResiduals = 64, kHasLearning = 128;
 
 }  // namespace reg
 

@@ -1,8 +1,6 @@
 // link - page header, page data, arm and acknowledge of a trace; knows no transport.
 #include "armcal/link/trace_registers.hpp"
 
-#include <cstring>
-
 #include "armcal/core/words.hpp"
 
 namespace armcal::link {
@@ -11,11 +9,6 @@ namespace {
 
 using core::PutU32;
 using core::Status;
-
-Status Copy(const std::uint16_t* from, std::uint16_t offset, std::uint16_t count, std::uint16_t* to) {
-  std::memcpy(to, from + offset, 2u * count);
-  return Status::kOk;
-}
 
 // `context` is the Trace in all of them. Reading the header forms a page if there is none.
 Status ReadPageHeader(void* context, std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
@@ -35,7 +28,7 @@ Status ReadPageHeader(void* context, std::uint16_t offset, std::uint16_t count, 
   h[12] = static_cast<std::uint16_t>(state);
   h[13] = static_cast<std::uint16_t>(waiting > 0xFFFFu ? 0xFFFFu : waiting);
   PutU32(h + 14, trace.requested().channels);
-  return Copy(h, offset, count, words);
+  return CopyWords(h, offset, count, words);
 }
 
 Status ReadPageData(void* context, std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
@@ -48,7 +41,7 @@ Status ReadArm(void* context, std::uint16_t offset, std::uint16_t count, std::ui
   PutU32(w + 4, arm.start_tick);
   PutU32(w + 6, arm.limit);
   PutU32(w + 8, arm.channels);
-  return Copy(w, offset, count, words);
+  return CopyWords(w, offset, count, words);
 }
 
 Status WriteArm(void* context, std::uint16_t, std::uint16_t, const std::uint16_t* w) {
@@ -70,7 +63,7 @@ Status WriteArm(void* context, std::uint16_t, std::uint16_t, const std::uint16_t
 Status ReadAcknowledge(void* context, std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
   std::uint16_t w[2];
   PutU32(w, static_cast<Trace*>(context)->acknowledged());
-  return Copy(w, offset, count, words);
+  return CopyWords(w, offset, count, words);
 }
 
 Status WriteAcknowledge(void* context, std::uint16_t, std::uint16_t, const std::uint16_t* words) {

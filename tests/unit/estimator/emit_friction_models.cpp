@@ -1,11 +1,8 @@
-// tests - er20_like with the Stribeck law, or with a friction that has memory, on every joint, into a folder each.
-#include <filesystem>
-#include <fstream>
-
+// tests - er20_like with the Stribeck law, or with a friction that has memory, on every joint, into a folder each, in
+// this order.
 #include "codegen/src/generator/emit.hpp"
 
-int main(int, char** argument) {
-  const std::filesystem::path folder = argument[1];
+int main(int, char** folder) {
   for (const std::string effect : {"stribeck", "presliding_dahl"}) {
     armcal::codegen::Robot robot = armcal::codegen::ReadRobot("codegen/robots/er20_like.toml");
     robot.name = "with_" + effect;
@@ -19,8 +16,6 @@ int main(int, char** argument) {
       robot.effect.push_back(use);
     }
     const armcal::codegen::Model model(robot, armcal::codegen::ReadCatalogue("codegen/effects"));
-    std::filesystem::create_directories(folder / robot.name);
-    for (const auto& [name, text] : armcal::codegen::Emit(model).text)
-      std::ofstream(folder / robot.name / name) << text;
+    armcal::codegen::WriteFiles(armcal::codegen::Emit(model), *++folder);
   }
 }

@@ -6,7 +6,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 
-#include "host_sim/calibration/self_product.hpp"
+#include "host_sim/calibration/tall_product.hpp"
 
 namespace armcal::calibration {
 

@@ -2,6 +2,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "host_sim/diagnosis/work.hpp"
 
@@ -10,15 +11,27 @@ namespace armcal::diagnosis {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+std::set<std::string> Diagnosis::Work::Reads(const std::vector<const Chosen*>& terms, const Candidate* further) const {
+  std::set<std::string> out;
+  for (const Chosen* t : terms) out.merge(t->candidate->inputs());
+  if (further) out.merge(further->inputs());
+  return out;
+}
+
 // Candidates read the model's torque as the estimate has it.
-void Diagnosis::Work::FollowEstimate() {
+void Diagnosis::Work::FollowEstimate(const std::set<std::string>& reads) {
   if (evidence.logs.empty()) {
-    for (const auto* d : train) evidence.logs.push_back(MakeQuantities(model, *d, needs_flange));
-  } else if (followed == estimate.x) {
-    return;
+    for (const auto* d : train) evidence.logs.push_back(MakeQuantities(model, *d, all_reads));
+    followed.resize(0);
   }
-  for (Quantities& log : evidence.logs) Follow(model, arm, estimate.x, declared.eta, log);
+  if (followed.size() != estimate.x.size() || followed != estimate.x) followed_reads.clear();
+  std::set<std::string> stale;
+  std::set_difference(reads.begin(), reads.end(), followed_reads.begin(), followed_reads.end(),
+                      std::inserter(stale, stale.end()));
+  if (stale.empty()) return;
+  for (Quantities& log : evidence.logs) Follow(model, arm, estimate.x, declared.eta, stale, log);
   followed = estimate.x;
+  followed_reads.merge(stale);
 }
 
 // What of the declared model's rows no estimate changes; coordinates declared.active.
@@ -106,7 +119,7 @@ VectorXd Diagnosis::Work::SlopeOverModelTorque(const std::vector<const Chosen*>&
 void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   const int active = static_cast<int>(declared.active.size());
   const auto follows = [](const Chosen* t) { return t->candidate->record().depends_on_estimate; };
-  if (evidence.logs.empty() || std::any_of(terms.begin(), terms.end(), follows)) FollowEstimate();
+  if (evidence.logs.empty() || std::any_of(terms.begin(), terms.end(), follows)) FollowEstimate(Reads(terms));
   if (model.depends_on_estimate() || regressor.empty()) StartRows();
   rows.mean.resize(active);
   for (int a = 0; a < active; ++a) rows.mean[a] = prior.mean[declared.active[a]];

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <set>
 
 #include "codegen/src/generator/state_path.hpp"
 
@@ -25,11 +24,19 @@ Candidate::Candidate(const codegen::EffectRecord& record, const codegen::Robot& 
       roots.push_back(e);
     }
   tape_ = std::make_unique<codegen::Tape>(*graph_, roots);
+  states_ = codegen::StatesOf(*graph_, roots);
 }
 
 bool Candidate::reads(const std::string& input) const {
   const auto& inputs = record().inputs;
   return std::find(inputs.begin(), inputs.end(), input) != inputs.end();
+}
+
+std::set<std::string> Candidate::inputs() const {
+  std::set<std::string> out(graph_->inputs().begin(), graph_->inputs().end());
+  for (const auto* some : {&joints(), &rows_})
+    for (const int j : *some) out.insert(codegen::InputName("tau_rigid", j));
+  return out;
 }
 
 std::string Candidate::name() const {
@@ -119,7 +126,7 @@ void Candidate::EvaluateUse(const Quantities& quantities, const double* eta, std
   }
   Eigen::MatrixXd path;
   if (!states.empty()) {
-    path = codegen::StatePath(*graph_, states.size(), bindings, samples, quantities.restart);
+    path = codegen::StatePath(*graph_, states.size(), bindings, samples, quantities.restart, states_);
     for (std::size_t k = 0; k < states.size(); ++k)
       bindings[graph_->nodes()[states[k].value.id()].a].column = path.col(static_cast<Eigen::Index>(k)).data();
   }

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,8 @@ class Candidate {
   const codegen::EffectColumn& column(int c) const { return instance_.columns[c % instance_.columns.size()]; }
   const std::vector<int>& rows() const { return rows_; }  // joints whose torque it touches
   bool reads(const std::string& input) const;
+  // Graph inputs that its columns read, and the load of its joints, which a search may ask for.
+  std::set<std::string> inputs() const;
   bool is_curve() const { return record().generic_penalty > 0; }  // fits a form, names no cause
   // At a time of the training log: what one part of a log shows of it says nothing about another part, or another log.
   bool is_event() const { return record().search.how == "window"; }
@@ -66,6 +69,7 @@ class Candidate {
   std::vector<int> rows_;
   std::vector<std::pair<int, int>> root_;  // (column, index into rows_)
   std::unique_ptr<codegen::Tape> tape_;
+  std::vector<char> states_;  // those of the graph that the columns need
 };
 
 // Every record of the catalogue on every joint set it may be tried on, except the friction law and what the model

@@ -43,9 +43,11 @@ calibration::Dataset AsTermsSay(const Diagnosis::Work& w, const calibration::Dat
   return w.delay_s != 0 ? calibration::Delayed(log, w.delay_s) : log;
 }
 
-Quantities AtEstimate(const Diagnosis::Work& w, const calibration::Dataset& log) {
-  Quantities q = MakeQuantities(w.model, log, w.needs_flange);
-  Follow(w.model, w.arm, w.estimate.x, w.declared.eta, q);
+Quantities AtEstimate(const Diagnosis::Work& w, const std::vector<const Chosen*>& terms,
+                      const calibration::Dataset& log) {
+  const std::set<std::string> reads = w.Reads(terms);
+  Quantities q = MakeQuantities(w.model, log, reads);
+  Follow(w.model, w.arm, w.estimate.x, w.declared.eta, reads, q);
   return q;
 }
 
@@ -55,7 +57,7 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
                 std::string* tracking = nullptr) {
   w.Solve(terms);
   const calibration::Dataset seen = AsTermsSay(w, log);
-  const Quantities q = AtEstimate(w, seen);
+  const Quantities q = AtEstimate(w, terms, seen);
   MatrixXd left = log.tau - calibration::Predict(w.model, seen, w.estimate.x, w.declared.eta);
   if (tracking) tracking->clear();
   // Run states are followed in what is left once everything else has been taken off.
@@ -162,6 +164,11 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
   finding.innovation = w.estimate.innovation;
 }
 
+// Whether a term earns its place beside the others, searched again. A delay stays: the logs are as it says now.
+bool StaysIn(const Diagnosis::Work& w, Selector& select, Chosen& term) {
+  return term.delay_s != 0 || select.StillEarns(term, Rivals(w.chosen, term));
+}
+
 }  // namespace
 
 Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
@@ -170,21 +177,25 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   Work& w = *work_;
   if (!narrow.empty()) {
     w.narrow = std::make_unique<Work>(model, codegen::Catalogue{}, std::move(narrow));
-    w.narrow->needs_flange = w.needs_flange;
+    w.narrow->all_reads = w.all_reads;
   }
   Selector select(w);
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);
     ApplyDelay(w);
     // What was found under an effect that nobody had named yet is a little off, and what is off looks like more terms.
-    for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k)
-      if (w.chosen[k].delay_s == 0) (void)select.StillEarns(w.chosen[k], Rivals(w.chosen, w.chosen[k]));
+    for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k) w.chosen[k].earns = StaysIn(w, select, w.chosen[k]);
     w.Polish();
   }
+  // All but the latest have been searched again since it came.
+  bool searched = true;
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
-    // A delay stays: the logs are as it says now.
-    if (w.chosen[k].delay_s != 0 || select.StillEarns(w.chosen[k], Rivals(w.chosen, w.chosen[k]))) ++k;
-    else w.chosen.erase(w.chosen.begin() + static_cast<long>(k));
+    if (searched && k + 1 < w.chosen.size() ? w.chosen[k].earns : StaysIn(w, select, w.chosen[k])) {
+      ++k;
+    } else {
+      w.chosen.erase(w.chosen.begin() + static_cast<long>(k));
+      searched = false;
+    }
   }
   std::sort(w.chosen.begin(), w.chosen.end(),
             [](const Chosen& a, const Chosen& b) { return a.found.score > b.found.score; });
@@ -231,7 +242,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
 std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
   const Work& w = *work_;
   const calibration::Dataset seen = AsTermsSay(w, data);
-  const Quantities q = AtEstimate(w, seen);
+  const Quantities q = AtEstimate(w, Confirmed(w.chosen), seen);
   std::vector<MatrixXd> out;
   std::size_t k = 0;
   for (const Chosen& c : w.chosen) {
@@ -251,7 +262,7 @@ std::vector<calibration::Dataset> Diagnosis::WithoutTerms() const {
   for (const calibration::Dataset* log : w.train) {
     out.push_back(*log);
     if (terms.empty()) continue;
-    const Quantities q = AtEstimate(w, *log);
+    const Quantities q = AtEstimate(w, terms, *log);
     for (std::size_t k = 0; k < terms.size(); ++k)
       out.back().tau -= CandidateTorque(*terms[k]->candidate, q, terms[k]->eta, w.estimate.amplitude[k]);
   }

@@ -28,11 +28,13 @@ Columns Gather(const Candidate& candidate, const std::vector<Quantities>& logs, 
     candidate.Evaluate(logs[log], eta, value);
     for (std::size_t r = 0; r < out.joints.size(); ++r) {
       const RowIndex& index = rows[out.joints[r]];
+      const auto [first, last] = std::equal_range(index.dataset.begin(), index.dataset.end(), static_cast<int>(log));
+      const auto begin = first - index.dataset.begin(), end = last - index.dataset.begin();
       for (int c = 0; c < candidate.columns(eta); ++c) {
         const VectorXd& v = value[c][r];
         if (v.size() == 0) continue;
-        for (int k = 0; k < index.size(); ++k)
-          if (index.dataset[k] == static_cast<int>(log)) out.block[r](k, c) = v[index.sample[k]];
+        double* const to = out.block[r].col(c).data();
+        for (auto k = begin; k < end; ++k) to[k] = v[index.sample[static_cast<std::size_t>(k)]];
       }
     }
   }

@@ -11,9 +11,9 @@ constexpr int kThinnedRows = 2500;  // of a log: a coarse grid needs to see wher
 constexpr double kClearly = 0.9;    // of a joint's noise: below this a found effect was most of what looked like noise
 }  // namespace
 
-Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms) : work_(work) {
+Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms, const Candidate* only) : work_(work) {
   work_.Solve(terms);
-  work_.FollowEstimate();
+  work_.FollowEstimate(only ? work_.Reads(terms, only) : work_.all_reads);
   work_.Prepare(terms);
   thinned_ = std::make_unique<Thinned>(work_.evidence, kThinnedRows);
   thin_rows_ = thinned_->Average(work_.rows);

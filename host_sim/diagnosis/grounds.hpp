@@ -9,8 +9,9 @@ namespace armcal::diagnosis {
 
 class Grounds {
  public:
-  // Fits the base with the given terms and takes its residuals' spread as white noise.
-  Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms);
+  // Fits the base with the given terms and takes its residuals' spread as white noise. only: the one candidate that is
+  // tried on it; null: any.
+  Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms, const Candidate* only = nullptr);
 
   Ground ground() const { return {work_.evidence, *thinned_, *metric_, *thin_metric_}; }
   const Metric& metric() const { return *metric_; }

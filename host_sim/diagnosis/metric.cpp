@@ -29,13 +29,10 @@ void Metric::WhitenJoint(int j) {
   for (std::size_t i = 0; i < columns.size(); ++i) map_[j].row(i) = rows_.L.row(columns[i]);
   q_[j] = WhitenAll(noise_[j], rows_.index[j], rows_.design[j]);
   y_[j] = Whiten(noise_[j], rows_.index[j], rows_.target[j]);
-  if (IsWhite(noise_[j])) {
-    const double weight = 1 / (noise_[j].innovation * noise_[j].innovation);
-    gram_[j] = weight * rows_.gram[j], right_[j] = weight * rows_.right[j];
-    return;
-  }
-  gram_[j] = SelfProduct(q_[j]);
-  right_[j] = q_[j].transpose() * y_[j];
+  const double weight = 1 / (noise_[j].innovation * noise_[j].innovation);
+  const bool white = IsWhite(noise_[j]);
+  gram_[j] = map_[j].transpose() * (white ? MatrixXd(weight * rows_.gram[j]) : SelfProduct(q_[j])) * map_[j];
+  right_[j] = map_[j].transpose() * (white ? VectorXd(weight * rows_.right[j]) : VectorXd(q_[j].transpose() * y_[j]));
 }
 
 void Metric::Solve() {
@@ -43,8 +40,8 @@ void Metric::Solve() {
   MatrixXd hessian = prior_;
   VectorXd right = VectorXd::Zero(d);
   for (int j = 0; j < n; ++j) {
-    hessian += map_[j].transpose() * gram_[j] * map_[j];
-    right += map_[j].transpose() * right_[j];
+    hessian += gram_[j];
+    right += right_[j];
   }
   factor_.compute(hessian);
   z_ = factor_.solve(right);
@@ -101,8 +98,7 @@ Projection Metric::Project(const Columns& c) const {
     const int j = c.joints[r];
     const MatrixXd w = WhitenedColumns(c, static_cast<int>(r));
     p.gram += SelfProduct(w);
-    for (int i = 0; i < k; ++i)  // column by column: a product of so few columns would spend its time copying q
-      p.B.col(i) += map_[j].transpose() * (q_[j].transpose() * w.col(i));
+    p.B += map_[j].transpose() * TallProduct(q_[j], w);
     p.g += w.transpose() * residual_[j];
   }
   return p;

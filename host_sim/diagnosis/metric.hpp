@@ -82,9 +82,9 @@ class Metric {
   const std::vector<NoiseModel>& noise() const { return noise_; }
   const Eigen::VectorXd& z() const { return z_; }
 
-  // chi^2 on each of `folds` interleaved folds of `blocks` blocks, of the base with C fitted to the other folds.
+  // Decrease of chi^2 on each of `folds` interleaved folds of `blocks` blocks, base and C fitted to the other folds.
   // precision: what is known of C's amplitudes; empty: nothing.
-  Eigen::VectorXd OutOfFold(const Columns& c, int blocks, int folds, const Eigen::MatrixXd& precision = {}) const;
+  Eigen::VectorXd FoldGains(const Columns& c, int blocks, int folds, const Eigen::MatrixXd& precision) const;
 
   // Share of the trace C a that lies in the fold which holds most of it: near 1, no other fold can tell of it.
   double LargestFold(const Columns& c, const Eigen::VectorXd& a, int blocks, int folds) const;
@@ -112,8 +112,8 @@ class Metric {
   std::vector<Eigen::MatrixXd> map_;  // [n] rows of L of columns[j]
   std::vector<Eigen::MatrixXd> q_;    // [n] whitened design
   std::vector<Eigen::VectorXd> residual_, y_;
-  std::vector<Eigen::MatrixXd> gram_;   // [n] of q_
-  std::vector<Eigen::VectorXd> right_;  // [n] q_' y_
+  std::vector<Eigen::MatrixXd> gram_;   // [n] of q_ map_
+  std::vector<Eigen::VectorXd> right_;  // [n] (q_ map_)' y_
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Eigen::MatrixXd prior_;
   Eigen::VectorXd z_, bounded_sd_;

@@ -16,7 +16,7 @@ namespace {
 int BlockBegin(int rows, int blocks, int b) { return static_cast<int>(static_cast<long>(rows) * b / blocks); }
 }  // namespace
 
-VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const MatrixXd& precision) const {
+VectorXd Metric::FoldGains(const Columns& c, int blocks, int folds, const MatrixXd& precision) const {
   const int n = rows_.joints(), d = rows_.coordinates(), k = c.count();
   std::vector<MatrixXd> gram(folds, MatrixXd::Zero(d + k, d + k));  // of each fold's own rows
   std::vector<VectorXd> right(folds, VectorXd::Zero(d + k));
@@ -46,22 +46,27 @@ VectorXd Metric::OutOfFold(const Columns& c, int blocks, int folds, const Matrix
     for (int f = 0; f < folds; ++f) gram[f] += map[j].transpose() * own[f] * map[j];
   }
   MatrixXd total = MatrixXd::Zero(d + k, d + k);
-  VectorXd total_right = VectorXd::Zero(d + k), error = VectorXd::Zero(folds);
+  VectorXd total_right = VectorXd::Zero(d + k), gain = VectorXd::Zero(folds);
   for (int f = 0; f < folds; ++f) total += gram[f], total_right += right[f];
   MatrixXd ridge = MatrixXd::Zero(d + k, d + k);
   ridge.topLeftCorner(d, d) = prior_;
   ridge.bottomRightCorner(k, k).diagonal() = 1e-9 * total.bottomRightCorner(k, k).diagonal();
   if (precision.size()) ridge.bottomRightCorner(k, k) += precision;
   for (int f = 0; f < folds; ++f) {
-    const VectorXd x = MatrixXd(total - gram[f] + ridge).ldlt().solve(total_right - right[f]);
+    const MatrixXd others = total - gram[f] + ridge;
+    const VectorXd others_right = total_right - right[f], with = others.ldlt().solve(others_right),
+                   without = others.topLeftCorner(d, d).ldlt().solve(others_right.head(d));
     for (int j = 0; j < n; ++j) {
-      const VectorXd local = map[j] * x;
-      for (const auto& [begin, end] : fold_rows[f][j])
-        error[f] +=
-            (y_[j].segment(begin, end - begin) - extended[j].middleRows(begin, end - begin) * local).squaredNorm();
+      const VectorXd own = map_[j] * without, extended_own = map[j] * with;
+      for (const auto& [begin, end] : fold_rows[f][j]) {
+        const int rows = end - begin;
+        const auto y = y_[j].segment(begin, rows);
+        gain[f] += (y - q_[j].middleRows(begin, rows) * own).squaredNorm() -
+                   (y - extended[j].middleRows(begin, rows) * extended_own).squaredNorm();
+      }
     }
   }
-  return error;
+  return gain;
 }
 
 double Metric::LargestFold(const Columns& c, const VectorXd& a, int blocks, int folds) const {
@@ -106,8 +111,8 @@ double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_n
   for (int j = 0; j < rows_.joints(); ++j) {
     const auto at = std::find(c.joints.begin(), c.joints.end(), j);
     if (at == c.joints.end()) {
-      h.topLeftCorner(d, d) += map_[j].transpose() * gram_[j] * map_[j];
-      b.head(d) += map_[j].transpose() * right_[j];
+      h.topLeftCorner(d, d) += gram_[j];
+      b.head(d) += right_[j];
       continue;
     }
     const std::size_t r = static_cast<std::size_t>(at - c.joints.begin());

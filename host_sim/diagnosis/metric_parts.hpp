@@ -1,7 +1,7 @@
 // diagnosis - small pieces that every part of a metric uses.
 #pragma once
 
-#include "host_sim/calibration/self_product.hpp"
+#include "host_sim/calibration/tall_product.hpp"
 #include "host_sim/diagnosis/metric.hpp"
 
 namespace armcal::diagnosis {
@@ -10,6 +10,6 @@ namespace armcal::diagnosis {
 Gain SolveGain(const Eigen::LLT<Eigen::MatrixXd>& base, const Projection& p);
 
 Eigen::MatrixXd WhitenAll(const NoiseModel& noise, const RowIndex& rows, const Eigen::MatrixXd& m);
-using calibration::SelfProduct;
+using calibration::SelfProduct, calibration::TallProduct;
 
 }  // namespace armcal::diagnosis

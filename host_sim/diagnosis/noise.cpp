@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "codegen/src/generator/vector_units.hpp"
+
 namespace armcal::diagnosis {
 
 using Eigen::VectorXd;
@@ -15,6 +17,24 @@ std::vector<int> PlaceInSegment(const RowIndex& rows) {
   std::vector<int> place(rows.size());
   for (int k = 0; k < rows.size(); ++k) place[k] = rows.segment_begin[k] ? 0 : place[k - 1] + 1;
   return place;
+}
+
+// A stretch without gaps; leaves out[0 .. kArOrder) as it is.
+ARMCAL_VECTOR_UNITS("avx2")
+void WhitenStretch(const NoiseModel& noise, const double* v, int count, double* out) {
+  const double* const a = noise.a.data();
+  int k = kArOrder;
+  for (; k + codegen::kLanes <= count; k += codegen::kLanes) {
+    codegen::Lanes sum = codegen::LanesAt(v + k);
+#pragma GCC unroll 8
+    for (int i = 0; i < kArOrder; ++i) sum -= a[i] * codegen::LanesAt(v + k - 1 - i);
+    *reinterpret_cast<codegen::Lanes*>(out + k) = sum / noise.innovation;
+  }
+  for (; k < count; ++k) {
+    double sum = v[k];
+    for (int i = 0; i < kArOrder; ++i) sum -= a[i] * v[k - 1 - i];
+    out[k] = sum / noise.innovation;
+  }
 }
 
 }  // namespace
@@ -54,17 +74,11 @@ NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
 
 VectorXd Whiten(const NoiseModel& noise, const RowIndex& rows, const Eigen::Ref<const VectorXd>& v) {
   if (IsWhite(noise)) return v / noise.innovation;
-  VectorXd out(v.size());
-  int place = 0;
-  for (int k = 0; k < rows.size(); ++k) {
-    place = rows.segment_begin[k] ? 0 : place + 1;
-    if (place < kArOrder) {
-      out[k] = 0;
-      continue;
-    }
-    double sum = v[k];
-    for (int i = 0; i < kArOrder; ++i) sum -= noise.a[i] * v[k - 1 - i];
-    out[k] = sum / noise.innovation;
+  VectorXd out = VectorXd::Zero(v.size());
+  for (int begin = 0, end = 0; begin < rows.size(); begin = end) {
+    end = begin + 1;
+    while (end < rows.size() && !rows.segment_begin[end]) ++end;
+    WhitenStretch(noise, v.data() + begin, end - begin, out.data() + begin);
   }
   return out;
 }

@@ -70,9 +70,7 @@ Found Searcher::Finish(const Found& rough) {
   best_ = rough;
   best_.rough = false, best_.gain = Gain{};
   Consider(rough.eta);
-  const std::string& how = c_.record().search.how;
-  if (how == "onset") RefineBest(0.5 / kOnsetGrid / (1 << kOnsetHalvings), 2);
-  else if (how == "profile" && !c_.unknowns().empty() && Promising()) RefineBest(GridStep() / 16, 1);
+  if (c_.record().search.how == "profile" && !c_.unknowns().empty() && Promising()) RefineBest(GridStep() / 16, 1);
   return Scored();
 }
 
@@ -80,14 +78,15 @@ Found Searcher::Scored() const {
   Found f = best_;
   f.penalty = PenaltyOf(f.gain.rank + f.searched, c_, e_);
   if (f.gain.gain > 0 && c_.is_curve() && c_.record().search.how == "spline")
-    f.penalty = f.gain.gain - metric().CurveEvidence(metric().Project(Gather(f.eta)), &f.precision);
+    f.penalty = f.gain.gain - metric().CurveEvidence(seen_, &f.precision);
   f.score = Score(f, f.gain.gain);
   return f;
 }
 
 double Searcher::Consider(const std::vector<double>& eta) {
-  const Gain g = Try(eta);
-  if (g.gain > best_.gain.gain) best_.gain = g, best_.eta = eta;
+  Projection projection = metric().Project(Gather(eta));
+  const Gain g = Value(projection);
+  if (g.gain > best_.gain.gain) best_.gain = g, best_.eta = eta, seen_ = std::move(projection);
   return g.gain;
 }
 

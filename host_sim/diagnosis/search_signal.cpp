@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 namespace {
 
 // Of the gain that a score above zero needs: a peak between two bins shows less than it has.
-constexpr double kWorthATry = 0.3;
+constexpr double kWorthATry = 0.6;
 constexpr int kCells = 64, kKnots = 8;  // of a signal's range; of a spline, as its record has them
 constexpr int kNarrowest = kCells / 8;  // one cell a knot
 
@@ -114,12 +114,13 @@ void Searcher::Spline() {
   const auto [first, last] = WidestGain(product, square);
   if (Consider(over_all) < chance && last - first == kCells) return void(best_.gain = Gain{});
   const Found all = Scored();
+  const Projection seen_over_all = seen_;
   if (last - first == kCells) return;
   best_.searched = 2;
   best_.tried = 4.0 * kCells / kNarrowest;
   best_.gain = Gain{};
   Consider({lo + range * first / kCells, lo + range * last / kCells});
-  if (Scored().score < all.score) best_ = all;
+  if (Scored().score < all.score) best_ = all, seen_ = seen_over_all;
 }
 
 }  // namespace armcal::diagnosis

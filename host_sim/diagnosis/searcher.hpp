@@ -45,7 +45,7 @@ class Searcher {
   // Gauss-Newton, unknowns in unit coordinates: a pattern search would creep along a valley.
   std::vector<double> Climb(std::vector<double> eta) const;
   static constexpr int kOnsetGrid = 12;     // cells of the log's time
-  static constexpr int kOnsetHalvings = 5;  // of half a cell, in the rough search
+  static constexpr int kOnsetHalvings = 7;  // of half a cell: a few hundredths of a second
   double GridStep() const { return 0.5 / (c_.record().search.grid - 1); }
 
   void Profile();   // search.cpp
@@ -59,6 +59,7 @@ class Searcher {
   const Ground& g_;
   const Evidence& e_;
   Found best_;
+  Projection seen_;  // of the best
 };
 
 // A signal of the candidate's joint j ("q", "abs(qd)") or of its other one ("q[k]") in the rows of joint j.

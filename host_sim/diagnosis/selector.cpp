@@ -67,7 +67,7 @@ bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chose
 }
 
 bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
-  const Grounds grounds(w_, others);
+  const Grounds grounds(w_, others, term.candidate);
   Found f = Finish(SearchCandidate(*term.candidate, grounds.ground()), grounds.ground());
   if (f.gain.gain <= 0) return false;
   Rescore(grounds, f);
@@ -149,7 +149,7 @@ bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Cho
   if (!w_.narrow) return true;
   Diagnosis::Work& narrow = *w_.narrow;
   narrow.estimate = w_.estimate;
-  narrow.FollowEstimate();
+  narrow.FollowEstimate(w_.Reads(terms, f.candidate));
   narrow.Prepare(terms);
   const Metric metric(narrow.rows, noise);
   const Columns c = GatherColumns(*f.candidate, narrow.evidence, f.eta);
@@ -178,8 +178,7 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   (void)grounds.metric().RefittedDeviance(c, &noise);
   const Metric metric(w_.rows, noise);
   const Gain gain = metric.Try(c);
-  const VectorXd folds =
-      metric.OutOfFold(Columns{}, kBlocks, kFolds) - metric.OutOfFold(c, kBlocks, kFolds, f.precision);
+  const VectorXd folds = metric.FoldGains(c, kBlocks, kFolds, f.precision);
   const bool holds = folds.sum() > kKeepsOutOfFold * gain.gain && (folds.array() > 0).count() >= kFoldsThatImprove;
   const bool once = std::find(bursts_.begin(), bursts_.end(), f.candidate) != bursts_.end();
   if (!holds && !f.candidate->is_event() && !once) {

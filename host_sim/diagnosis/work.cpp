@@ -25,19 +25,28 @@ std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Ch
   return out;
 }
 
-Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, bool flange) {
+namespace {
+bool AnyStartsWith(const std::set<std::string>& names, const std::string& begin) {
+  const auto first = names.lower_bound(begin);
+  return first != names.end() && first->starts_with(begin);
+}
+}  // namespace
+
+Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data,
+                          const std::set<std::string>& reads) {
   Quantities out;
   out.data = &data;
   out.dt = codegen::SampleSteps(data.s.t, data.samples(), 0, out.restart);
-  if (flange) model.BodyColumns(data.s, model.joints() - 1, out.flange);
+  if (AnyStartsWith(reads, "Y")) model.BodyColumns(data.s, model.joints() - 1, out.flange);
   return out;
 }
 
 void Follow(const codegen::Model& model, const codegen::ArmTorque& arm, const VectorXd& x,
-            const std::vector<double>& eta, Quantities& quantities) {
+            const std::vector<double>& eta, const std::set<std::string>& reads, Quantities& quantities) {
   const calibration::Dataset& data = *quantities.data;
-  quantities.parts = arm.Evaluate(data.s, {x.data() + model.front(), static_cast<std::size_t>(model.rigid())});
-  quantities.tau_model = calibration::Predict(model, data, x, eta);
+  arm.Evaluate(data.s, {x.data() + model.front(), static_cast<std::size_t>(model.rigid())}, reads, quantities.parts);
+  if (AnyStartsWith(reads, "tau_model") || AnyStartsWith(reads, "tau_delayed"))
+    quantities.tau_model = calibration::Predict(model, data, x, eta);
 }
 
 MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities, const std::vector<double>& eta,
@@ -67,7 +76,7 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
   for (const auto& e : model.effects())
     for (const auto& p : model.table())
       if (p.effect == e.record->name && p.state == "standby") standby.push_back(p.effect);
-  for (const auto& c : candidates) needs_flange = needs_flange || c->reads("Y");
+  for (const auto& c : candidates) all_reads.merge(c->inputs());
   evidence.model = &model;
   IndexRows();
 }

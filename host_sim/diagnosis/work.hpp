@@ -13,6 +13,7 @@ struct Chosen {
   Eigen::VectorXd folds;
   std::vector<std::string> also_fits;
   std::vector<Rival> rivals;
+  bool earns = true;  // its place beside the others, as last seen
   bool confirmed = true;
   double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
 };
@@ -41,6 +42,10 @@ struct Diagnosis::Work {
   };
   std::vector<Deviation> Deviations(const std::vector<const Chosen*>& terms);
 
+  // What these terms read, and a candidate beside them.
+  std::set<std::string> Reads(const std::vector<const Chosen*>& terms, const Candidate* further = nullptr) const;
+  // The evidence's model torque and its parts at the estimate, as far as something reads them.
+  void FollowEstimate(const std::set<std::string>& reads);
   // Refreshes base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
   Eigen::VectorXd SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j);
@@ -49,7 +54,6 @@ struct Diagnosis::Work {
   void AlignLogs();
   void SetDelay(double by_s);
   void IndexRows();
-  void FollowEstimate();
   void StartRows();
   void FillDeclared(int j);
   bool FillGain(int j);
@@ -71,17 +75,19 @@ struct Diagnosis::Work {
   std::vector<Chosen> chosen;
   std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept where it does not hang on the estimate
   std::vector<char> bent;                               // [joint] 1: its declared rows must be filled anew
-  Eigen::VectorXd followed;                             // the estimate that the evidence is at
+  Eigen::VectorXd followed;                             // the estimate that the evidence is at ...
+  std::set<std::string> followed_reads;                 // ... in these
   std::vector<std::string> standby;                     // records compiled in, not yet estimated
-  bool needs_flange = false;
+  std::set<std::string> all_reads;                      // of all candidates
   std::unique_ptr<Work> narrow;  // the same logs at a lower bandwidth, without candidates of its own
 };
 
-// What no estimate changes: steps, and the last body's columns if they are asked for.
-Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data, bool flange);
-// Model torque and its parts at x.
+// What no estimate changes: steps, and the last body's columns if something reads them.
+Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data,
+                          const std::set<std::string>& reads);
+// Model torque and its parts at x, as far as something reads them.
 void Follow(const codegen::Model& model, const codegen::ArmTorque& arm, const Eigen::VectorXd& x,
-            const std::vector<double>& eta, Quantities& quantities);
+            const std::vector<double>& eta, const std::set<std::string>& reads, Quantities& quantities);
 
 // Torque of a candidate with given parameters on a dataset, N x n.
 Eigen::MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities,

@@ -6,7 +6,7 @@
 namespace armcal::codegen {
 
 template <class T>
-T ApplyOp(Op op, T a, T b) {
+inline __attribute__((always_inline)) T ApplyOp(Op op, T a, T b) {
   using std::abs, std::cbrt, std::cos, std::exp, std::log, std::pow, std::sin, std::sqrt, std::tanh;
   switch (op) {
     case Op::kNegate:

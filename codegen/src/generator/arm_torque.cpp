@@ -7,23 +7,29 @@ namespace armcal::codegen {
 
 ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
   const Robot& robot = model.robot();
-  std::vector<Expr> roots;
-  const auto add = [&](const BodyRows& rows) {
-    for (int i = 0; i < joints_; ++i) roots.push_back(BaseTorque(graph_, rows, model.base_columns(), i));
+  const auto add = [&](const BodyRows& rows, const auto& name) {
+    for (int i = 0; i < joints_; ++i) part_.push_back({name(i), BaseTorque(graph_, rows, model.base_columns(), i)});
   };
-  add(BodyRegressor(graph_, robot));
-  add(BodyRegressor(graph_, robot, false));
-  for (int j = 0; j < joints_; ++j) add(AccelerationRows(graph_, robot, j));
+  add(BodyRegressor(graph_, robot), [](int i) { return InputName("tau_rigid", i); });
+  add(BodyRegressor(graph_, robot, false), [](int i) { return InputName("tau_gravity", i); });
+  for (int j = 0; j < joints_; ++j)
+    add(AccelerationRows(graph_, robot, j), [j](int i) { return EntryName("M", i, j); });
   for (int axis = 0; axis < 3; ++axis) {
     Robot tilted = robot;
     tilted.gravity_mps2 = {};
     tilted.gravity_mps2[axis] = 1;
-    add(BodyRegressor(graph_, tilted, false));
+    add(BodyRegressor(graph_, tilted, false), [axis](int i) { return EntryName("G", i, axis); });
   }
-  tape_ = std::make_unique<Tape>(graph_, roots);
 }
 
-TorqueParts ArmTorque::Evaluate(const Signals& s, std::span<const double> base) const {
+std::set<std::string> ArmTorque::names() const {
+  std::set<std::string> out;
+  for (const Part& p : part_) out.insert(p.name);
+  return out;
+}
+
+void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const std::set<std::string>& wanted,
+                         TorqueParts& out) const {
   const int n = joints_, samples = s.samples();
   std::vector<Binding> bindings;
   for (const std::string& input : graph_.inputs()) {
@@ -35,19 +41,24 @@ TorqueParts ArmTorque::Evaluate(const Signals& s, std::span<const double> base) 
     else b.column = (quantity == "q" ? s.q : quantity == "qd" ? s.qd : s.qdd).col(number - 1).data();
     bindings.push_back(b);
   }
-  TorqueParts out;
   out.rigid.resize(samples, n), out.gravity.resize(samples, n);
-  out.mass.assign(n, std::vector<Eigen::VectorXd>(n, Eigen::VectorXd(samples)));
-  out.tilt.assign(n, std::vector<Eigen::VectorXd>(3, Eigen::VectorXd(samples)));
-  std::vector<double*> target;
-  for (int i = 0; i < n; ++i) target.push_back(out.rigid.col(i).data());
-  for (int i = 0; i < n; ++i) target.push_back(out.gravity.col(i).data());
+  out.mass.resize(n, std::vector<Eigen::VectorXd>(n)), out.tilt.resize(n, std::vector<Eigen::VectorXd>(3));
+  std::vector<double*> place;
+  for (int i = 0; i < n; ++i) place.push_back(out.rigid.col(i).data());
+  for (int i = 0; i < n; ++i) place.push_back(out.gravity.col(i).data());
+  const auto entry = [&](Eigen::VectorXd& v) {
+    v.resize(samples);
+    place.push_back(v.data());
+  };
   for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) target.push_back(out.mass[i][j].data());
+    for (int i = 0; i < n; ++i) entry(out.mass[i][j]);
   for (int axis = 0; axis < 3; ++axis)
-    for (int i = 0; i < n; ++i) target.push_back(out.tilt[i][axis].data());
-  tape_->Evaluate(bindings, samples, target);
-  return out;
+    for (int i = 0; i < n; ++i) entry(out.tilt[i][axis]);
+  std::vector<Expr> roots;
+  std::vector<double*> target;
+  for (std::size_t k = 0; k < part_.size(); ++k)
+    if (wanted.contains(part_[k].name)) roots.push_back(part_[k].value), target.push_back(place[k]);
+  Tape(graph_, roots).Evaluate(bindings, samples, target);
 }
 
 }  // namespace armcal::codegen

@@ -2,6 +2,8 @@
 // effect.
 #pragma once
 
+#include <set>
+
 #include "codegen/src/generator/model.hpp"
 
 namespace armcal::codegen {
@@ -18,13 +20,20 @@ class ArmTorque {
  public:
   explicit ArmTorque(const Model& model);
 
-  // base: values of the model's base parameters.
-  TorqueParts Evaluate(const Signals& s, std::span<const double> base) const;
+  // base: values of the model's base parameters. wanted: parts, by the names of the graph inputs that stand for them
+  // (QuantitiesAsInputs); other names there mean nothing here, other parts are left as they are.
+  void Evaluate(const Signals& s, std::span<const double> base, const std::set<std::string>& wanted,
+                TorqueParts& out) const;
+  std::set<std::string> names() const;  // of all parts
 
  private:
+  struct Part {
+    std::string name;
+    Expr value;
+  };
   int joints_;
   Graph graph_;
-  std::unique_ptr<Tape> tape_;
+  std::vector<Part> part_;  // in the order of TorqueParts
 };
 
 }  // namespace armcal::codegen

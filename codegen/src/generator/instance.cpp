@@ -168,15 +168,14 @@ void MakeStates(Graph& g, const EffectRecord& record, const std::string& prefix,
 }  // namespace
 
 ModelQuantities QuantitiesAsInputs(Graph& graph) {
-  return {[&graph](int j) { return graph.Input(InputName("tau_rigid", j)); },
-          [&graph](int j) { return graph.Input(InputName("tau_gravity", j)); },
-          [&graph](int row, int body, int p) {
-            return graph.Input("Y" + std::to_string(row) + "_" + std::to_string(body) + "_" + std::to_string(p));
-          },
-          [&graph](int row, int j) { return graph.Input("M" + std::to_string(row) + "_" + std::to_string(j)); },
-          [&graph](int row, int axis) { return graph.Input("G" + std::to_string(row) + "_" + std::to_string(axis)); },
-          [&graph](int j) { return graph.Input(InputName("tau_model", j)); },
-          [&graph](int j) { return graph.Input(InputName("tau_delayed", j)); }};
+  return {
+      [&graph](int j) { return graph.Input(InputName("tau_rigid", j)); },
+      [&graph](int j) { return graph.Input(InputName("tau_gravity", j)); },
+      [&graph](int row, int body, int p) { return graph.Input(EntryName("Y", row, body) + "_" + std::to_string(p)); },
+      [&graph](int row, int j) { return graph.Input(EntryName("M", row, j)); },
+      [&graph](int row, int axis) { return graph.Input(EntryName("G", row, axis)); },
+      [&graph](int j) { return graph.Input(InputName("tau_model", j)); },
+      [&graph](int j) { return graph.Input(InputName("tau_delayed", j)); }};
 }
 
 std::vector<std::vector<int>> JointSets(const EffectRecord& record, int n) {

@@ -21,10 +21,13 @@ Eigen::VectorXd SampleSteps(const Eigen::VectorXd& t, int samples, double usual,
 // The steps as an input: one value if all are equal.
 Binding BindSteps(const Eigen::VectorXd& dt);
 
+// Which of the graph's states these roots hang on, the states that those need included: one flag a state.
+std::vector<char> StatesOf(const Graph& graph, const std::vector<Expr>& roots);
+
 // The first `count` states over a log: [samples x count], the value that each sample starts from (what the graph's
 // state inputs stand for). bindings: one per graph input; those of the states are not read. restart[k] != 0: sample k
-// starts anew. Samples must be in order.
+// starts anew. wanted: one flag a state, the others stay zero; empty: all. Samples must be in order.
 Eigen::MatrixXd StatePath(const Graph& graph, std::size_t count, std::span<const Binding> bindings, int samples,
-                          std::span<const char> restart);
+                          std::span<const char> restart, std::vector<char> wanted = {});
 
 }  // namespace armcal::codegen

@@ -4,11 +4,15 @@
 #include <algorithm>
 #include <cmath>
 
-// One binary for every PC: the widest vectors that the machine has. Without contraction all give the same bits.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__)
-#define WIDEST_VECTORS __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define WIDEST_VECTORS
+#include "codegen/src/generator/vector_units.hpp"
+
+// The C library's vector functions are good to a few last bits.
+#if defined(__x86_64__) && defined(__GLIBC__) && !defined(__clang__)
+#define HAS_VECTOR_FORM extern "C" __attribute__((simd("notinbranch")))
+HAS_VECTOR_FORM double sin(double) noexcept;
+HAS_VECTOR_FORM double cos(double) noexcept;
+HAS_VECTOR_FORM double exp(double) noexcept;
+HAS_VECTOR_FORM double tanh(double) noexcept;
 #endif
 
 namespace armcal::codegen {
@@ -23,7 +27,8 @@ inline __attribute__((always_inline)) void ApplyTo(const double* __restrict a, c
 }
 
 // z = a op b over one block. Lanes differ. One loop an operation: the compiler vectorises those that it can.
-WIDEST_VECTORS void ApplyToBlock(Op op, const double* a, const double* b, double* z) {
+ARMCAL_VECTOR_UNITS("avx512f", "avx2")
+void ApplyToBlock(Op op, const double* a, const double* b, double* z) {
   switch (op) {
     case Op::kNegate:
       return ApplyTo<Op::kNegate>(a, b, z);
@@ -35,6 +40,14 @@ WIDEST_VECTORS void ApplyToBlock(Op op, const double* a, const double* b, double
       return ApplyTo<Op::kMultiply>(a, b, z);
     case Op::kDivide:
       return ApplyTo<Op::kDivide>(a, b, z);
+    case Op::kSin:
+      return ApplyTo<Op::kSin>(a, b, z);
+    case Op::kCos:
+      return ApplyTo<Op::kCos>(a, b, z);
+    case Op::kExp:
+      return ApplyTo<Op::kExp>(a, b, z);
+    case Op::kTanh:
+      return ApplyTo<Op::kTanh>(a, b, z);
     case Op::kSqrt:
       return ApplyTo<Op::kSqrt>(a, b, z);
     case Op::kAbs:
@@ -119,15 +132,17 @@ void Tape::ForEachBlock(std::span<const Binding> bindings, int samples, const Vi
     else if (s.op == Op::kInput) std::fill_n(lane(k), kBlock, bindings[s.a].value);
     else std::fill_n(lane(k), kBlock, ApplyOp<double>(s.op, *lane(s.a), s.b < 0 ? 0 : *lane(s.b)));
   }
-  std::vector<const double*> root;
-  for (const int r : root_) root.push_back(lane(r));
+  std::vector<const double*> at(step_.size()), root(root_.size());  // each step's block
+  for (std::size_t k = 0; k < step_.size(); ++k) at[k] = lane(static_cast<int>(k));
   for (int begin = 0; begin < samples; begin += kBlock) {
     const int count = std::min(kBlock, samples - begin);
     for (const int k : varying) {
       const Node& s = step_[k];
-      if (s.op == Op::kInput) std::copy_n(bindings[s.a].column + begin, count, lane(k));
-      else ApplyToBlock(s.op, lane(s.a), s.b < 0 ? lane(s.a) : lane(s.b), lane(k));
+      if (s.op != Op::kInput) ApplyToBlock(s.op, at[s.a], at[s.b < 0 ? s.a : s.b], lane(k));
+      else if (count == kBlock) at[k] = bindings[s.a].column + begin;
+      else at[k] = std::copy_n(bindings[s.a].column + begin, count, lane(k)) - count;
     }
+    for (std::size_t r = 0; r < root.size(); ++r) root[r] = at[root_[r]];
     visit(begin, count, root);
   }
 }

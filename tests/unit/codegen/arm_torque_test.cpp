@@ -18,6 +18,7 @@ class ArmTorqueOf : public testing::TestWithParam<const char*> {
   ArmTorqueOf()
       : robot_(codegen::ReadRobot(std::string("codegen/robots/") + GetParam() + ".toml")),
         model_(robot_, codegen::ReadCatalogue("codegen/effects")),
+        arm_(model_),
         bodies_(model_.body_parameters()) {
     for (int p = 0; p < bodies_.size(); ++p) bodies_[p] = model_.table()[p].mean;
     std::mt19937_64 random(11);
@@ -27,9 +28,14 @@ class ArmTorqueOf : public testing::TestWithParam<const char*> {
     s_.t = VectorXd::LinSpaced(kSamples, 0, 1);
   }
   int n() const { return robot_.joints(); }
-  codegen::TorqueParts Parts(const VectorXd& bodies) const {
+  void Evaluate(const VectorXd& bodies, const std::set<std::string>& wanted, codegen::TorqueParts& out) const {
     const VectorXd base = model_.base_map() * bodies;
-    return codegen::ArmTorque(model_).Evaluate(s_, {base.data(), static_cast<std::size_t>(base.size())});
+    arm_.Evaluate(s_, {base.data(), static_cast<std::size_t>(base.size())}, wanted, out);
+  }
+  codegen::TorqueParts Parts(const VectorXd& bodies) const {
+    codegen::TorqueParts out;
+    Evaluate(bodies, arm_.names(), out);
+    return out;
   }
   // Relative to the largest torque; every part of every sample.
   double Error(const codegen::TorqueParts& parts) const {
@@ -73,6 +79,7 @@ class ArmTorqueOf : public testing::TestWithParam<const char*> {
   static constexpr int kSamples = 25;
   codegen::Robot robot_;
   codegen::Model model_;
+  codegen::ArmTorque arm_;
   VectorXd bodies_;
   codegen::Signals s_;
 };
@@ -86,6 +93,20 @@ TEST_P(ArmTorqueOf, KdlsBodies_IsKdlsTorquePartByPart) {
   codegen::TorqueParts exchanged = Parts(bodies_);
   for (auto& row : exchanged.tilt) std::swap(row[0], row[1]);
   EXPECT_GT(Error(exchanged), 1e-4);
+}
+
+TEST_P(ArmTorqueOf, SomeParts_AreThoseAloneThatChange) {
+  const codegen::TorqueParts before = Parts(bodies_), after = Parts(2 * bodies_);
+  codegen::TorqueParts some = before;
+  Evaluate(2 * bodies_, {"tau_gravity2", "M1_0", "G1_2", "tau_model1"}, some);
+  codegen::TorqueParts expected = before;
+  expected.gravity.col(1) = after.gravity.col(1);
+  expected.mass[1][0] = after.mass[1][0], expected.tilt[1][2] = after.tilt[1][2];
+  EXPECT_EQ(some.rigid, expected.rigid);
+  EXPECT_EQ(some.gravity, expected.gravity);
+  EXPECT_EQ(some.mass, expected.mass);
+  EXPECT_EQ(some.tilt, expected.tilt);
+  EXPECT_NE(some.mass, before.mass);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ArmTorqueOf, testing::Values("two_link", "er20_like", "ur10"));

@@ -128,6 +128,28 @@ TEST(Memory, Previous_IsTheSampleBefore_AtTheFirstItself) {
   for (std::size_t k = 2; k < y.size(); ++k) EXPECT_EQ(twice[k], 2 * kSignal[k - 2]);
 }
 
+TEST(Memory, States_AreThoseThatAnExpressionHangsOn_OthersAreNotRun) {
+  Graph g;
+  g.Input("x"), g.Input("p"), g.Input("dt");
+  const Expr slow = Parse(g, "lowpass(previous(x), p)");
+  const std::size_t own = g.states().size();
+  const Expr other = Parse(g, "previous(x*x)");
+  ASSERT_EQ(own, 2u);
+  ASSERT_EQ(g.states().size(), 3u);
+  EXPECT_EQ(codegen::StatesOf(g, {slow}), (std::vector<char>{1, 1, 0}));
+  EXPECT_EQ(codegen::StatesOf(g, {other}), (std::vector<char>{0, 0, 1}));
+  EXPECT_EQ(codegen::StatesOf(g, {g.Input("x")}), (std::vector<char>{0, 0, 0}));
+  std::vector<Binding> bindings(g.inputs().size());
+  bindings[0].column = kSignal.data(), bindings[1].value = 0.02, bindings[2].value = 0.01;
+  const std::vector<char> restart(kSignal.size(), 0);
+  const int samples = static_cast<int>(kSignal.size());
+  const auto all = codegen::StatePath(g, 3, bindings, samples, restart);
+  const auto some = codegen::StatePath(g, 3, bindings, samples, restart, {1, 1, 0});
+  EXPECT_EQ(some.leftCols(2), all.leftCols(2));
+  EXPECT_EQ(some.col(2).norm(), 0);
+  for (int k = 1; k < samples; ++k) EXPECT_EQ(all(k, 2), kSignal[k - 1] * kSignal[k - 1]);
+}
+
 TEST(Memory, LongRun_IsTheRecursionByHand_AndStartsAnewWhereItIsBroken) {
   std::vector<double> x(203);
   for (std::size_t k = 0; k < x.size(); ++k) x[k] = std::sin(0.3 * static_cast<double>(k));

@@ -23,8 +23,8 @@ struct ShortRun {
       : arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 3),
         torque(arm.model()),
         data(arm.Run(seconds, 30)),
-        q(MakeQuantities(arm.model(), data, true)) {
-    Follow(arm.model(), torque, arm.truth(), {}, q);
+        q(MakeQuantities(arm.model(), data, torque.names())) {
+    Follow(arm.model(), torque, arm.truth(), {}, torque.names(), q);
   }
   MatrixXd Zero() const { return MatrixXd::Zero(data.samples(), kJoints); }
 

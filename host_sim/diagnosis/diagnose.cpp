@@ -1,11 +1,9 @@
-// diagnosis - adds terms one at a time, prunes them, judges them on the held-out log.
+// diagnosis - adds terms one at a time, prunes them, writes down what was found.
 #include "host_sim/diagnosis/diagnose.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "host_sim/calibration/delay.hpp"
-#include "host_sim/diagnosis/run_state.hpp"
 #include "host_sim/diagnosis/selector.hpp"
 #include "host_sim/diagnosis/work.hpp"
 
@@ -17,17 +15,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kMaxTerms = 4;
-constexpr double kWorse = 1.005;  // held-out: what gets worse by more refutes a term
-constexpr double kTried = 10;     // members of a usual grid, for what would just have been seen
-
-// What a term must stand beside: not the curves over its joints, which may take its place but cannot tell its cause.
-std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chosen& term) {
-  std::vector<const Chosen*> out = Confirmed(chosen, &term);
-  if (term.candidate->is_curve()) return out;
-  std::erase_if(
-      out, [&](const Chosen* c) { return c->candidate->is_curve() && c->candidate->rows() == term.candidate->rows(); });
-  return out;
-}
+constexpr double kTried = 10;  // members of a usual grid, for what would just have been seen
 
 // Delays the logs by what the latest term says of them.
 void ApplyDelay(Diagnosis::Work& w) {
@@ -38,94 +26,6 @@ void ApplyDelay(Diagnosis::Work& w) {
   w.AlignLogs();
 }
 
-// A log as the confirmed terms say that it was measured.
-calibration::Dataset AsTermsSay(const Diagnosis::Work& w, const calibration::Dataset& log) {
-  return w.delay_s != 0 ? calibration::Delayed(log, w.delay_s) : log;
-}
-
-Quantities AtEstimate(const Diagnosis::Work& w, const std::vector<const Chosen*>& terms,
-                      const calibration::Dataset& log) {
-  const std::set<std::string> reads = w.Reads(terms);
-  Quantities q = MakeQuantities(w.model, log, reads);
-  Follow(w.model, w.arm, w.estimate.x, w.declared.eta, reads, q);
-  return q;
-}
-
-// What the declared model with these terms leaves of another log, [N x n]; w keeps their estimate. tracking: how run
-// states among them were followed.
-MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
-                std::string* tracking = nullptr) {
-  w.Solve(terms);
-  const calibration::Dataset seen = AsTermsSay(w, log);
-  const Quantities q = AtEstimate(w, terms, seen);
-  MatrixXd left = log.tau - calibration::Predict(w.model, seen, w.estimate.x, w.declared.eta);
-  if (tracking) tracking->clear();
-  // Run states are followed in what is left once everything else has been taken off.
-  for (const bool run_states : {false, true})
-    for (std::size_t k = 0; k < terms.size(); ++k) {
-      const Chosen& c = *terms[k];
-      const bool is_run_state = c.candidate->record().kind_class == "run_state";
-      if (c.candidate->is_event() || is_run_state != run_states) continue;
-      if (!is_run_state) {
-        left -= CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[k]);
-        continue;
-      }
-      const auto& t = w.train[0]->s.t;
-      const RunState state = MakeRunState(*c.candidate, c.eta, w.estimate.amplitude[k], t[t.size() - 1] - t[0]);
-      left -= Track(state, q, left, w.estimate.sigma);
-      if (tracking) *tracking = "run states followed one step ahead; delay one sample";
-    }
-  return left;
-}
-
-// Whether these errors with a term refute it beside those without it: those of a joint of its own, or all together.
-std::optional<Refutation> Worse(const Chosen& term, const VectorXd& with, const VectorXd& without) {
-  const VectorXd change = (with.array().max(1e-12) / without.array().max(1e-12)).log();
-  const auto& own = term.candidate->rows();
-  const auto worst = std::max_element(own.begin(), own.end(), [&](int a, int b) { return change[a] < change[b]; });
-  if (worst != own.end() && change[*worst] > std::log(kWorse))
-    return Refutation{*worst, false, std::exp(change[*worst]), with, without};
-  // All joints: the base fit moves with every term, and where more is missing one joint's gain is another's loss.
-  if (change.sum() > std::log(kWorse)) return Refutation{-1, false, std::exp(change.sum()), with, without};
-  return {};
-}
-
-// The weakest term that makes a joint of its own worse, or all joints together: than the declared model is, or than the
-// other terms that could tell its cause are without it. A delay is judged with all others, which were found on logs
-// that it had aligned.
-Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after,
-                std::optional<Refutation>& why) {
-  for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
-    if (!c->confirmed || c->candidate->is_event()) continue;
-    if ((why = Worse(*c, after, before))) return &*c;
-    const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
-    if (others.empty() || c->delay_s != 0) continue;
-    if ((why = Worse(*c, after, calibration::Rms(log, Leaves(w, others, log), true)))) {
-      why->beside_others = true;
-      return &*c;
-    }
-  }
-  return nullptr;
-}
-
-// Of kinds that training could not tell apart the held-out log has refuted one that would be the arm's own: what it
-// leaves of them belongs to the run. False if nothing does.
-bool OfTheRunInstead(Diagnosis::Work& w, const Chosen& refuted, Chosen& out) {
-  for (const Rival& rival : refuted.rivals) {
-    const auto& names = refuted.also_fits;
-    if (rival.record->kind_class != "run_state" ||
-        std::find(names.begin(), names.end(), rival.record->kind) == names.end())
-      continue;
-    const auto is_it = [&](const auto& c) { return &c->record() == rival.record && c->joints() == rival.joints; };
-    const auto candidate = std::find_if(w.candidates.begin(), w.candidates.end(), is_it);
-    out = Chosen{};
-    out.candidate = candidate->get();
-    out.folds = refuted.folds;
-    if (Selector(w).StillEarns(out, Confirmed(w.chosen))) return true;
-  }
-  return false;
-}
-
 // Parameters of every use of a record: F_1, F_2 where there are two.
 template <class Parameter>
 void Repeat(const std::vector<Parameter>& once, std::size_t count, std::vector<Parameter>& out) {
@@ -133,6 +33,21 @@ void Repeat(const std::vector<Parameter>& once, std::size_t count, std::vector<P
     out.push_back(once[k % once.size()]);
     if (count > once.size()) out.back().name += "_" + std::to_string(k / once.size() + 1);
   }
+}
+
+// Whether a term earns its place beside the others, searched again. A delay stays: the logs are as it says now.
+bool StaysIn(const Diagnosis::Work& w, Selector& select, Chosen& term) {
+  return term.delay_s != 0 || select.StillEarns(term, Rivals(w.chosen, term));
+}
+
+}  // namespace
+
+std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chosen& term) {
+  std::vector<const Chosen*> out = Confirmed(chosen, &term);
+  if (term.candidate->is_curve()) return out;
+  std::erase_if(
+      out, [&](const Chosen* c) { return c->candidate->is_curve() && c->candidate->rows() == term.candidate->rows(); });
+  return out;
 }
 
 void WriteTerms(Diagnosis::Work& w, Finding& finding) {
@@ -163,13 +78,6 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
   finding.sigma = w.estimate.sigma;
   finding.innovation = w.estimate.innovation;
 }
-
-// Whether a term earns its place beside the others, searched again. A delay stays: the logs are as it says now.
-bool StaysIn(const Diagnosis::Work& w, Selector& select, Chosen& term) {
-  return term.delay_s != 0 || select.StillEarns(term, Rivals(w.chosen, term));
-}
-
-}  // namespace
 
 Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
                      std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow)
@@ -210,63 +118,5 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
 }
 
 Diagnosis::~Diagnosis() = default;
-
-HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
-  Work& w = *work_;
-  HeldOut out;
-  out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
-  const VectorXd before = calibration::Rms(test, out.before, true);
-  std::vector<std::optional<Refutation>> why;
-  for (const Term& t : finding_.terms) why.push_back(t.refuted);
-  for (;;) {
-    out.after = Leaves(w, Confirmed(w.chosen), test, &out.tracking);
-    Work::Estimate with_all = w.estimate;
-    std::optional<Refutation> reason;
-    Chosen* refuted = Refuted(w, test, before, calibration::Rms(test, out.after, true), reason);
-    w.estimate = std::move(with_all);
-    if (!refuted) break;
-    const auto at = refuted - w.chosen.data();
-    refuted->confirmed = false;
-    why[static_cast<std::size_t>(at)] = reason;
-    w.AlignLogs();
-    if (Chosen instead; OfTheRunInstead(w, *refuted, instead)) {
-      w.chosen.insert(w.chosen.begin() + at + 1, instead);
-      why.insert(why.begin() + at + 1, std::nullopt);
-    }
-  }
-  WriteTerms(w, finding_);
-  for (std::size_t k = 0; k < why.size(); ++k) finding_.terms[k].refuted = why[k];
-  return out;
-}
-
-std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {
-  const Work& w = *work_;
-  const calibration::Dataset seen = AsTermsSay(w, data);
-  const Quantities q = AtEstimate(w, Confirmed(w.chosen), seen);
-  std::vector<MatrixXd> out;
-  std::size_t k = 0;
-  for (const Chosen& c : w.chosen) {
-    out.push_back(MatrixXd::Zero(data.samples(), data.joints()));
-    if (!c.confirmed) continue;
-    const VectorXd& amplitude = w.estimate.amplitude[k++];
-    if (!c.candidate->is_event()) out.back() = CandidateTorque(*c.candidate, q, c.eta, amplitude);
-    if (c.delay_s != 0) out.back() += q.tau_model - calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
-  }
-  return out;
-}
-
-std::vector<calibration::Dataset> Diagnosis::WithoutTerms() const {
-  const Work& w = *work_;
-  const std::vector<const Chosen*> terms = Confirmed(w.chosen);
-  std::vector<calibration::Dataset> out;
-  for (const calibration::Dataset* log : w.train) {
-    out.push_back(*log);
-    if (terms.empty()) continue;
-    const Quantities q = AtEstimate(w, terms, *log);
-    for (std::size_t k = 0; k < terms.size(); ++k)
-      out.back().tau -= CandidateTorque(*terms[k]->candidate, q, terms[k]->eta, w.estimate.amplitude[k]);
-  }
-  return out;
-}
 
 }  // namespace armcal::diagnosis

@@ -39,7 +39,7 @@ Gain SolveGain(const Eigen::LLT<MatrixXd>& base, const Projection& p) {
 }
 
 MatrixXd WhitenAll(const NoiseModel& noise, const RowIndex& rows, const MatrixXd& m) {
-  if (IsWhite(noise)) return m / noise.innovation;
+  if (IsWhite(noise)) return m * (1 / noise.innovation);
   MatrixXd out(m.rows(), m.cols());
   for (int c = 0; c < m.cols(); ++c) out.col(c) = Whiten(noise, rows, m.col(c));
   return out;

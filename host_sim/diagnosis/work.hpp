@@ -21,6 +21,9 @@ struct Chosen {
 // Those that are, but for `without`.
 std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Chosen* without = nullptr);
 
+// What a term must stand beside: not the curves over its joints, which may take its place but cannot tell its cause.
+std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chosen& term);
+
 struct Diagnosis::Work {
   Work(const codegen::Model& model, const codegen::Catalogue& catalogue,
        std::vector<const calibration::Dataset*> train);
@@ -81,6 +84,9 @@ struct Diagnosis::Work {
   std::set<std::string> all_reads;                      // of all candidates
   std::unique_ptr<Work> narrow;  // the same logs at a lower bandwidth, without candidates of its own
 };
+
+// The chosen terms as they are now, with their deviations.
+void WriteTerms(Diagnosis::Work& work, Finding& finding);
 
 // What no estimate changes: steps, and the last body's columns if something reads them.
 Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data,

@@ -27,12 +27,18 @@ void Metric::WhitenJoint(int j) {
   const auto& columns = rows_.columns[j];
   map_[j].resize(static_cast<Eigen::Index>(columns.size()), rows_.L.cols());
   for (std::size_t i = 0; i < columns.size(); ++i) map_[j].row(i) = rows_.L.row(columns[i]);
-  q_[j] = WhitenAll(noise_[j], rows_.index[j], rows_.design[j]);
   y_[j] = Whiten(noise_[j], rows_.index[j], rows_.target[j]);
-  const double weight = 1 / (noise_[j].innovation * noise_[j].innovation);
-  const bool white = IsWhite(noise_[j]);
-  gram_[j] = map_[j].transpose() * (white ? MatrixXd(weight * rows_.gram[j]) : SelfProduct(q_[j])) * map_[j];
-  right_[j] = map_[j].transpose() * (white ? VectorXd(weight * rows_.right[j]) : VectorXd(q_[j].transpose() * y_[j]));
+  if (IsWhite(noise_[j])) {
+    const double scale = 1 / noise_[j].innovation;
+    q_map_[j] = scale * map_[j];
+    gram_[j] = q_map_[j].transpose() * rows_.gram[j] * q_map_[j];
+    right_[j] = q_map_[j].transpose() * (scale * rows_.right[j]);
+    return;
+  }
+  coloured_[j] = WhitenAll(noise_[j], rows_.index[j], rows_.design[j]);
+  q_map_[j] = map_[j];
+  gram_[j] = map_[j].transpose() * SelfProduct(coloured_[j]) * map_[j];
+  right_[j] = map_[j].transpose() * (coloured_[j].transpose() * y_[j]);
 }
 
 void Metric::Solve() {
@@ -45,7 +51,7 @@ void Metric::Solve() {
   }
   factor_.compute(hessian);
   z_ = factor_.solve(right);
-  for (int j = 0; j < n; ++j) residual_[j] = y_[j] - q_[j] * (map_[j] * z_);
+  for (int j = 0; j < n; ++j) residual_[j] = y_[j] - q(j) * (q_map_[j] * z_);
   bounded_sd_.resize(static_cast<Eigen::Index>(rows_.bounded.size()));
   for (std::size_t k = 0; k < rows_.bounded.size(); ++k) {
     const VectorXd row = rows_.L.row(rows_.bounded[k].coordinate).transpose();
@@ -61,7 +67,8 @@ MatrixXd Metric::PriorPrecision() const {
 Metric::Metric(const BaseRows& rows, std::vector<NoiseModel> noise)
     : rows_(rows), noise_(std::move(noise)), prior_(PriorPrecision()) {
   const std::size_t n = rows.index.size();
-  map_.resize(n), q_.resize(n), y_.resize(n), gram_.resize(n), right_.resize(n), residual_.resize(n);
+  map_.resize(n), q_map_.resize(n), coloured_.resize(n), y_.resize(n), gram_.resize(n), right_.resize(n),
+      residual_.resize(n);
   for (int j = 0; j < rows.joints(); ++j) WhitenJoint(j);
   Solve();
 }
@@ -98,7 +105,7 @@ Projection Metric::Project(const Columns& c) const {
     const int j = c.joints[r];
     const MatrixXd w = WhitenedColumns(c, static_cast<int>(r));
     p.gram += SelfProduct(w);
-    p.B += map_[j].transpose() * TallProduct(q_[j], w);
+    p.B += q_map_[j].transpose() * TallProduct(q(j), w);
     p.g += w.transpose() * residual_[j];
   }
   return p;

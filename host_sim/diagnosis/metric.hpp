@@ -110,10 +110,13 @@ class Metric {
   const BaseRows& rows_;
   std::vector<NoiseModel> noise_;
   std::vector<Eigen::MatrixXd> map_;  // [n] rows of L of columns[j]
-  std::vector<Eigen::MatrixXd> q_;    // [n] whitened design
+  // The whitened design in coordinates is q(j) q_map_[j]. White noise only scales: q is then the design itself.
+  const Eigen::MatrixXd& q(int j) const { return coloured_[j].size() ? coloured_[j] : rows_.design[j]; }
+  std::vector<Eigen::MatrixXd> coloured_;  // [n] whitened design; empty if the noise is white
+  std::vector<Eigen::MatrixXd> q_map_;     // [n] map_, over the noise if it is white
   std::vector<Eigen::VectorXd> residual_, y_;
-  std::vector<Eigen::MatrixXd> gram_;   // [n] of q_ map_
-  std::vector<Eigen::VectorXd> right_;  // [n] (q_ map_)' y_
+  std::vector<Eigen::MatrixXd> gram_;   // [n] of q q_map_
+  std::vector<Eigen::VectorXd> right_;  // [n] (q q_map_)' y_
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Eigen::MatrixXd prior_;
   Eigen::VectorXd z_, bounded_sd_;

@@ -26,13 +26,13 @@ VectorXd Metric::FoldGains(const Columns& c, int blocks, int folds, const Matrix
   for (auto& joints : fold_rows) joints.resize(n);
   for (int j = 0; j < n; ++j) {
     const auto at = std::find(c.joints.begin(), c.joints.end(), j);
-    const int r = static_cast<int>(q_[j].cols()), extra = at == c.joints.end() ? 0 : k;
-    const int rows = static_cast<int>(q_[j].rows());
+    const int r = static_cast<int>(q(j).cols()), extra = at == c.joints.end() ? 0 : k;
+    const int rows = static_cast<int>(q(j).rows());
     extended[j].resize(rows, r + extra);
-    extended[j].leftCols(r) = q_[j];
+    extended[j].leftCols(r) = q(j);
     if (extra) extended[j].rightCols(k) = WhitenedColumns(c, static_cast<int>(at - c.joints.begin()));
     map[j] = MatrixXd::Zero(r + extra, d + k);
-    map[j].topLeftCorner(r, d) = map_[j];
+    map[j].topLeftCorner(r, d) = q_map_[j];
     map[j].bottomRightCorner(extra, extra).setIdentity();
     std::vector<MatrixXd> own(folds, MatrixXd::Zero(r + extra, r + extra));
     for (int b = 0; b < blocks; ++b) {
@@ -57,11 +57,11 @@ VectorXd Metric::FoldGains(const Columns& c, int blocks, int folds, const Matrix
     const VectorXd others_right = total_right - right[f], with = others.ldlt().solve(others_right),
                    without = others.topLeftCorner(d, d).ldlt().solve(others_right.head(d));
     for (int j = 0; j < n; ++j) {
-      const VectorXd own = map_[j] * without, extended_own = map[j] * with;
+      const VectorXd own = q_map_[j] * without, extended_own = map[j] * with;
       for (const auto& [begin, end] : fold_rows[f][j]) {
         const int rows = end - begin;
         const auto y = y_[j].segment(begin, rows);
-        gain[f] += (y - q_[j].middleRows(begin, rows) * own).squaredNorm() -
+        gain[f] += (y - q(j).middleRows(begin, rows) * own).squaredNorm() -
                    (y - extended[j].middleRows(begin, rows) * extended_own).squaredNorm();
       }
     }
@@ -116,7 +116,7 @@ double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_n
       continue;
     }
     const std::size_t r = static_cast<std::size_t>(at - c.joints.begin());
-    const int own = static_cast<int>(q_[j].cols());
+    const int own = static_cast<int>(q(j).cols());
     MatrixXd w(rows_.design[j].rows(), own + k);
     w.leftCols(own) = WhitenAll(noise[r], rows_.index[j], rows_.design[j]);
     w.rightCols(k) = WhitenAll(noise[r], rows_.index[j], c.block[r]);
@@ -144,7 +144,7 @@ std::pair<double, double> Metric::Imitates(const Columns& other, const Columns& 
     const int j = fitted.joints[r];
     trace[j] = WhitenedColumns(fitted, static_cast<int>(r)) * a;
     own += trace[j].squaredNorm();
-    onto += map_[j].transpose() * (q_[j].transpose() * trace[j]);
+    onto += q_map_[j].transpose() * (q(j).transpose() * trace[j]);
   }
   const VectorXd z = factor_.solve(onto);
   own -= onto.dot(z);
@@ -177,7 +177,7 @@ MatrixXd Metric::RobustCovariance(const Columns& c, double block_s, const std::v
       while (last < index.size() && block(last) == block(first)) ++last;
       VectorXd& sum = score.try_emplace(block(first), VectorXd::Zero(d + k)).first->second;
       const auto residual = residual_[j].segment(first, last - first);
-      sum.head(d) += map_[j].transpose() * (q_[j].middleRows(first, last - first).transpose() * residual);
+      sum.head(d) += q_map_[j].transpose() * (q(j).middleRows(first, last - first).transpose() * residual);
       if (own.size()) sum.tail(k) += own.middleRows(first, last - first).transpose() * residual;
     }
   }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
+#include <deque>
 #include <random>
 
 #include "codegen/src/generator/arm_torque.hpp"
@@ -40,7 +41,7 @@ class ArmTorqueOf : public testing::TestWithParam<const char*> {
   // Relative to the largest torque; every part of every sample.
   double Error(const codegen::TorqueParts& parts) const {
     KdlArm arm(robot_, bodies_);
-    std::vector<KdlArm> tilted;
+    std::deque<KdlArm> tilted;
     for (int axis = 0; axis < 3; ++axis) {
       codegen::Robot one = robot_;
       one.gravity_mps2 = {};

@@ -46,6 +46,9 @@ class KdlArm {
     solver_ = std::make_unique<KDL::ChainIdSolver_RNE>(chain_, KDL::Vector(g[0], g[1], g[2]));
   }
 
+  KdlArm(const KdlArm&) = delete;  // the solver points at the chain
+  KdlArm& operator=(const KdlArm&) = delete;
+
   Eigen::VectorXd Torque(const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd) {
     KDL::JntArray a(n_), v(n_), x(n_), tau(n_);
     for (int j = 0; j < n_; ++j) x(j) = q[j], v(j) = qd[j], a(j) = qdd[j];

@@ -23,7 +23,7 @@ struct ShortRun {
       : arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 3),
         torque(arm.model()),
         data(arm.Run(seconds, 30)),
-        q(MakeQuantities(arm.model(), data, torque.names())) {
+        q(MakeQuantities(arm.model(), data, {"Y"})) {
     Follow(arm.model(), torque, arm.truth(), {}, torque.names(), q);
   }
   MatrixXd Zero() const { return MatrixXd::Zero(data.samples(), kJoints); }

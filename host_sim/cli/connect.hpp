@@ -1,4 +1,4 @@
-// cli - HOST:PORT and the table layout of the drive that answers there; knows no verb.
+// cli - a drive's address and the table layout of the drive that answers there; knows no verb.
 #pragma once
 
 #include <string>
@@ -8,8 +8,10 @@
 
 namespace armcal::cli {
 
-// "HOST:PORT" -> a connection. Throws io::InputError (form), client::LinkError.
-client::DriveClient ConnectTo(const std::string& host_port);
+// What --connect takes: "HOST:PORT", or a serial line "DEVICE[:BAUD[:PARITY[:UNIT]]]" whose device is a path from the
+// root; 115200, E and 1 if left out. Throws io::InputError (form), client::LinkError.
+client::DriveClient ConnectTo(const std::string& address);
+inline constexpr char kConnectHelp[] = "drive: HOST:PORT, or a serial line as /dev/ttyUSB0[:115200[:E[:1]]]";
 
 // The layout that the drive's schema names: the default table of `model`. Throws client::RefusedError if the drive runs
 // another one.

@@ -25,7 +25,8 @@ int RunEstimate(const EstimateOptions& o) {
                                  (Home() / "codegen" / "effects").string()};
   if (!o.connect.empty()) {
     const auto colon = o.connect.rfind(':');
-    if (colon == std::string::npos) throw io::InputError("--connect " + o.connect + ": expected HOST:PORT");
+    if (colon == std::string::npos || o.connect[0] == '/')
+      throw io::InputError("--connect " + o.connect + ": expected HOST:PORT; a serial line cannot carry every sample");
     words.insert(words.end(), {"--host", o.connect.substr(0, colon), "--port", o.connect.substr(colon + 1)});
   }
   for (const auto& [key, value] :

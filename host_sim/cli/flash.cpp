@@ -97,7 +97,7 @@ int Verify(const FlashOptions& o) {
 
 CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std::shared_ptr<FlashOptions>& o) {
   auto* verb = app.add_subcommand(name, help);
-  verb->add_option("--connect", o->connect, "drive, HOST:PORT")->required();
+  verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--robot", o->robot, "robot file or name: the model the drive was built for")->required();
   verb->add_option("--table", o->table, "table file (TOML) of armcal identify")->required();
   verb->add_option("--json", o->json, "write the result here");

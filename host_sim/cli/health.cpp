@@ -126,7 +126,7 @@ void AddHealth(CLI::App& app, Action& action) {
       "exit code 0: all fit, 5: a joint does not, 6: too early to tell\n"
       "example: armcal health --connect 192.168.0.10:502");
   auto o = std::make_shared<HealthOptions>();
-  verb->add_option("--connect", o->connect, "drive, HOST:PORT")->required();
+  verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--json", o->json, "write the verdicts here");
   verb->callback([o, &action] { action = [o] { return RunHealth(*o); }; });
 }

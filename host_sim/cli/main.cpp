@@ -29,6 +29,7 @@ int Main(int argc, char** argv) {
   AddFlash(app, action);
   AddVerify(app, action);
   AddHealth(app, action);
+  AddLearning(app, action);
   AddDemo(app, action);
   AddBench(app, action);
   AddSurvey(app, action);

@@ -211,7 +211,7 @@ void AddRecord(CLI::App& app, Action& action) {
                          "play a trajectory on the (simulated) drive and record its trace\nexample: armcal record "
                          "--connect 127.0.0.1:1502 --robot er20_like --trajectory train.csv --out train_log.csv.gz");
   auto o = std::make_shared<RecordOptions>();
-  verb->add_option("--connect", o->connect, "drive, HOST:PORT")->required();
+  verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--robot", o->robot, "robot file or name")->required();
   verb->add_option("--trajectory", o->trajectory, "trajectory of armcal excite")->required();
   verb->add_option("--out", o->out, "log to write (.csv or .csv.gz)")->required();

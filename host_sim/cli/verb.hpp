@@ -28,6 +28,7 @@ void AddDiagnose(CLI::App& app, Action& action);
 void AddFlash(CLI::App& app, Action& action);
 void AddVerify(CLI::App& app, Action& action);
 void AddHealth(CLI::App& app, Action& action);
+void AddLearning(CLI::App& app, Action& action);
 void AddDemo(CLI::App& app, Action& action);
 void AddBench(CLI::App& app, Action& action);
 void AddSurvey(CLI::App& app, Action& action);

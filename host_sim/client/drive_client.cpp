@@ -35,14 +35,18 @@ int ExceptionCode(int error) {
 
 }  // namespace
 
-DriveClient::DriveClient(const std::string& host, int port, int unit)
-    : host_(host),
-      name_(fmt::format("{}:{}", host, port)),
-      port_(port),
-      unit_(unit),
-      connection_(nullptr, CloseAndFree) {
+DriveClient::DriveClient(std::string name, int unit, std::function<_modbus*()> open)
+    : name_(std::move(name)), unit_(unit), open_(std::move(open)), connection_(nullptr, CloseAndFree) {
   Connect();
 }
+
+DriveClient::DriveClient(const std::string& host, int port, int unit)
+    : DriveClient(fmt::format("{}:{}", host, port), unit,
+                  [=] { return modbus_new_tcp_pi(host.c_str(), std::to_string(port).c_str()); }) {}
+
+DriveClient::DriveClient(const SerialLine& line, int unit)
+    : DriveClient(line.device, unit,
+                  [=] { return modbus_new_rtu(line.device.c_str(), line.baud, line.parity, 8, 1); }) {}
 
 DriveClient::~DriveClient() = default;
 DriveClient::DriveClient(DriveClient&&) noexcept = default;
@@ -50,12 +54,13 @@ DriveClient& DriveClient::operator=(DriveClient&&) noexcept = default;
 
 void DriveClient::Connect() {
   connection_.reset();
-  Connection fresh(modbus_new_tcp_pi(host_.c_str(), std::to_string(port_).c_str()), CloseAndFree);
+  Connection fresh(open_(), CloseAndFree);
   if (!fresh) throw LinkError(fmt::format("{}: {}", name_, modbus_strerror(errno)));
   modbus_set_slave(fresh.get(), unit_);
   modbus_set_response_timeout(fresh.get(), kResponse_s, 0);
   if (modbus_connect(fresh.get()) != 0)
     throw LinkError(fmt::format("{}: cannot connect: {}", name_, modbus_strerror(errno)));
+  modbus_flush(fresh.get());  // a line keeps what came late for the request before
   connection_ = std::move(fresh);
 }
 

@@ -1,4 +1,4 @@
-// client - registers of a drive over Modbus TCP, and what its identity and status say; knows no table and no model.
+// client - registers of a drive over Modbus TCP or RTU, and what its identity and status say; knows no table, no model.
 #pragma once
 
 #include <cstdint>
@@ -39,12 +39,20 @@ struct DriveStatus {
   std::uint32_t rows_used[2], rows_gated[2];
 };
 
+// A serial line as SPEC.md has it: eight data bits, one stop bit.
+struct SerialLine {
+  std::string device;  // "/dev/ttyUSB0"
+  int baud = 115200;
+  char parity = 'E';  // N, E or O
+};
+
 // Every call throws LinkError after three attempts without a sensible answer (two seconds each; the connection is made
 // anew between them, so that a late answer is never taken for the next one) and RefusedError, with the drive's own
 // reason, when it answers with an exception. Repeating is safe because every armcal write is idempotent.
 class DriveClient {
  public:
   DriveClient(const std::string& host, int port, int unit = 1);
+  explicit DriveClient(const SerialLine& line, int unit = 1);
   ~DriveClient();
   DriveClient(DriveClient&&) noexcept;
   DriveClient& operator=(DriveClient&&) noexcept;
@@ -64,18 +72,20 @@ class DriveClient {
   Identity ReadIdentity();
   DriveStatus ReadStatus();
 
-  const std::string& name() const { return name_; }  // "host:port", for messages
+  const std::string& name() const { return name_; }  // "host:port" or the device, for messages
 
  private:
   using Connection = std::unique_ptr<_modbus, void (*)(_modbus*)>;
 
+  DriveClient(std::string name, int unit, std::function<_modbus*()> open);
   void Connect();
   void Request(const std::string& what, const std::function<int(_modbus*)>& call);
   [[noreturn]] void Refused(const std::string& what, int exception);
   std::vector<std::uint16_t> Read(bool input, int first, int count);
 
-  std::string host_, name_;
-  int port_, unit_;
+  std::string name_;
+  int unit_;
+  std::function<_modbus*()> open_;
   Connection connection_;
 };
 

@@ -1,4 +1,5 @@
-// end-to-end tests - armcal health on a drive whose arm changes while it works: which joint, what, since when.
+// end-to-end tests - a drive whose arm changes while it works: armcal health says which joint, what and since when,
+// armcal learning holds and resets its estimators.
 #include <cmath>
 #include <fstream>
 #include <numbers>
@@ -122,10 +123,40 @@ TEST_F(Health, OfAnArmThatChanges_NamesJointCauseAndTime_AndSaysWhatItCannotTell
   EXPECT_NE(ill.out.find("armcal record"), std::string::npos);
 }
 
+TEST_F(Health, LearningOnHold_UsesNoRow_AndABlockIsReset) {
+  const auto ask = [&](std::vector<std::string> words) {
+    const std::string json = (folder_ / "learning.json").string();
+    words.insert(words.begin(), {"learning", "--connect", drive_.address(), "--json", json});
+    const Outcome o = Tool(words);
+    EXPECT_EQ(o.code, 0) << o.err;
+    return ReadJson(json);
+  };
+  EXPECT_EQ(ask({}).at("held"), false);
+  EXPECT_EQ(ask({"--hold"}).at("held"), true);
+  Work(1);
+  for (const auto& filter : ask({}).at("filters")) {
+    EXPECT_EQ(filter.at("rows_used"), 0);
+    EXPECT_GT(filter.at("rows_gated"), 0);
+  }
+  EXPECT_EQ(ask({"--resume"}).at("held"), false);
+  Work(1);
+  const auto after = ask({"--reset", "bodies"});
+  for (const auto& filter : after.at("filters")) EXPECT_GT(filter.at("rows_used"), 0);
+  EXPECT_EQ(after.at("consistency").size(), 6u);
+  EXPECT_EQ(ask({"--reset", "6", "--hold"}).at("reset"), "6");
+  for (const char* wrong : {"0", "7", "01", "links"})
+    ExpectOneLine(Tool({"learning", "--connect", drive_.address(), "--reset", wrong}), 2, "from 1 to 6, or bodies");
+  EXPECT_EQ(Tool({"learning", "--connect", drive_.address(), "--hold", "--resume"}).code, 2);
+}
+
 TEST_F(Health, WhatIsNoDrive_IsALinkError) {
   const TakenPort closed(false);
   ExpectOneLine(Tool({"health", "--connect", closed.address()}), 3, closed.address());
   ExpectOneLine(Tool({"health", "--connect", "nowhere"}), 2, "HOST:PORT");
+  ExpectOneLine(Tool({"health", "--connect", "/dev/does-not-exist"}), 3, "/dev/does-not-exist");
+  for (const char* wrong : {"/dev/null:12345", "/dev/null:9600:M", "/dev/null:9600:EE", "/dev/null:9600:E:300",
+                            "/dev/null:9600:E:1:1", "/dev/null:"})
+    ExpectOneLine(Tool({"health", "--connect", wrong}), 2, "9600 to 230400 baud");
 }
 
 }  // namespace

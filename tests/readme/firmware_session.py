@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Runs the README's firmware on an emulated board and talks Modbus RTU to it over its serial line.
 
-  firmware_session.py BOARD IMAGE
+  firmware_session.py BOARD IMAGE TOOL
 
-The client is written from the Modbus specification and SPEC.md, not from armcal. 77: no QEMU here.
+The client is written from the Modbus specification and SPEC.md, not from armcal; at the end the armcal tool, if it has
+been built, asks over the same line. 77: no QEMU here.
 """
 import math
 import os
@@ -161,16 +162,30 @@ def session(line):
     until("and used again", lambda: line.u32(0x0060) > used)
 
 
+def with_tool(tool, path):
+    if not os.path.exists(tool):
+        print(f"{tool} is not built: only our own client was tried")
+        return
+    for words, expected in (["learning", "--reset", "bodies"], 0), (["learning", "--hold"], 0), (["health"], 6):
+        command = [tool, *words, "--connect", path + ":115200:N:1"]
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+        print(" ".join(["armcal", *words]), done.stdout, sep="\n")
+        assert done.returncode == expected, done.returncode
+        if words[-1] == "--hold":
+            assert ": on hold" in done.stdout
+
+
 def main():
-    board, image = sys.argv[1:]
+    board, image, tool = sys.argv[1:]
     if shutil.which("qemu-system-arm") is None:
         print("skipped: no qemu-system-arm (toolchains/install.sh cross)")
         return 77
     command = ["qemu-system-arm", "-M", board, "-display", "none", "-monitor", "none", "-serial", "null", "-serial", "pty"]
     emulator = subprocess.Popen(command + ["-kernel", image], stdout=subprocess.PIPE, text=True)
     try:
-        path = re.search(r"/dev/\S+", emulator.stdout.readline())
-        session(Line(path.group()))
+        path = re.search(r"/dev/\S+", emulator.stdout.readline()).group()
+        session(Line(path))
+        with_tool(tool, path)
         assert emulator.poll() is None, "the image ended"
     finally:
         emulator.kill()

@@ -37,7 +37,8 @@ add_test(NAME Stack_OfEveryContextOfTheFirmware_IsBounded COMMAND_EXPAND_LISTS
 
 # The README's firmware, spoken to over its serial line.
 add_test(NAME Firmware_OverItsSerialLine_TakesATableAndLearns
-  COMMAND ${PROJECT_SOURCE_DIR}/tests/readme/firmware_session.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_image>)
+  COMMAND ${PROJECT_SOURCE_DIR}/tests/readme/firmware_session.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_image>
+          ${PROJECT_SOURCE_DIR}/build/host/armcal)
 set_tests_properties(Firmware_OverItsSerialLine_TakesATableAndLearns PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300 LABELS target)
 
 # cmake --build --preset cortex-m4f --target budgets

@@ -132,15 +132,18 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   }
 
   // What the filter knew of a block's columns no longer counts; they start again without data. block: a joint's front
-  // columns, or kJoints: the dense ones. Between samples; interface shared by all filters.
+  // columns, or kJoints: the dense ones. A front column is known through the dense ones of its row; where these may now
+  // be anywhere in their prior, the row says that much less. Between samples; interface shared by all filters.
   static constexpr bool CanReset(int block) { return block >= 0 && block <= Layout::kJoints; }
   void BeginReset(int block) {
     const ColumnRange columns = ColumnsOfBlock<Layout>(block, kColumns);
     for (int k = columns.begin; k < columns.end; ++k) d_[k] = kFloor;
+    next_ = block < Layout::kJoints ? Layout::kFront : 0;
   }
   bool StepReset(int& credit) {
+    for (; next_ < Layout::kFront && credit > 0; ++next_) credit -= WidenByDense(next_);
     credit -= kEndCost;
-    return true;
+    return next_ >= Layout::kFront;
   }
 
   // Shape: x [kColumns], prior units. What the data alone say, by back substitution; zero where they say nothing. No
@@ -195,6 +198,21 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   int ColumnAt(int k) const { return k < width_ ? first_ + k : dense_first_ + k - width_; }  // of the row in work
 
   static constexpr int kColumnCost = 6, kRowCost = 24, kEndCost = 2 * kColumns;
+
+  // Takes as much off the weight of a front column's row as the prior's spread of its dense columns makes its noise
+  // larger. Returns the work, in elements.
+  int WidenByDense(int column) {
+    const int joint = JointOf<Layout>(column), begin = Layout::kRowBegin[joint];
+    const float* coupling = rows_ + kOffsets.at[column] + (Layout::kFrontBegin[joint + 1] - 1 - column);
+    float variance = 0.0f;
+    for (int j = begin; j < Layout::kDense; ++j) {
+      const float* u = prior_->dense_ud + math::UdIndex(0, j);
+      const float along = coupling[j - begin] + math::Dot(coupling, u + begin, j - begin);
+      variance += u[j] * along * along;
+    }
+    d_[column] = math::Max(d_[column] / (1.0f + d_[column] * variance), kFloor);
+    return (Layout::kDense - begin) * (Layout::kDense - begin + 1) / 2;
+  }
 
   // Row `column` of the triangle as a measurement of the read-out's estimate.
   void BeginTake(int column, UdEstimate<Columns>& estimate) const {

@@ -1,6 +1,7 @@
 // tests - whole estimators on a recorded trace, with every filter of a model without nonlinear parameters.
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
+#include "armcal/filter/model_bank.hpp"
 #include "codegen/generated/er20_like/model.hpp"
 #include "tests/target/trace_run.hpp"
 
@@ -12,6 +13,7 @@ namespace {
 Run<Model, filter::ForgettingFilter<Model>> forgetting = {"forgetting", {}, {}, {}};
 Run<Model, filter::KalmanFilter<Model>> dense = {"kalman_dense", {}, {}, {}};
 Run<Model, filter::KalmanFilter<Model, filter::Form::kBlock>> block = {"kalman_block", {}, {}, {}};
+Run<Model, filter::ModelBank<Model>> bank = {"bank", {}, {}, {}};
 }  // namespace
 
-int Program() { return target::RunAlong(forgetting, dense, block); }
+int Program() { return target::RunAlong(forgetting, dense, block, bank); }

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "armcal/link/rtu_service.hpp"
+#include "host_sim/client/table_flash.hpp"
 #include "port/linux/steady_clock.hpp"
 #include "port/linux/tty_serial.hpp"
 #include "tests/unit/link/test_device.hpp"
@@ -40,30 +41,46 @@ void Move(int from, int to) {
   }
 }
 
-TEST(RtuLine, Libmodbus_ReadsWritesAndIsRefused) {
-  Terminal client, drive_side;
-  port_linux::TtySerial serial;
-  ASSERT_EQ(serial.Open(drive_side.path, 115200, port_linux::Parity::kNone), core::Status::kOk);
-  test::TestDevice drive;
-  std::atomic<std::uint32_t> ticks{0};
-  link::RtuService service(drive.device.engine(), serial.serial(), port_linux::SteadyClock(ticks), 9, 20);
+// A drive with address 9 at the far end of a line that a thread carries.
+class RtuLine : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(serial_.Open(drive_side_.path, 115200, port_linux::Parity::kNone), core::Status::kOk);
+    line_ = std::thread([this] { Carry(); });
+  }
+  void TearDown() override {
+    stop_ = true;
+    if (line_.joinable()) line_.join();
+  }
+  Terminal client_;
+  test::TestDevice drive_;
 
-  modbus_t* modbus = modbus_new_rtu(client.path.c_str(), 115200, 'N', 8, 1);
+ private:
+  void Carry() {
+    while (!stop_) {
+      pollfd watched[2] = {{client_.master, POLLIN, 0}, {drive_side_.master, POLLIN, 0}};
+      ::poll(watched, 2, 1);
+      Move(client_.master, drive_side_.master);
+      service_.Poll();
+      drive_.device.Step(clock_.Ms());
+      Move(drive_side_.master, client_.master);
+    }
+  }
+  Terminal drive_side_;
+  port_linux::TtySerial serial_;
+  std::atomic<std::uint32_t> ticks_{0};
+  const port::Clock clock_ = port_linux::SteadyClock(ticks_);
+  link::RtuService service_{drive_.device.engine(), serial_.serial(), clock_, 9, 20};
+  std::atomic<bool> stop_{false};
+  std::thread line_;
+};
+
+TEST_F(RtuLine, Libmodbus_ReadsWritesAndIsRefused) {
+  modbus_t* modbus = modbus_new_rtu(client_.path.c_str(), 115200, 'N', 8, 1);
   ASSERT_NE(modbus, nullptr);
   modbus_set_slave(modbus, 9);
   modbus_set_response_timeout(modbus, 5, 0);
   ASSERT_EQ(modbus_connect(modbus), 0);
-
-  std::atomic<bool> stop{false};
-  std::thread line([&] {
-    while (!stop) {
-      pollfd watched[2] = {{client.master, POLLIN, 0}, {drive_side.master, POLLIN, 0}};
-      ::poll(watched, 2, 1);
-      Move(client.master, drive_side.master);
-      service.Poll();
-      Move(drive_side.master, client.master);
-    }
-  });
 
   std::uint16_t words[2] = {};
   EXPECT_EQ(modbus_read_input_registers(modbus, 14, 2, words), 2) << modbus_strerror(errno);
@@ -79,10 +96,21 @@ TEST(RtuLine, Libmodbus_ReadsWritesAndIsRefused) {
   EXPECT_EQ(modbus_read_bits(modbus, 0, 1, &bits), -1);
   EXPECT_EQ(errno, EMBXILFUN) << "an undeclared function is answered, not dropped";
 
-  stop = true;
-  line.join();
   modbus_close(modbus);
   modbus_free(modbus);
+}
+
+TEST_F(RtuLine, DriveClient_FlashesATable) {
+  client::DriveClient drive(client::SerialLine{client_.path, 115200, 'N'}, 9);
+  EXPECT_EQ(drive.ReadIdentity().table_words, test::kTableWords);
+  EXPECT_EQ(client::FlashTable(drive, test::MakeTable(1)).store_sequence, 1u);
+  EXPECT_EQ(client::ReadActiveTable(drive), test::MakeTable(1));
+  EXPECT_THROW(client::FlashTable(drive, test::MakeTable(2, 0x11112222)), client::RefusedError);
+  EXPECT_EQ(client::ReadActiveTable(drive), test::MakeTable(1));
+}
+
+TEST(SerialLine, ThatIsNotThere_IsALinkError) {
+  EXPECT_THROW(client::DriveClient(client::SerialLine{"/dev/does-not-exist"}), client::LinkError);
 }
 
 TEST(TtySerial, PathThatIsNoTerminal_IsRefused) {

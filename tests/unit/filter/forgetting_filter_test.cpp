@@ -220,6 +220,51 @@ TEST(ForgettingFilter, AnySlices_GiveTheSameBits) {
   EXPECT_EQ(Kept(whole), Kept(sliced));
 }
 
+// In double: the block's rows of R are gone; where the dense columns may be anywhere in their prior, this is noise in the
+// front columns' rows.
+TEST(ForgettingFilter, Reset_ForgetsItsBlock_AndWhatWasKnownThroughIt) {
+  for (int block = 0; block <= Small::kJoints; ++block) {
+    Bench bench;
+    bench.size = 0.1f;  // data that do not drown the prior
+    SmallForgetting filter;
+    filter.Restart(bench.prior);
+    Recursion recursion;
+    const auto learn = [&](int samples) {
+      for (const Row& row : bench.Rows(samples)) {
+        filter.Update(row.joint, row.front, row.dense, row.y, true);
+        recursion.Add(Augmented(row));
+      }
+    };
+    learn(300);
+    filter.BeginReset(block);
+    for (int credit = 8; !filter.StepReset(credit); credit = 8) {
+    }
+    const Posterior untouched = recursion.Solve(bench.prior);
+    if (block < Small::kJoints) {
+      recursion.r.middleRows(Small::kFrontBegin[block], Small::kFrontBegin[block + 1] - Small::kFrontBegin[block])
+          .setZero();
+    } else {
+      recursion.r.bottomRows(Small::kDense).setZero();
+      const Matrix prior = PriorCovariance(bench.prior).bottomRightCorner(Small::kDense, Small::kDense);
+      for (int k = 0; k < Small::kFront; ++k) {
+        const Vector coupling = recursion.r.row(k).segment(Small::kFront, Small::kDense);
+        recursion.r.row(k) /= std::sqrt(1 + coupling.dot(prior * coupling));
+      }
+    }
+    const Posterior oracle = recursion.Solve(bench.prior);
+    const auto out = Read(filter);
+    EXPECT_LT(Distance<Small>(out.x, oracle), 0.01) << block;
+    for (int k = 0; k < Small::kColumns; ++k) EXPECT_NEAR(out.sd[k] / oracle.sd(k), 1, 1e-3) << block << ", " << k;
+    if (block != 1) {  // this joint has no front columns
+      EXPECT_GT(Distance<Small>(out.x, untouched), 0.1) << block;  // a reset that does nothing would show
+    }
+    learn(10);
+    EXPECT_LT(Distance<Small>(Read(filter).x, recursion.Solve(bench.prior)), 0.01) << block;
+  }
+  EXPECT_FALSE(SmallForgetting::CanReset(-1));
+  EXPECT_FALSE(SmallForgetting::CanReset(Small::kJoints + 1));
+}
+
 TEST(ForgettingFilter, WithoutData_ReadsThePrior) {
   Bench bench;
   SmallForgetting filter;

@@ -57,20 +57,23 @@ io::Log RawLog(const client::TraceRecords& r, const codegen::Robot& robot, const
   log.joints = n;
   log.source = "trace";
   log.t.resize(N);
-  for (MatrixXd* m : {&log.q, &log.tau, &log.temp, &log.qref, &log.tauff}) m->resize(N, n);
+  const bool warm = r.channels & estimator::kRawTemperature, told = r.channels & estimator::kRawSetPoint;
+  for (MatrixXd* m : {&log.q, &log.tau}) m->resize(N, n);
+  if (warm) log.temp.resize(N, n);
+  if (told) log.qref.resize(N, n), log.tauff.resize(N, n);
   log.flags.resize(N, n);
   VectorXd motor(n), current(n);
   for (Eigen::Index i = 0; i < N; ++i) {
     const std::uint16_t* w = &r.words[inside[i] * r.record_words];
     log.t[i] = static_cast<double>(r.ticks[inside[i]] - first_tick) / robot.tick_rate_Hz;
-    for (int j = 0; j < n; ++j, w += 11) {
+    for (int j = 0; j < n; ++j) {
       // 1/16 counts wrap at 2^32: signed, they reach +- 2^27 counts about zero, far beyond any joint's range
       motor[j] = scale.counts_to_rad[j] * (static_cast<std::int32_t>(words::GetU32(w)) / 16.0 - scale.zero[j]);
       current[j] = scale.lsb_to_Nm[j] * static_cast<std::int32_t>(words::GetU32(w + 2)) / 16.0;
-      log.temp(i, j) = words::GetF32(w + 4);
-      log.flags(i, j) = w[6];
-      log.qref(i, j) = words::GetF32(w + 7);
-      log.tauff(i, j) = words::GetF32(w + 9);
+      w += 4;
+      if (warm) log.temp(i, j) = words::GetF32(w), w += 2;
+      log.flags(i, j) = *w++;
+      if (told) log.qref(i, j) = words::GetF32(w), log.tauff(i, j) = words::GetF32(w + 2), w += 4;
     }
     log.q.row(i) = scale.to_joint * motor;
     log.tau.row(i) = scale.torque_to_joint * current;

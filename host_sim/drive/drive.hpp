@@ -47,7 +47,7 @@ class Drive {
         storage_(2, kSectorBytes, 8),
         controller_(Opened(storage_, o.storage), port_linux::SteadyClock(tick_), Identity()),
         vendor_(player_, n) {
-    Require(link::ServeTrace(controller_.map(), 0, raw_trace_));
+    Require(controller_.Record(raw_trace_));
     Require(link::ServeTrace(controller_.map(), 1, sample_trace_));
     Require(vendor_.Serve(controller_.map()));
     controller_.template filter<0>().SetObserver(&OnSample, this);
@@ -91,7 +91,7 @@ class Drive {
   static link::Identity Identity() {
     link::Identity identity;
     identity.firmware_version = 1, identity.serial_number = 1;
-    identity.capabilities = link::reg::kHasRawTrace | link::reg::kHasSampleTrace;
+    identity.capabilities = link::reg::kHasSampleTrace;
     return identity;
   }
   static port::Storage Opened(port_linux::FileStorage& storage, const std::string& path) {
@@ -220,16 +220,6 @@ class Drive {
       raw.temperature_degC[j] = static_cast<float>(sensors_.temperature_degC[j]);
     }
     (void)controller_.Push(raw);  // a refused sample is counted and served
-    const link::TraceTurn turn = raw_trace_.Offer(tick);
-    if (turn.recording) {
-      if (turn.first) raw_record_.Clear();
-      raw_record_.Add(raw, target.q, tau_ff);
-      if (turn.last) {
-        std::uint16_t words[estimator::RawRecordWords<n>(estimator::kRawAll)];
-        raw_record_.Write(raw_trace_.armed().channels, words);
-        (void)raw_trace_.Push(words, controller_.feed_forward().generation());
-      }
-    }
     if (truth_ && (player_.moving() || before == PlayerState::kPlaying)) WriteTruth(tick);
     tick_ = tick + 1;
     if (!player_.moving()) grant_ = std::max(0, grant_.load() - 1);
@@ -244,7 +234,6 @@ class Drive {
     if (tick % 4096 == 0) std::fflush(truth_);
   }
 
-  static std::uint16_t RawWords(void*, std::uint32_t channels) { return estimator::RawRecordWords<n>(channels); }
   static std::uint16_t SampleWords(void*, std::uint32_t channels) { return estimator::SampleRecordWords<n>(channels); }
 
   DriveOptions options_;
@@ -256,10 +245,10 @@ class Drive {
   std::atomic<std::uint32_t> tick_{0};  // the controller's clock
   controller::Controller<Model, filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>> controller_;
   VendorBlock vendor_;
-  link::TraceRing<> raw_trace_{1, &RawWords, nullptr}, sample_trace_{Model::kSampleTicks, &SampleWords, nullptr};
+  controller::RawTrace<Model> raw_trace_;
+  link::TraceRing<> sample_trace_{Model::kSampleTicks, &SampleWords, nullptr};
   std::uint32_t samples_seen_ = 0, read_out_at_ = 0;
   std::atomic<int> grant_{0};
-  estimator::RawRecord<n> raw_record_;
   std::vector<std::int32_t> previous_counts_;
   bool have_previous_ = false;
   SetPoint last_set_;

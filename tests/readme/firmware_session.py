@@ -14,6 +14,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
 import termios
 import time
 import tty
@@ -162,17 +163,33 @@ def session(line):
     until("and used again", lambda: line.u32(0x0060) > used)
 
 
+def run(expected, *words):
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    print(" ".join(["armcal", *words[1:]]), done.stdout, sep="\n")
+    assert done.returncode == expected, done.returncode
+    return done.stdout
+
+
 def with_tool(tool, path):
     if not os.path.exists(tool):
         print(f"{tool} is not built: only our own client was tried")
         return
-    for words, expected in (["learning", "--reset", "bodies"], 0), (["learning", "--hold"], 0), (["health"], 6):
-        command = [tool, *words, "--connect", path + ":115200:N:1"]
-        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
-        print(" ".join(["armcal", *words]), done.stdout, sep="\n")
-        assert done.returncode == expected, done.returncode
-        if words[-1] == "--hold":
-            assert ": on hold" in done.stdout
+    drive = ["--connect", path + ":115200:N:1"]
+    run(0, tool, "learning", *drive, "--reset", "bodies")
+    assert ": on hold" in run(0, tool, "learning", *drive, "--hold")
+    run(6, tool, "health", *drive)  # too early to tell
+    with tempfile.TemporaryDirectory() as folder:
+        log = os.path.join(folder, "log.csv")
+        record = [tool, "record", *drive, "--robot", "er20_like", "--out", log]
+        assert "plays no trajectories" in run(4, *record, "--trajectory", "any.csv")
+        assert "serves no trace of processed samples" in run(4, *record, "--seconds", "5", "--samples", log)
+        run(0, *record, "--seconds", "5", "--lean")
+        with open(log, encoding="utf-8") as file:
+            header, *rows = [line.strip().split(",") for line in file if not line.startswith("#")]
+        q1 = [float(row[header.index("q1")]) for row in rows]
+        # The pretended joint 1 swings by 0.4 rad in 4 s: half a period later it is on the other side.
+        assert len(q1) > 600 and abs(max(q1) - 0.4) < 1e-3, (len(q1), max(q1))
+        assert max(abs(a + b) for a, b in zip(q1, q1[250:])) < 1e-3
 
 
 def main():

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "armcal/controller/raw_trace.hpp"
 #include "armcal/controller/set_point.hpp"
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/estimator/image.hpp"
@@ -12,6 +13,7 @@
 #include "armcal/link/device.hpp"
 #include "armcal/link/learning_registers.hpp"
 #include "armcal/link/residual_registers.hpp"
+#include "armcal/link/trace_registers.hpp"
 #include "armcal/port/clock.hpp"
 #include "armcal/port/storage.hpp"
 #include "armcal/table/table_store.hpp"
@@ -59,6 +61,17 @@ class Controller {
   // Which axes are under control, a bit each: a table is then adopted only if it is bumpless. Context: any.
   void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
 
+  // From now on a client can record what Push and FeedForward were given; `ring` outlives this. Once, before the first
+  // tick. Answers as link::ServeTrace. Context: background.
+  template <std::uint32_t kRingWords>
+  core::Status Record(RawTrace<Model, kRingWords>& ring) {
+    const core::Status served = link::ServeTrace(device_.map(), 0, ring);
+    if (!core::IsOk(served)) return served;
+    device_.Declare(link::reg::kHasRawTrace);
+    trace_ = &ring;
+    return served;
+  }
+
   // Joint torque of the set-point by the table in force. tau_Nm: [n], zero without a table. Answers as
   // feedforward::FeedForward::Evaluate. Context: tick.
   core::Status FeedForward(const SetPoint<n>& set, const float* temperature_degC, float* tau_Nm) {
@@ -71,6 +84,7 @@ class Controller {
                                                         : 1u,
                              std::memory_order_relaxed);
     clamp_count_.store(feed_forward_.clamp_count(), std::memory_order_relaxed);
+    for (int i = 0; i < n; ++i) told_q_[i] = set.q[i], told_Nm_[i] = tau_Nm[i];
     return status;
   }
 
@@ -82,6 +96,7 @@ class Controller {
       if (!core::IsOk(pushed)) status = pushed;
     };
     ForEach(push);
+    if (trace_ != nullptr) RecordTick(raw);
     return status;
   }
 
@@ -164,6 +179,18 @@ class Controller {
     live_.health = static_cast<std::uint16_t>(e.inconsistent ? live_.health | bit : live_.health & ~bit);
   }
 
+  // Context: tick. A full ring counts what it refuses.
+  void RecordTick(const model::RawSample<n>& raw) {
+    const link::TraceTurn turn = trace_->Offer(raw.tick);
+    if (!turn.recording) return;
+    if (turn.first) record_.Clear();
+    record_.Add(raw, told_q_, told_Nm_);
+    if (!turn.last) return;
+    std::uint16_t words[estimator::RawRecordWords<n>(estimator::kRawAll)];
+    record_.Write(trace_->armed().channels, words);
+    (void)trace_->Push(words, feed_forward_.generation());
+  }
+
   // Callbacks of the link. Context: background.
   static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
     static_assert(monitor::ResidualBins::kValues == link::reg::kResidualBinValues &&
@@ -234,6 +261,9 @@ class Controller {
   link::Device device_;
 
   feedforward::FeedForward<Model> feed_forward_;
+  link::Trace* trace_ = nullptr;
+  estimator::RawRecord<n> record_;         // the tick's, as the two below
+  float told_q_[n] = {}, told_Nm_[n] = {};  // by the last FeedForward
   std::tuple<estimator::Estimator<Model, Filters>...> estimators_;
   estimator::Estimates<Model> estimates_[kFilters];
   monitor::ResidualStatistics<n> residuals_;

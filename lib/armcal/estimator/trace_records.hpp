@@ -75,10 +75,12 @@ class RawRecord {
   }
 
  private:
-  // 16 x mean, rounded to nearest
+  // 16 x mean, rounded to nearest; in 32 bits, which the core divides itself.
   std::int32_t Sixteenths(std::int32_t sum) const {
-    const std::int64_t scaled = static_cast<std::int64_t>(sum) * 32 + (sum >= 0 ? count_ : -count_);
-    return count_ > 0 ? static_cast<std::int32_t>(scaled / (2 * count_)) : 0;
+    if (count_ == 0) return 0;
+    const std::int32_t whole = sum / count_, rest = sum % count_;
+    const std::int32_t share = (rest * 32 + (rest >= 0 ? count_ : -count_)) / (2 * count_);
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(whole) * 16u + static_cast<std::uint32_t>(share));
   }
 
   std::int32_t count_ = 0;

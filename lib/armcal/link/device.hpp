@@ -48,6 +48,9 @@ class Device {
   // kFull: no room for another list; else what RegisterMap::Add answers.
   core::Status AddFloats(std::uint16_t first, const float* values, std::uint16_t count);
 
+  // What else the device can do (reg::kHasRawTrace ...). Before the first request.
+  void Declare(std::uint32_t capabilities) { identity_.capabilities |= capabilities; }
+
   // Time goes on for the transaction and the lock. Call it in every turn of the background loop.
   void Step(std::uint32_t now_ms);
 

@@ -9,8 +9,9 @@ using Model = armcal::generated::SelectedModel;
 using Filter = armcal::filter::ForgettingFilter<Model>;
 static armcal::controller::Controller<Model, Filter> controller(board::Storage(), board::Clock());
 static armcal::link::RtuService modbus(controller.engine(), board::Serial(), board::Clock(), 1, board::kSilence_ms);
+static armcal::controller::RawTrace<Model, 16384> trace;  // 32 KB: so late may a client be that records, four seconds
 
-extern "C" void TickInterrupt() {  // constant time
+extern "C" void TickInterrupt() {  // bounded time, the same whatever is measured
   armcal::model::RawSample<Model::kJoints> raw;
   armcal::controller::SetPoint<Model::kJoints> set;
   float tau_Nm[Model::kJoints];
@@ -21,6 +22,7 @@ extern "C" void TickInterrupt() {  // constant time
 }
 extern "C" void SerialInterrupt() { board::OnSerial(); }  // bytes into a ring, nothing else
 extern "C" void Application() {                           // all the rest, in bounded slices
+  (void)controller.Record(trace);                         // what Push and FeedForward are given, if a client asks
   (void)controller.Boot();                                // why there is no table, if so, is served as a register
   board::Start(Model::kTickRate_Hz);
   for (;;) {

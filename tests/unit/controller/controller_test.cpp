@@ -185,6 +185,47 @@ TEST(Controller, AJointReset_IsAsUncertainAsBeforeIt) {
   }
 }
 
+TEST(Controller, ATraceThatAClientArms_HoldsWhatTheTickWasGiven) {
+  const auto bench = std::make_unique<Bench<Forgetting>>();
+  const auto trace = std::make_unique<controller::RawTrace<Model, 8192>>();
+  const auto capabilities = [&] {
+    return core::GetU32(bench->Read(link::RegisterKind::kInput, reg::kIdentity + 20, 2).data());
+  };
+  EXPECT_EQ(capabilities() & reg::kHasRawTrace, 0u);
+  ASSERT_EQ(bench->controller.Record(*trace), Status::kOk);
+  EXPECT_EQ(capabilities() & reg::kHasRawTrace, reg::kHasRawTrace);
+  EXPECT_EQ(bench->controller.Record(*trace), Status::kBadAddress);  // once
+  bench->Run(50);  // nobody has asked
+  EXPECT_EQ(bench->Read(link::RegisterKind::kInput, reg::kTracePage[0] + 6, 1)[0], 0);
+
+  const std::uint32_t channels = estimator::kRawAll, start = bench->now + 10;
+  std::vector<std::uint16_t> arm{7, 2, 4, 0};  // streaming, four ticks a record
+  for (const std::uint16_t half : bench->Halves({start, 0, channels})) arm.push_back(half);
+  ASSERT_EQ(bench->Write(reg::kTraceArm[0], arm), Status::kOk);
+  bench->Run(10 + 4 * 3);
+  const auto header = bench->Read(link::RegisterKind::kInput, reg::kTracePage[0], reg::kPageHeaderCount);
+  EXPECT_EQ(core::GetU32(&header[2]), start);
+  EXPECT_EQ(header[6], 3);
+  ASSERT_EQ(header[7], 11 * n);
+  const auto words = bench->Read(link::RegisterKind::kInput, reg::kTracePage[0] + reg::kPageData, 3 * 11 * n);
+  for (int record = 0; record < 3; ++record)
+    for (int j = 0; j < n; ++j) {
+      double counts = 0, current = 0, told = 0;
+      for (std::uint32_t k = 0; k < 4; ++k) {
+        model::RawSample<n> raw;
+        controller::SetPoint<n> set;
+        (void)bench->axes.Read(start + 4 * record + k, raw, set);
+        counts += raw.counts[j], current += raw.current[j], told += static_cast<double>(set.q[j]);
+      }
+      const std::uint16_t* w = &words[11 * (n * record + j)];
+      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(w)) / 16.0, counts / 4, 1.0 / 32);
+      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(w + 2)) / 16.0, current / 4, 1.0 / 32);
+      EXPECT_EQ(w[6], model::kEnabled);
+      EXPECT_NEAR(core::GetF32(w + 7), told / 4, 1e-6);
+      EXPECT_EQ(core::GetF32(w + 9), 0.0f);  // no table: no feed-forward
+    }
+}
+
 TEST(Controller, NoiseFarBeyondTheTables_IsServedAsTheFiltersHealth) {
   const auto bench = std::make_unique<Bench<Forgetting, Block>>();
   bench->Run(9000);

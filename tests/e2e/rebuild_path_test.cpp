@@ -45,7 +45,8 @@ exponent = 2.8
   EXPECT_EQ(result.at("title"), "churning in joint 4 of another arm");
 }
 
-// A base that is not level turns gravity for the whole arm; a drag with the ninth power of speed is in no record.
+// A base that is not level turns gravity for the whole arm; a drag with the ninth power of speed is in no record. (At the
+// joint's speed limit, which every excitation comes close to, it is 30 N*m of the 90 that the axis has.)
 TEST_F(RebuildPath, ATiltedBaseAndAnUnknownFriction_AreCompiledIn) {
   const fs::path folder = FreshFolder("tilt_and_curve");
   const fs::path scenario = folder / "tilt_and_curve.toml";
@@ -61,18 +62,18 @@ pitch_deg = 0.6
 
 [[effect]]
 kind = "viscous_cubic"
-joint = 4
-drag_at_1radps_Nm = 1e-4
+joint = 6
+drag_at_1radps_Nm = 2e-8
 exponent = 9.0
 )";
   const nlohmann::json result = RunDemo(scenario.string(), folder);
   ASSERT_FALSE(result.is_null());
   ExpectSoundLoop(result, folder);
-  ExpectFound(result, {"unknown"}, 4);
+  ExpectFound(result, {"unknown"}, 6);
   ASSERT_EQ(result.at("terms").size(), 2u);
   const nlohmann::json &curve = result.at("terms")[0], &tilt = result.at("terms")[1];
   EXPECT_EQ(curve.at("record"), "curve_friction");
-  EXPECT_EQ(curve.at("signals"), nlohmann::json({"qd4"}));
+  EXPECT_EQ(curve.at("signals"), nlohmann::json({"qd6"}));
   EXPECT_EQ(tilt.at("kind"), "base_tilt");
   for (const int joint : {1, 2}) ExpectExcessGone(result, joint);
   EXPECT_FALSE(result.at("model").at("by_table").get<bool>());

@@ -45,15 +45,14 @@ int RunRecord(const RecordOptions& o) {
   std::uint32_t first_tick = 0;
   const io::Log log = RawLog(raw, robot, played_ticks, first_tick);
   io::WriteLog(o.out, log);
-  nlohmann::ordered_json json{{"log", o.out},
-                              {"first_tick", first_tick},
-                              {"decimation", raw.tick_step},
-                              {"samples", log.samples()}};
+  nlohmann::ordered_json json{
+      {"log", o.out}, {"first_tick", first_tick}, {"decimation", raw.tick_step}, {"samples", log.samples()}};
   report::Table table{{"joint", "moving / %"}, {}};
   VectorXd tracking;
   if (log.qref.size() > 0) {
     const auto always = [](Eigen::Index, int) { return true; };
-    tracking = RmsOf(log, [&](Eigen::Index k, int j) { return log.q(k, j) - log.qref(k, j); }, always);
+    tracking = RmsOf(
+        log, [&](Eigen::Index k, int j) { return log.q(k, j) - log.qref(k, j); }, always);
     json["tracking_rms_rad"] = List(tracking);
     table.header.push_back("tracking error rms / mrad");
   }

@@ -182,8 +182,10 @@ void CheckDrive(client::DriveClient& drive, const RecordOptions& o, const codege
   try {
     (void)ReadPlayer(drive);
   } catch (const client::RefusedError&) {
-    throw client::RefusedError(drive.name() + ": plays no trajectories; move the arm by its own controller, with "
-                               "--seconds instead of --trajectory", 0, core::Status::kBadAddress);
+    throw client::RefusedError(drive.name() +
+                                   ": plays no trajectories; move the arm by its own controller, with --seconds "
+                                   "instead of --trajectory",
+                               0, core::Status::kBadAddress);
   }
 }
 

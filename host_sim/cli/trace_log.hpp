@@ -12,8 +12,8 @@ struct PlayedTicks {
   std::uint32_t first, last;
 };
 
-// Trace 0, with motion and flags and whatever else its channels hold. Records whose whole window lies inside the played part; first_tick: of the first of them.
-// Throws client::LinkError if there are too few for a log.
+// Trace 0, with motion and flags and whatever else its channels hold. Records whose whole window lies inside the played
+// part; first_tick: of the first of them. Throws client::LinkError if there are too few for a log.
 io::Log RawLog(const client::TraceRecords& records, const codegen::Robot& robot, const PlayedTicks& played,
                std::uint32_t& first_tick);
 

@@ -3,8 +3,8 @@
 #include <csignal>
 #include <cstring>
 
-#include "host_sim/drive/drive.hpp"
 #include <selected_model.hpp>
+#include "host_sim/drive/drive.hpp"
 
 namespace {
 

@@ -1,4 +1,5 @@
-// tests - every path that a page of docs, README or DESIGN puts between backticks is there, and so is every linked page.
+// tests - every path that a page of docs, README or DESIGN puts between backticks is there, and so is every linked
+// page.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -45,8 +45,8 @@ exponent = 2.8
   EXPECT_EQ(result.at("title"), "churning in joint 4 of another arm");
 }
 
-// A base that is not level turns gravity for the whole arm; a drag with the ninth power of speed is in no record. (At the
-// joint's speed limit, which every excitation comes close to, it is 30 N*m of the 90 that the axis has.)
+// A base that is not level turns gravity for the whole arm; a drag with the ninth power of speed is in no record. (At
+// the joint's speed limit, which every excitation comes close to, it is 30 N*m of the 90 that the axis has.)
 TEST_F(RebuildPath, ATiltedBaseAndAnUnknownFriction_AreCompiledIn) {
   const fs::path folder = FreshFolder("tilt_and_curve");
   const fs::path scenario = folder / "tilt_and_curve.toml";

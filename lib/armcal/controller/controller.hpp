@@ -262,7 +262,7 @@ class Controller {
 
   feedforward::FeedForward<Model> feed_forward_;
   link::Trace* trace_ = nullptr;
-  estimator::RawRecord<n> record_;         // the tick's, as the two below
+  estimator::RawRecord<n> record_;          // the tick's, as the two below
   float told_q_[n] = {}, told_Nm_[n] = {};  // by the last FeedForward
   std::tuple<estimator::Estimator<Model, Filters>...> estimators_;
   estimator::Estimates<Model> estimates_[kFilters];

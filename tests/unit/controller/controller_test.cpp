@@ -195,7 +195,7 @@ TEST(Controller, ATraceThatAClientArms_HoldsWhatTheTickWasGiven) {
   ASSERT_EQ(bench->controller.Record(*trace), Status::kOk);
   EXPECT_EQ(capabilities() & reg::kHasRawTrace, reg::kHasRawTrace);
   EXPECT_EQ(bench->controller.Record(*trace), Status::kBadAddress);  // once
-  bench->Run(50);  // nobody has asked
+  bench->Run(50);                                                    // nobody has asked
   EXPECT_EQ(bench->Read(link::RegisterKind::kInput, reg::kTracePage[0] + 6, 1)[0], 0);
 
   const std::uint32_t channels = estimator::kRawAll, start = bench->now + 10;

@@ -220,8 +220,8 @@ TEST(ForgettingFilter, AnySlices_GiveTheSameBits) {
   EXPECT_EQ(Kept(whole), Kept(sliced));
 }
 
-// In double: the block's rows of R are gone; where the dense columns may be anywhere in their prior, this is noise in the
-// front columns' rows.
+// In double: the block's rows of R are gone; where the dense columns may be anywhere in their prior, this is noise in
+// the front columns' rows.
 TEST(ForgettingFilter, Reset_ForgetsItsBlock_AndWhatWasKnownThroughIt) {
   for (int block = 0; block <= Small::kJoints; ++block) {
     Bench bench;
@@ -255,7 +255,7 @@ TEST(ForgettingFilter, Reset_ForgetsItsBlock_AndWhatWasKnownThroughIt) {
     const auto out = Read(filter);
     EXPECT_LT(Distance<Small>(out.x, oracle), 0.01) << block;
     for (int k = 0; k < Small::kColumns; ++k) EXPECT_NEAR(out.sd[k] / oracle.sd(k), 1, 1e-3) << block << ", " << k;
-    if (block != 1) {  // this joint has no front columns
+    if (block != 1) {                                              // this joint has no front columns
       EXPECT_GT(Distance<Small>(out.x, untouched), 0.1) << block;  // a reset that does nothing would show
     }
     learn(10);

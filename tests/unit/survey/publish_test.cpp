@@ -44,8 +44,7 @@ TEST(SurveyJson, HoldsRowsByColumnAndEveryGoal) {
 
 TEST(SurveyPage, ContainsTablesGoalsAndDrawings_Escaped) {
   const std::string html = Html(Small(), {});
-  for (const char* part :
-       {"small enough", "65.5", "0.100 ± 0.020", "<svg viewBox='0 0 1 1'>", "platform &lt;1&gt;"})
+  for (const char* part : {"small enough", "65.5", "0.100 ± 0.020", "<svg viewBox='0 0 1 1'>", "platform &lt;1&gt;"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   EXPECT_LT(html.find("<svg viewBox='0 0 1 1'>"), html.find("</main>"));
 }

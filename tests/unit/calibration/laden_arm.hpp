@@ -2,14 +2,13 @@
 // constants are off; only the motion's time law is borrowed.
 #pragma once
 
-#include <unistd.h>
-
 #include <fstream>
 #include <random>
 
 #include "host_sim/plant/dynamics.hpp"
 #include "host_sim/plant/truth.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
+#include "tests/unit/io/temporary_folder.hpp"
 
 namespace armcal::tests {
 
@@ -20,9 +19,8 @@ inline std::string ReadAll(const std::string& path) {
 
 // A robot file with `more` at its end, in a temporary folder.
 inline std::string RobotWith(const std::string& more, const std::string& name = "er20_like") {
-  const std::string path = testing::TempDir() + "armcal_" + std::to_string(getpid()) + "_" + name + ".toml";
-  std::ofstream(path) << ReadAll("codegen/robots/" + name + ".toml") << more;
-  return path;
+  static const io::test::TemporaryFolder folder;  // until the program ends
+  return folder.Write(name + ".toml", ReadAll("codegen/robots/" + name + ".toml") + more).string();
 }
 
 // The flange is neither at the last link's origin nor along its axes.

@@ -254,9 +254,8 @@ TEST(Payload, FileThatIsIncomplete_IsRefusedNamingTheKey) {
       if (as_robot) {
         codegen::ReadRobot(tests::RobotWith(text, "er20_like"));
       } else {
-        const std::string path = testing::TempDir() + "armcal_payload.toml";
-        std::ofstream(path) << text;
-        codegen::ReadPayload(std::filesystem::path(path));
+        const io::test::TemporaryFolder folder;
+        codegen::ReadPayload(folder.Write("payload.toml", text));
       }
     });
   };

@@ -2,24 +2,21 @@
 #pragma once
 
 #include <cmath>
-#include <fstream>
 #include <numbers>
 #include <string>
 #include <vector>
-
-#include <unistd.h>
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
 #include "host_sim/plant/arm.hpp"
+#include "tests/unit/io/temporary_folder.hpp"
 
 namespace armcal::plant::bench {
 
 inline std::string WriteText(const std::string& name, const std::string& text) {
-  const std::string path = ::testing::TempDir() + "armcal_plant_" + std::to_string(::getpid()) + "_" + name;
-  std::ofstream(path) << text;
-  return path;
+  static const io::test::TemporaryFolder folder;  // until the program ends
+  return folder.Write(name, text).string();
 }
 
 // What a test wants of a joint; the rest is the same for all.

@@ -64,7 +64,7 @@ void MakePrior(filter::Prior<Layout>& prior) {
     prior.lambda[k] = 0.999f;
     prior.noise[k] = k < Layout::kFront || k >= Layout::kColumns ? 1e-6f : 0.0f;
   }
-  prior.link_floor = 1e-9f;
+  prior.link_floor = 1e-6f;
   prior.gate_sigma = 4.0f;
 }
 

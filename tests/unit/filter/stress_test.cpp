@@ -9,7 +9,7 @@ constexpr int kSamples = 10000;
 class Condition : public testing::TestWithParam<double> {};
 
 TEST_P(Condition, WithNoiseAndForgetting_BothStayBesideTheRecursionsInDouble) {
-  Stress stress(GetParam(), 0.999f, 1e-6f, 1e-9f);
+  Stress stress(GetParam(), 0.999f, 1e-6f, 1e-6f);
   for (int s = 0; s < kSamples; ++s) stress.Sample();
   EXPECT_LT(stress.KalmanDistance(), 0.2);
   EXPECT_LT(stress.ForgettingDistance(), 0.05);

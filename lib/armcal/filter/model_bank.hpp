@@ -193,7 +193,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     const int first = Columns::kAt.first[i], slope = Columns::kAt.front_end[i] - 1, width = slope + 1 - first;
     const std::uint32_t moves = math::MaskOf((moving_ >> i & 1u) != 0u);
     const int p = drifting_[i] < 0 ? slope : drifting_[i], turn = first + turn_[i];
-    const float noise = prior_->noise[Columns::kAt.column[turn == slope ? first : turn]];
+    const float noise = prior_->noise[turn == slope ? 0 : Columns::kAt.column[turn]];  // of the slope: not asked
     const bool walks = (drifting_[i] >= 0) & ((turn == slope) | (noise > 0.0f));
     for (int m = 0; m < kMembers; ++m) {
       Estimate& e = member_[m];

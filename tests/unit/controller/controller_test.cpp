@@ -199,10 +199,11 @@ TEST(Controller, ATraceThatAClientArms_HoldsWhatTheTickWasGiven) {
   EXPECT_EQ(bench->Read(link::RegisterKind::kInput, reg::kTracePage[0] + 6, 1)[0], 0);
 
   const std::uint32_t channels = estimator::kRawAll, start = bench->now + 10;
-  std::vector<std::uint16_t> arm{7, 2, 4, 0};  // streaming, four ticks a record
+  constexpr std::uint16_t kTicks = 3;               // a record, so that a mean has to be rounded
+  std::vector<std::uint16_t> arm{7, 2, kTicks, 0};  // streaming
   for (const std::uint16_t half : bench->Halves({start, 0, channels})) arm.push_back(half);
   ASSERT_EQ(bench->Write(reg::kTraceArm[0], arm), Status::kOk);
-  bench->Run(10 + 4 * 3);
+  bench->Run(10 + 3 * kTicks);
   const auto header = bench->Read(link::RegisterKind::kInput, reg::kTracePage[0], reg::kPageHeaderCount);
   EXPECT_EQ(core::GetU32(&header[2]), start);
   EXPECT_EQ(header[6], 3);
@@ -211,17 +212,17 @@ TEST(Controller, ATraceThatAClientArms_HoldsWhatTheTickWasGiven) {
   for (int record = 0; record < 3; ++record)
     for (int j = 0; j < n; ++j) {
       double counts = 0, current = 0, told = 0;
-      for (std::uint32_t k = 0; k < 4; ++k) {
+      for (std::uint32_t k = 0; k < kTicks; ++k) {
         model::RawSample<n> raw;
         controller::SetPoint<n> set;
-        (void)bench->axes.Read(start + 4 * record + k, raw, set);
+        (void)bench->axes.Read(start + kTicks * record + k, raw, set);
         counts += raw.counts[j], current += raw.current[j], told += static_cast<double>(set.q[j]);
       }
       const std::uint16_t* w = &words[11 * (n * record + j)];
-      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(w)) / 16.0, counts / 4, 1.0 / 32);
-      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(w + 2)) / 16.0, current / 4, 1.0 / 32);
+      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(w)) / 16.0, counts / kTicks, 1.0 / 32);
+      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(w + 2)) / 16.0, current / kTicks, 1.0 / 32);
       EXPECT_EQ(w[6], model::kEnabled);
-      EXPECT_NEAR(core::GetF32(w + 7), told / 4, 1e-6);
+      EXPECT_NEAR(core::GetF32(w + 7), told / kTicks, 1e-6);
       EXPECT_EQ(core::GetF32(w + 9), 0.0f);  // no table: no feed-forward
     }
 }

@@ -39,8 +39,20 @@ bool TakeSerial(const std::vector<std::string>& parts, client::SerialLine& line,
 
 }  // namespace
 
+bool IsSerialLine(const std::string& address) { return address.rfind('/', 0) == 0; }
+
+std::pair<std::string, int> HostAndPort(const std::string& address) {
+  const auto colon = address.rfind(':');
+  int port = 0;
+  if (colon == std::string::npos || !TakeNumber(address.substr(colon + 1), 1, 65535, port))
+    throw io::InputError("--connect " + address +
+                         ": expected HOST:PORT, for instance 127.0.0.1:1502, or a serial line, for instance "
+                         "/dev/ttyUSB0:115200");
+  return {address.substr(0, colon), port};
+}
+
 client::DriveClient ConnectTo(const std::string& address) {
-  if (address.rfind('/', 0) == 0) {
+  if (IsSerialLine(address)) {
     client::SerialLine line;
     int unit = 1;
     if (!TakeSerial(Parts(address), line, unit))
@@ -49,13 +61,8 @@ client::DriveClient ConnectTo(const std::string& address) {
                            "230400 baud, parity N, E or O, unit 1 to 247");
     return client::DriveClient(line, unit);
   }
-  const auto colon = address.rfind(':');
-  int port = 0;
-  if (colon == std::string::npos || !TakeNumber(address.substr(colon + 1), 1, 65535, port))
-    throw io::InputError("--connect " + address +
-                         ": expected HOST:PORT, for instance 127.0.0.1:1502, or a serial line, for instance "
-                         "/dev/ttyUSB0:115200");
-  return client::DriveClient(address.substr(0, colon), port);
+  const auto [host, port] = HostAndPort(address);
+  return client::DriveClient(host, port);
 }
 
 calibration::TableFile LayoutOf(client::DriveClient& drive, const codegen::Model& model) {

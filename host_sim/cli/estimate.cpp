@@ -1,6 +1,7 @@
 // cli - armcal estimate: starts the host port of the estimator that was compiled for a robot.
 #include <unistd.h>
 
+#include "host_sim/cli/connect.hpp"
 #include "host_sim/cli/verb.hpp"
 #include "host_sim/io/input_error.hpp"
 
@@ -24,10 +25,10 @@ int RunEstimate(const EstimateOptions& o) {
   std::vector<std::string> words{program.string(), "--robot", robot.string(), "--effects",
                                  (Home() / "codegen" / "effects").string()};
   if (!o.connect.empty()) {
-    const auto colon = o.connect.rfind(':');
-    if (colon == std::string::npos || o.connect[0] == '/')
+    if (IsSerialLine(o.connect))
       throw io::InputError("--connect " + o.connect + ": expected HOST:PORT; a serial line cannot carry every sample");
-    words.insert(words.end(), {"--host", o.connect.substr(0, colon), "--port", o.connect.substr(colon + 1)});
+    const auto [host, port] = HostAndPort(o.connect);
+    words.insert(words.end(), {"--host", host, "--port", std::to_string(port)});
   }
   for (const auto& [key, value] :
        {std::pair{"--log", o.log}, {"--table", o.table}, {"--records", o.records}, {"--json", o.json}})

@@ -84,7 +84,8 @@ class Controller {
                                                         : 1u,
                              std::memory_order_relaxed);
     clamp_count_.store(feed_forward_.clamp_count(), std::memory_order_relaxed);
-    for (int i = 0; i < n; ++i) told_q_[i] = set.q[i], told_Nm_[i] = tau_Nm[i];
+    if (trace_ != nullptr)
+      for (int i = 0; i < n; ++i) told_q_[i] = set.q[i], told_Nm_[i] = tau_Nm[i];
     return status;
   }
 

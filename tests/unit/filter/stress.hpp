@@ -57,15 +57,15 @@ struct Collinear {
   }
 };
 
-inline Prior<SixAxis> Independent(float lambda) {
+inline Prior<SixAxis> Independent(float lambda, float noise, float floor) {
   Prior<SixAxis> prior;
   for (int k = 0; k < SixAxis::kColumns; ++k) {
     prior.active[k] = ~0u;
     prior.lambda[k] = lambda;
-    prior.noise[k] = k < SixAxis::kFront ? 1e-8f : 0.0f;
+    prior.noise[k] = k < SixAxis::kFront ? noise : 0.0f;
   }
   for (int k = 0; k < SixAxis::kDense; ++k) prior.dense_ud[math::UdIndex(k, k)] = 1.0f;
-  prior.link_floor = 1e-9f;
+  prior.link_floor = floor;
   return prior;
 }
 
@@ -147,9 +147,8 @@ struct Stress {
   DoubleTriangle triangle_oracle;
   int noisy = 0;
 
-  Stress(double condition, float lambda, float noise, float floor) : rows(condition), prior(Independent(lambda)) {
-    prior.link_floor = floor;
-    for (int k = 0; k < SixAxis::kFront; ++k) prior.noise[k] = noise;
+  Stress(double condition, float lambda, float noise, float floor)
+      : rows(condition), prior(Independent(lambda, noise, floor)) {
     kalman->Restart(prior);
     forgetting->Restart(prior);
   }

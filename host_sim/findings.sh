@@ -15,7 +15,7 @@ splits() {
   local name=$1 set=$2 robot=$3
   shift 3
   echo "== $name"
-  "${ARMCAL:-build/host/armcal}" diagnose --robot "$robot" --channels "host_sim/io/channels/$set.toml" \
+  "${ARMCAL:-build/host/armcal}" diagnose --robot "$robot" --channels "host_sim/data/channels/$set.toml" \
     --out "$out/$name" --json "$out/$name.json" --report "$out/$name.html" --splits "$@"
   for picture in "$out/$name"/*.svg; do cp "$picture" "$pictures/${name}_$(basename "$picture")"; done
 }
@@ -37,7 +37,7 @@ state = "estimated"
 joints = [7]
 nonlinear = { lo = -1.27, hi = 1.27 }'
 errors() {  # ROBOT HELD_OUT TRAIN...
-  "${ARMCAL:-build/host/armcal}" identify --robot "$1" --channels host_sim/io/channels/kuka_lwr4.toml \
+  "${ARMCAL:-build/host/armcal}" identify --robot "$1" --channels host_sim/data/channels/kuka_lwr4.toml \
     --train "${@:3}" --test "${lwr}_$2.csv.gz" |
     awk -v what="run $2, $(basename "$1" .toml):" '/^ +[1-7] /{ what = what " " $3 } END { print what }'
 }

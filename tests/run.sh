@@ -94,12 +94,12 @@ if [[ $scope != fast ]]; then
     fi
   done
   step "a user's project for cortex-m7" ctest --build-and-test tests/add_model/consumer build/cortex-m7/consumer \
-    --build-generator Ninja --build-options "-DARMCAL=$PWD" "-DARMCAL_TOOL=$PWD/build/host/armcal" \
+    --build-generator Ninja --build-options "-DARMCAL=$PWD" "-DARMCAL_GENERATE=$PWD/build/host/armcal-generate" \
     "-DCMAKE_TOOLCHAIN_FILE=$PWD/toolchains/cortex-m7.cmake" -DCMAKE_BUILD_TYPE=Release
 
   # Under sanitizers: what bytes from outside reach and what runs on the target. The host's matrix code takes long to compile so; it
   # comes with `long`.
-  rooms=(core math signal filter physical monitor feedforward table link controller client io report port_template)
+  rooms=(core math signal filter physical monitor feedforward table link controller client files logs report port_template)
   targets=("${rooms[@]/#/test_}")
   tests="^($(IFS='|'; echo "${targets[*]}"))$"
   if [[ $scope == long ]]; then

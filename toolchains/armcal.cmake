@@ -9,7 +9,8 @@ add_library(armcal_rules INTERFACE)
 # Contraction would make host and target differ in the last bit; fast-math would remove the NaN checks.
 target_compile_options(armcal_rules INTERFACE -Wall -Wextra -Wpedantic -Werror -Wshadow -ffp-contract=off -fno-fast-math
                        -fno-math-errno)
-target_include_directories(armcal_rules INTERFACE ${PROJECT_SOURCE_DIR}/lib)
+get_filename_component(ARMCAL_TOP ${CMAKE_CURRENT_LIST_DIR} DIRECTORY)  # the checkout
+target_include_directories(armcal_rules INTERFACE ${ARMCAL_TOP}/lib)
 if(CMAKE_CROSSCOMPILING)
   target_compile_options(armcal_rules INTERFACE -fcallgraph-info=su)  # who calls whom and with how much stack: toolchains/stack.py
 endif()
@@ -23,7 +24,7 @@ target_compile_options(armcal_lib_rules INTERFACE -Wconversion -Wno-sign-convers
 add_library(armcal_host_rules INTERFACE)
 target_link_libraries(armcal_host_rules INTERFACE armcal_rules)
 target_compile_options(armcal_host_rules INTERFACE -Wno-restrict)
-target_include_directories(armcal_host_rules INTERFACE ${PROJECT_SOURCE_DIR})
+target_include_directories(armcal_host_rules INTERFACE ${ARMCAL_TOP})
 target_compile_features(armcal_host_rules INTERFACE cxx_std_20)
 
 if(ARMCAL_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
@@ -101,9 +102,13 @@ function(armcal_emitted_models name)
   target_include_directories(${name} INTERFACE ${CMAKE_CURRENT_BINARY_DIR})
 endfunction()
 
-# add every subfolder that has a CMakeLists.txt
+# armcal_add_rooms([FOLDER]): adds the folder's own CMakeLists.txt and those of its subfolders, as far as there are any.
 function(armcal_add_rooms)
-  file(GLOB rooms CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/*/CMakeLists.txt)
+  set(top ${CMAKE_CURRENT_SOURCE_DIR})
+  file(GLOB rooms CONFIGURE_DEPENDS RELATIVE ${top} ${top}/${ARGV0}/*/CMakeLists.txt)
+  if(ARGV0 AND EXISTS ${top}/${ARGV0}/CMakeLists.txt)
+    list(APPEND rooms ${ARGV0}/CMakeLists.txt)
+  endif()
   foreach(room ${rooms})
     get_filename_component(room ${room} DIRECTORY)
     add_subdirectory(${room})

@@ -8,44 +8,46 @@
 # folders. NAME: the headers are included as <FOLDER/model.hpp>, for a project with more than one model. A bad robot file ends the build
 # with one line that names file and key.
 #
-# The generator runs on the PC, in a cross build, too. It is, in this order: the target `armcal` of this very build; the program that
-# ARMCAL_TOOL names (cache variable or environment); `armcal` in <armcal>/build/host or on the PATH; else it is built from the checkout
-# with the PC's own compiler, under the build folder (needs toolchains/install.sh host).
+# The generator runs on the PC, in a cross build, too. It is, in this order: the target `armcal-generate` of this very build; the program
+# that ARMCAL_GENERATE names (cache variable or environment); `armcal-generate` in <armcal>/build/host or on the PATH; else it is built
+# from the checkout with the PC's own compiler, under the build folder. That takes ten compile steps at most and these Debian
+# packages: g++ cmake ninja-build libeigen3-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev; and pkg-config liburdfdom-dev
+# for robot files that name a URDF.
 include_guard(GLOBAL)
 include(ExternalProject)
 get_filename_component(ARMCAL_CHECKOUT ${CMAKE_CURRENT_LIST_DIR} DIRECTORY)
 
 # Sets `out` to the generator's program and `wait_for` to the target that builds it, if one does.
-function(armcal_find_tool out wait_for)
+function(armcal_find_generator out wait_for)
   set(${wait_for} "" PARENT_SCOPE)
-  if(TARGET armcal AND NOT CMAKE_CROSSCOMPILING)
-    set(${out} $<TARGET_FILE:armcal> PARENT_SCOPE)
-    set(${wait_for} armcal PARENT_SCOPE)
+  if(TARGET armcal-generate AND NOT CMAKE_CROSSCOMPILING)
+    set(${out} $<TARGET_FILE:armcal-generate> PARENT_SCOPE)
+    set(${wait_for} armcal-generate PARENT_SCOPE)
     return()
   endif()
-  if(NOT ARMCAL_TOOL AND DEFINED ENV{ARMCAL_TOOL})
-    set(ARMCAL_TOOL $ENV{ARMCAL_TOOL})
+  if(NOT ARMCAL_GENERATE AND DEFINED ENV{ARMCAL_GENERATE})
+    set(ARMCAL_GENERATE $ENV{ARMCAL_GENERATE})
   endif()
-  if(ARMCAL_TOOL AND NOT EXISTS ${ARMCAL_TOOL})
-    message(FATAL_ERROR "ARMCAL_TOOL: ${ARMCAL_TOOL}: no such program")
+  if(ARMCAL_GENERATE AND NOT EXISTS ${ARMCAL_GENERATE})
+    message(FATAL_ERROR "ARMCAL_GENERATE: ${ARMCAL_GENERATE}: no such program")
   endif()
-  if(NOT ARMCAL_TOOL)
-    find_program(ARMCAL_FOUND_TOOL armcal HINTS ${ARMCAL_CHECKOUT}/build/host NO_CMAKE_FIND_ROOT_PATH)
-    set(ARMCAL_TOOL ${ARMCAL_FOUND_TOOL})
+  if(NOT ARMCAL_GENERATE)
+    find_program(ARMCAL_FOUND_GENERATE armcal-generate HINTS ${ARMCAL_CHECKOUT}/build/host NO_CMAKE_FIND_ROOT_PATH)
+    set(ARMCAL_GENERATE ${ARMCAL_FOUND_GENERATE})
   endif()
-  if(NOT ARMCAL_TOOL)
-    set(folder ${CMAKE_BINARY_DIR}/armcal_host_tool)
-    set(ARMCAL_TOOL ${folder}/armcal)
-    if(NOT TARGET armcal_host_tool)
-      ExternalProject_Add(armcal_host_tool
-        SOURCE_DIR ${ARMCAL_CHECKOUT} BINARY_DIR ${folder} PREFIX ${folder}.state
-        CONFIGURE_COMMAND ${CMAKE_COMMAND} -G ${CMAKE_GENERATOR} -S ${ARMCAL_CHECKOUT} -B ${folder} -DCMAKE_BUILD_TYPE=Release -DCMAKE_UNITY_BUILD=ON
-        BUILD_COMMAND ${CMAKE_COMMAND} --build ${folder} --target armcal
-        BUILD_ALWAYS ON INSTALL_COMMAND "" BUILD_BYPRODUCTS ${ARMCAL_TOOL})
+  if(NOT ARMCAL_GENERATE)
+    set(folder ${CMAKE_BINARY_DIR}/armcal_generate_program)
+    set(ARMCAL_GENERATE ${folder}/armcal-generate)
+    if(NOT TARGET armcal_generate_program)
+      ExternalProject_Add(armcal_generate_program
+        SOURCE_DIR ${ARMCAL_CHECKOUT}/codegen BINARY_DIR ${folder} PREFIX ${folder}.state
+        CONFIGURE_COMMAND ${CMAKE_COMMAND} -G ${CMAKE_GENERATOR} -S ${ARMCAL_CHECKOUT}/codegen -B ${folder} -DCMAKE_BUILD_TYPE=Release -DCMAKE_UNITY_BUILD=ON
+        BUILD_COMMAND ${CMAKE_COMMAND} --build ${folder} --target armcal-generate
+        BUILD_ALWAYS ON INSTALL_COMMAND "" BUILD_BYPRODUCTS ${ARMCAL_GENERATE})
     endif()
-    set(${wait_for} armcal_host_tool PARENT_SCOPE)
+    set(${wait_for} armcal_generate_program PARENT_SCOPE)
   endif()
-  set(${out} ${ARMCAL_TOOL} PARENT_SCOPE)
+  set(${out} ${ARMCAL_GENERATE} PARENT_SCOPE)
 endfunction()
 
 function(armcal_add_model target)
@@ -57,7 +59,7 @@ function(armcal_add_model target)
   if(NOT EXISTS ${robot})
     message(FATAL_ERROR "armcal_add_model(${target} ...): ${robot}: no such robot file")
   endif()
-  armcal_find_tool(tool wait_for)
+  armcal_find_generator(tool wait_for)
   set(include ${CMAKE_CURRENT_BINARY_DIR}/${target}.model)
   set(folder ${include})
   if(A_NAME)
@@ -65,7 +67,7 @@ function(armcal_add_model target)
   endif()
   file(GLOB records CONFIGURE_DEPENDS ${ARMCAL_CHECKOUT}/codegen/effects/*.toml)
   add_custom_command(OUTPUT ${folder}/model.hpp VERBATIM
-    COMMAND ${CMAKE_COMMAND} -E env ARMCAL_HOME=${ARMCAL_CHECKOUT} ${tool} generate --robot ${robot} --out ${folder}
+    COMMAND ${CMAKE_COMMAND} -E env ARMCAL_HOME=${ARMCAL_CHECKOUT} ${tool} --robot ${robot} --out ${folder}
     COMMAND ${CMAKE_COMMAND} -E touch ${folder}/model.hpp
     DEPENDS ${robot} ${records} ${tool} ${wait_for})
   add_custom_target(${target}_files DEPENDS ${folder}/model.hpp)

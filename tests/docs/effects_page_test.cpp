@@ -1,4 +1,4 @@
-// tests - docs/effects.md against the records: every record has its line, word for word.
+// tests - the pages on effects against the records and the table of quantities, word for word.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -23,13 +23,28 @@ std::string Parameters(const codegen::EffectRecord& r) {
 }
 
 std::string Line(const codegen::EffectRecord& r) {
-  return "| `" + r.name + "` | " + r.kind_class + " | " + r.scope + " | " + r.title +
+  return "| `" + r.name + "` | " + codegen::Word(r.effect_class) + " | " + codegen::Word(r.scope) + " | " + r.title +
          (r.replaces.empty() ? "" : " (law)") + " | " + Parameters(r) + " |\n";
 }
 
+std::string FileText(const char* path) {
+  std::ifstream in(path);
+  EXPECT_TRUE(in) << "run this in the top folder";
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(AddAnEffectPage, HasOneLinePerQuantity_AsTheTableSays) {
+  std::string expected, found;
+  for (const codegen::QuantityInfo& q : codegen::QuantityTable())
+    expected += std::string("| `") + q.word + "` | `" + q.declared + "` | " + q.unit + " | " + q.meaning + " |\n";
+  std::istringstream page(FileText("docs/add_an_effect.md"));
+  for (std::string line; std::getline(page, line);)
+    if (line.rfind("| `", 0) == 0) found += line + "\n";
+  EXPECT_EQ(found, expected) << "the table of docs/add_an_effect.md must be:\n" << expected;
+}
+
 TEST(EffectsPage, HasOneLinePerRecord_AsTheRecordSays) {
-  std::ifstream in("docs/effects.md");
-  ASSERT_TRUE(in) << "run this in the top folder";
+  std::istringstream in(FileText("docs/effects.md"));
   std::string expected, found;
   for (const auto& [name, record] : codegen::ReadCatalogue("codegen/effects")) expected += Line(record);
   for (std::string line; std::getline(in, line);)

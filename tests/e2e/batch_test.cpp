@@ -1,6 +1,6 @@
 // end-to-end tests - many logs at once: a folder of small arms, one of them lacking a term, some of them bad; and runs
 // of one arm, each held out once.
-#include "host_sim/io/log.hpp"
+#include "host_sim/data/logs/log.hpp"
 #include "tests/e2e/tool.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
@@ -11,10 +11,10 @@ constexpr int kPartial = 6, kBadInput = 2;
 
 void WriteRun(const fs::path& path, SyntheticArm& arm, std::uint64_t seed, const Effect& effect) {
   const calibration::Dataset d = arm.Run(10, seed, effect);
-  io::Log log;
+  logs::Log log;
   log.joints = d.joints();
   log.t = d.s.t, log.q = d.s.q, log.tau = d.tau;
-  io::WriteLog(path, log);
+  logs::WriteLog(path, log);
 }
 
 // Two good logs as pairs and one as a folder; "offset" lacks a term on joint 2; two that are bad, each in its own way.

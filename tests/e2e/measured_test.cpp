@@ -23,7 +23,7 @@ TEST(Measured, Kr300_HeldOutError_StaysWithinATenthOfItsReference) {
   const fs::path data = Measured("kuka_kr300");
   SKIP_WITHOUT(data, "kuka_kr300");
   const fs::path json = FreshFolder("kr300_identify") / "out.json";
-  const Outcome o = Tool({"identify", "--robot", "kuka_kr300", "--channels", "host_sim/io/channels/kuka_kr300.toml",
+  const Outcome o = Tool({"identify", "--robot", "kuka_kr300", "--channels", "host_sim/data/channels/kuka_kr300.toml",
                           "--train", (data / "run_A.csv.gz").string(), (data / "run_B.csv.gz").string(), "--test",
                           (data / "run_C.csv.gz").string(), "--band", "20", "--json", json.string()});
   ASSERT_EQ(o.code, 0) << o.err;
@@ -41,7 +41,7 @@ TEST(Measured, Emps_GivesThePublishedParameters) {
   const fs::path data = Measured("emps");
   SKIP_WITHOUT(data, "emps");
   const fs::path json = FreshFolder("emps") / "out.json";
-  const Outcome o = Tool({"identify", "--robot", "emps", "--channels", "host_sim/io/channels/emps.toml", "--train",
+  const Outcome o = Tool({"identify", "--robot", "emps", "--channels", "host_sim/data/channels/emps.toml", "--train",
                           (data / "emps_ident.csv.gz").string(), "--json", json.string()});
   ASSERT_EQ(o.code, 0) << o.err;
   struct Published {
@@ -66,7 +66,7 @@ TEST(Measured, Kr300_DiagnosisWritesTheWholeVerdict) {
   const fs::path data = Measured("kuka_kr300");
   SKIP_WITHOUT(data, "kuka_kr300");
   const fs::path folder = FreshFolder("kr300_diagnose");
-  const Outcome o = Tool({"diagnose", "--robot", "kuka_kr300", "--channels", "host_sim/io/channels/kuka_kr300.toml",
+  const Outcome o = Tool({"diagnose", "--robot", "kuka_kr300", "--channels", "host_sim/data/channels/kuka_kr300.toml",
                           "--train", (data / "run_A.csv.gz").string(), (data / "run_B.csv.gz").string(), "--test",
                           (data / "run_C.csv.gz").string(), "--json", (folder / "out.json").string(), "--report",
                           (folder / "out.html").string(), "--model-out", (folder / "new.toml").string()});
@@ -94,7 +94,7 @@ TEST(Measured, Kr300_DiagnosisWritesTheWholeVerdict) {
   EXPECT_NE(report.find("</html>"), std::string::npos);
   for (const auto& term : v.at("terms")) EXPECT_NE(report.find(term.at("kind").get<std::string>()), std::string::npos);
   const Outcome again = Tool({"identify", "--robot", (folder / "new.toml").string(), "--channels",
-                              "host_sim/io/channels/kuka_kr300.toml", "--train", (data / "run_A.csv.gz").string()});
+                              "host_sim/data/channels/kuka_kr300.toml", "--train", (data / "run_A.csv.gz").string()});
   EXPECT_EQ(again.code, 0) << again.err;  // the new robot file is one that the tool itself can read
 }
 

@@ -5,7 +5,7 @@
 #include <random>
 #include <regex>
 
-#include "host_sim/io/log.hpp"
+#include "host_sim/data/logs/log.hpp"
 #include "tests/e2e/tool.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
@@ -64,10 +64,10 @@ class ModelOut : public testing::Test {
  private:
   void Write(Dataset d, const Change& change, const std::string& name) const {
     if (change) change(d);
-    io::Log log;
+    logs::Log log;
     log.joints = d.joints();
     log.t = d.s.t, log.q = d.s.q, log.tau = d.tau;
-    io::WriteLog(Path(name), log);
+    logs::WriteLog(Path(name), log);
   }
 };
 

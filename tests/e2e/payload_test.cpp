@@ -1,5 +1,5 @@
 // end-to-end tests - drives' gains and a payload from two runs of the simulated drive, whose truth the scenario draws.
-#include "host_sim/plant/truth.hpp"
+#include "host_sim/machine/plant/truth.hpp"
 #include "tests/e2e/tool.hpp"
 
 namespace armcal::tests {

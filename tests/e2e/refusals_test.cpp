@@ -3,9 +3,9 @@
 #include <functional>
 #include <thread>
 
-#include "host_sim/calibration/table_file.hpp"
 #include "host_sim/client/drive_client.hpp"
-#include "host_sim/drive/vendor_registers.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
+#include "host_sim/machine/drive/vendor_registers.hpp"
 #include "tests/e2e/tool.hpp"
 
 namespace armcal::tests {

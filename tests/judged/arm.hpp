@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/plant/dynamics.hpp"
-#include "host_sim/plant/random.hpp"
+#include "host_sim/machine/plant/dynamics.hpp"
+#include "host_sim/machine/plant/random.hpp"
 
 namespace armcal::judged {
 

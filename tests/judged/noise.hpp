@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/plant/random.hpp"
+#include "host_sim/machine/plant/random.hpp"
 
 namespace armcal::judged {
 

@@ -1,4 +1,4 @@
-// rooms - scans the sources; knows the folders and reads text, nothing else.
+// rooms - scans the sources as text.
 #include "tests/rooms/house.hpp"
 
 #include <algorithm>
@@ -74,13 +74,23 @@ std::string RoomOf(const Edges& edges, const std::string& folder) {
 std::string Folder(const std::string& file) { return fs::path(file).parent_path().string(); }
 
 // An edge leads to a folder, to a folder and all below it ("x/"), or to one file.
-bool Allowed(const Edges& edges, const std::string& room, const std::string& file) {
+bool LeadsTo(const std::string& edge, const std::string& file) {
   const std::string folder = Folder(file);
-  if (RoomOf(edges, folder) == room) return true;
+  return edge.back() == '/' ? folder.rfind(edge, 0) == 0 : folder == edge || file == edge;
+}
+
+bool Allowed(const Edges& edges, const std::string& room, const std::string& file) {
+  if (RoomOf(edges, Folder(file)) == room) return true;
   const auto& may = edges.at(room);
-  return std::any_of(may.begin(), may.end(), [&](const std::string& other) {
-    return other.back() == '/' ? folder.rfind(other, 0) == 0 : folder == other || file == other;
-  });
+  return std::any_of(may.begin(), may.end(), [&](const std::string& edge) { return LeadsTo(edge, file); });
+}
+
+// The file from the top that a line includes; empty for another line.
+std::string FileOf(const std::string& line, const Selected& selected) {
+  std::string file = Included(line, '"', '"');
+  if (file.rfind("armcal/", 0) == 0) file = "lib/" + file;
+  const auto it = selected.find(file);
+  return it == selected.end() ? file : it->second;
 }
 
 bool InHouse(const std::string& name) { return Contains(kHouse, fs::path(name).begin()->string()); }
@@ -92,19 +102,32 @@ std::vector<std::string> CheckIncludes(const fs::path& top, const Edges& edges, 
   ForEachFile(top, IsSource, [&](const std::string& name, const std::vector<std::string>& lines) {
     if (!InHouse(name)) return;
     const std::string room = RoomOf(edges, Folder(name));
-    if (room.empty()) {
-      found.push_back(At(name, 0, "lies in no room of the table"));
-      return;
-    }
-    for (std::size_t k = 0; k < lines.size(); ++k) {
-      std::string file = Included(lines[k], '"', '"');
+    if (room.empty()) found.push_back(At(name, 0, "lies in no room of the table"));
+    for (std::size_t k = 0; k < lines.size() && !room.empty(); ++k) {
+      const std::string file = FileOf(lines[k], selected);
       if (file.empty()) continue;
-      if (file.rfind("armcal/", 0) == 0) file = "lib/" + file;
-      if (const auto it = selected.find(file); it != selected.end()) file = it->second;
       if (!InHouse(file)) found.push_back(At(name, k, "includes \"" + file + "\", which is no path from the top"));
       else if (!Allowed(edges, room, file)) found.push_back(At(name, k, room + " may not include " + file));
     }
   });
+  return found;
+}
+
+std::vector<std::string> UnusedEdges(const fs::path& top, const Edges& edges, const Selected& selected) {
+  std::map<std::string, std::set<std::string>> unused;
+  for (const auto& [room, may] : edges) unused[room].insert(may.begin(), may.end());
+  ForEachFile(top, IsSource, [&](const std::string& name, const std::vector<std::string>& lines) {
+    const auto room = unused.find(RoomOf(edges, Folder(name)));
+    if (room == unused.end()) return;
+    for (const std::string& line : lines) {
+      const std::string file = FileOf(line, selected);
+      if (!file.empty() && RoomOf(edges, Folder(file)) != room->first)
+        std::erase_if(room->second, [&](const std::string& edge) { return LeadsTo(edge, file); });
+    }
+  });
+  std::vector<std::string> found;
+  for (const auto& [room, left] : unused)
+    for (const std::string& edge : left) found.push_back(room + " -> " + edge + ": no include uses this edge");
   return found;
 }
 

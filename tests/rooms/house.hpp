@@ -1,4 +1,4 @@
-// rooms - the rules of the house that a program can check; knows the folders and reads text, nothing else.
+// rooms - the rules of the house that a program can check.
 #pragma once
 
 #include <filesystem>
@@ -19,6 +19,9 @@ using Selected = std::map<std::string, std::string>;
 // folders are not looked at.
 std::vector<std::string> CheckIncludes(const std::filesystem::path& top, const Edges& edges,
                                        const Selected& selected = {});
+// Edges of the table that no include uses, one line each.
+std::vector<std::string> UnusedEdges(const std::filesystem::path& top, const Edges& edges,
+                                     const Selected& selected = {});
 std::vector<std::string> CheckSystemHeaders(const std::filesystem::path& top, const std::vector<std::string>& rooms,
                                             const std::vector<std::string>& allowed);
 std::vector<std::string> CheckFirstLines(const std::filesystem::path& top);

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kLib = "lib/armcal/";
+const std::string kLib = "lib/armcal/", kCode = "codegen/src/", kHost = "host_sim/";
 
 // clang-format off
 const Edges kEdges = {
@@ -40,31 +40,49 @@ const Edges kEdges = {
     {"port/mps2/application",  {kLib, "codegen/generated/", "port/mps2"}},
 
     // The generator prints includes of lib but uses none; its output sees numbers only.
-    {"codegen/generated/",     {kLib + "core", kLib + "math", kLib + "model", kLib + "link/registers.hpp"}},
-    {"codegen/src/robot",      {"host_sim/io"}},
-    {"codegen/src/generator",  {"codegen/src/robot", "host_sim/io"}},
+    {"codegen/generated/",     {kLib + "math", kLib + "model", kLib + "link/registers.hpp"}},
+    {"codegen/src/io",         {}},
+    {"codegen/src/robot",      {kCode + "io"}},
+    {"codegen/src/generator",  {kCode + "io", kCode + "robot"}},
+    {"codegen/src/generate",   {kCode + "io", kCode + "generator"}},
 
-    // The PC side. The plant sees neither codegen nor lib: it is the truth that the others are judged by.
-    {"host_sim/io",            {}},
-    {"host_sim/report",        {"host_sim/io"}},
-    {"host_sim/plant",         {"host_sim/io"}},
-    {"host_sim/client",        {"host_sim/io", kLib + "core", kLib + "link", kLib + "model"}},
-    {"host_sim/search",        {}},  // minimises functions of numbers; the only room that sees pagmo
-    {"host_sim/excitation",    {"host_sim/io", "host_sim/search", "codegen/src/"}},
-    {"host_sim/calibration",   {"host_sim/io", "codegen/src/", kLib + "core", kLib + "math", kLib + "model",
-                                kLib + "physical", "host_sim/calibration/methods"}},
-    {"host_sim/calibration/methods", {"host_sim/io", "host_sim/search", "codegen/src/", "host_sim/calibration"}},
-    {"host_sim/diagnosis",     {"host_sim/io", "codegen/src/", "host_sim/calibration"}},
-    {"host_sim/health",        {"host_sim/client", kLib + "link/registers.hpp"}},  // a drive's statistics -> a verdict
-    {"host_sim/drive",         {"host_sim/io", "host_sim/plant", "host_sim/excitation", "port/linux",
-                                "codegen/src/robot", "codegen/generated/", kLib}},
-    {"host_sim/estimate",      {"host_sim/io", "host_sim/client", "host_sim/calibration", "codegen/generated/", kLib}},
-    {"host_sim/survey",        {"host_sim/io", "host_sim/report", "host_sim/search", "host_sim/plant", "host_sim/excitation",
-                                "host_sim/calibration", "host_sim/calibration/methods", "codegen/src/",
-                                "codegen/generated/", kLib}},  // its online table judges the firmware's own estimator
-    // Times the model against yardsticks; a program of its own flags, so headers that stand alone only.
-    {"host_sim/bench",         {"host_sim/calibration", "codegen/generated/", kLib + "math", kLib + "model"}},
-    {"host_sim/cli",           {"host_sim/", "codegen/", "port/linux", kLib}},
+    // Data: what is read and what is shown.
+    {"host_sim/data/files",    {kCode + "io"}},
+    {"host_sim/data/logs",     {kCode + "io", kHost + "data/files"}},
+    {"host_sim/data/trajectory", {kCode + "io", kHost + "data/files"}},
+    {"host_sim/data/report",   {kHost + "data/files"}},
+
+    // Identify: parameters from logs, and the motions that show them.
+    {"host_sim/identify/search", {}},  // minimises functions of numbers; the only room that sees pagmo
+    {"host_sim/identify/excitation", {kCode, kHost + "data/trajectory", kHost + "identify/search"}},
+    {"host_sim/identify/calibration", {kCode, kHost + "data/files", kHost + "data/logs", kLib + "math", kLib + "model"}},
+    {"host_sim/identify/methods", {kCode, kHost + "data/logs", kHost + "identify/search", kHost + "identify/calibration"}},
+
+    // Diagnose: causes of what the model leaves, and how a person is told.
+    {"host_sim/diagnose/diagnosis", {kCode, kHost + "identify/calibration", kHost + "identify/methods"}},
+    {"host_sim/diagnose/verdict", {kCode, kHost + "data/files", kHost + "data/logs", kHost + "data/report",
+                                   kHost + "identify/excitation", kHost + "identify/calibration", kHost + "identify/methods",
+                                   kHost + "diagnose/diagnosis"}},
+    {"host_sim/diagnose/health", {kHost + "client"}},  // a drive's statistics -> a verdict
+
+    // Client: what talks to a drive.
+    {"host_sim/client",        {kCode, kHost + "data/logs", kHost + "data/trajectory", kHost + "data/report",
+                                kHost + "machine/drive/vendor_registers.hpp", kLib + "core", kLib + "estimator", kLib + "link"}},
+
+    // Machine: the simulated arm, and lib running on a PC. The plant sees neither the generator nor lib: it is the truth
+    // that the others are judged by.
+    {"host_sim/machine/plant", {kCode + "io"}},
+    {"host_sim/machine/drive", {kHost + "machine/plant", kHost + "data/trajectory", "port/linux", kCode + "robot",
+                                kLib}},
+    {"host_sim/machine/estimate", {kCode + "io", kHost + "data/files", kHost + "client", kHost + "identify/calibration",
+                                   kLib}},
+
+    // Study: the survey's tables and the benchmarks. No user of the product runs them.
+    {"host_sim/study/survey",  {kCode, kHost + "data/", kHost + "identify/", kHost + "machine/plant", "codegen/generated/",
+                                kLib}},  // its online table judges the firmware's own estimator
+    // A program of its own flags: headers that stand alone only.
+    {"host_sim/study/bench",   {kHost + "identify/calibration", "codegen/generated/", kLib + "math", kLib + "model"}},
+    {"host_sim/tool",          {kHost, kCode, kLib}},
 
     // Tests may look everywhere; nothing may look into tests.
     {"tests/",                 {kLib, "port/", "codegen/", "host_sim/"}},
@@ -86,6 +104,11 @@ fs::path Top() { return fs::current_path(); }
 
 TEST(Rooms, EveryInclude_FollowsAnEdgeOfTheTable) {
   const auto found = CheckIncludes(Top(), kEdges, kSelected);
+  EXPECT_TRUE(found.empty()) << Lines(found);
+}
+
+TEST(Rooms, EveryEdgeOfTheTable_IsUsed) {
+  const auto found = UnusedEdges(Top(), kEdges, kSelected);
   EXPECT_TRUE(found.empty()) << Lines(found);
 }
 
@@ -129,7 +152,7 @@ class PlantedViolation : public testing::Test {
     top_ = mkdtemp(name.data());
     Write("lib/armcal/core/status.hpp", "// core - good; knows nothing.\n");
     Write("lib/armcal/filter/kalman.hpp", "// filter - good.\n#include \"armcal/core/status.hpp\"\n");
-    Write("host_sim/plant/arm.cpp", "// plant - good.\n#include \"host_sim/plant/arm.hpp\"\n");
+    Write("host_sim/machine/plant/arm.cpp", "// plant - good.\n#include \"host_sim/machine/plant/arm.hpp\"\n");
   }
   ~PlantedViolation() override { fs::remove_all(top_); }
 
@@ -150,12 +173,13 @@ TEST_F(PlantedViolation, None_NothingFound) {
 
 TEST_F(PlantedViolation, ForbiddenEdge_IsFound) {
   Write("lib/armcal/filter/bad.hpp", "// filter - bad.\n\n#include \"armcal/model/contract.hpp\"\n");
-  Write("host_sim/plant/bad.cpp", "// plant - bad.\n#include \"codegen/src/robot/robot.hpp\"\n");
+  Write("host_sim/machine/plant/bad.cpp", "// plant - bad.\n#include \"codegen/src/robot/robot.hpp\"\n");
   Write("codegen/src/generator/bad.cpp", "// generator - bad.\n#include \"tests/rooms/house.hpp\"\n");
-  EXPECT_EQ(CheckIncludes(top_, kEdges),
-            (Found{"codegen/src/generator/bad.cpp:2: codegen/src/generator may not include tests/rooms/house.hpp",
-                   "host_sim/plant/bad.cpp:2: host_sim/plant may not include codegen/src/robot/robot.hpp",
-                   "lib/armcal/filter/bad.hpp:3: lib/armcal/filter may not include lib/armcal/model/contract.hpp"}));
+  EXPECT_EQ(
+      CheckIncludes(top_, kEdges),
+      (Found{"codegen/src/generator/bad.cpp:2: codegen/src/generator may not include tests/rooms/house.hpp",
+             "host_sim/machine/plant/bad.cpp:2: host_sim/machine/plant may not include codegen/src/robot/robot.hpp",
+             "lib/armcal/filter/bad.hpp:3: lib/armcal/filter may not include lib/armcal/model/contract.hpp"}));
 }
 
 TEST_F(PlantedViolation, RelativeIncludeOrUnknownRoom_IsFound) {
@@ -164,6 +188,14 @@ TEST_F(PlantedViolation, RelativeIncludeOrUnknownRoom_IsFound) {
   EXPECT_EQ(CheckIncludes(top_, kEdges),
             (Found{"lib/armcal/cellar/a.hpp:1: lies in no room of the table",
                    "lib/armcal/core/bad.hpp:2: includes \"status.hpp\", which is no path from the top"}));
+}
+
+TEST_F(PlantedViolation, EdgeThatNoIncludeUses_IsFound) {
+  const Edges edges = {{"lib/armcal/core", {}},
+                       {"lib/armcal/filter", {"lib/armcal/core", "lib/armcal/math"}},
+                       {"host_sim/plant", {"codegen/src/"}}};
+  EXPECT_EQ(UnusedEdges(top_, edges), (Found{"host_sim/plant -> codegen/src/: no include uses this edge",
+                                             "lib/armcal/filter -> lib/armcal/math: no include uses this edge"}));
 }
 
 TEST_F(PlantedViolation, StreamInFirmware_IsFound) {

@@ -9,7 +9,7 @@
 
 #include "armcal/model/sample.hpp"
 #include "codegen/src/robot/robot.hpp"
-#include "host_sim/plant/arm.hpp"
+#include "host_sim/machine/plant/arm.hpp"
 #include "tests/target/trace_tick.hpp"
 
 namespace {

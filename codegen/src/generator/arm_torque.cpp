@@ -7,38 +7,36 @@ namespace armcal::codegen {
 
 ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
   const Robot& robot = model.robot();
-  const auto add = [&](const BodyRows& rows, const auto& name) {
-    for (int i = 0; i < joints_; ++i) part_.push_back({name(i), BaseTorque(graph_, rows, model.base_columns(), i)});
+  const auto add = [&](const BodyRows& rows, const auto& id) {
+    for (int i = 0; i < joints_; ++i) part_.push_back({id(i), BaseTorque(graph_, rows, model.base_columns(), i)});
   };
-  add(BodyRegressor(graph_, robot), [](int i) { return InputName("tau_rigid", i); });
-  add(BodyRegressor(graph_, robot, false), [](int i) { return InputName("tau_gravity", i); });
+  add(BodyRegressor(graph_, robot), [](int i) { return InputId{Quantity::kRigidTorque, i}; });
+  add(BodyRegressor(graph_, robot, false), [](int i) { return InputId{Quantity::kGravityTorque, i}; });
   for (int j = 0; j < joints_; ++j)
-    add(AccelerationRows(graph_, robot, j), [j](int i) { return EntryName("M", i, j); });
+    add(AccelerationRows(graph_, robot, j), [j](int i) { return InputId{Quantity::kMassMatrix, i, j}; });
   for (int axis = 0; axis < 3; ++axis) {
     Robot tilted = robot;
     tilted.gravity_mps2 = {};
     tilted.gravity_mps2[axis] = 1;
-    add(BodyRegressor(graph_, tilted, false), [axis](int i) { return EntryName("G", i, axis); });
+    add(BodyRegressor(graph_, tilted, false), [axis](int i) { return InputId{Quantity::kGravitySlope, i, 0, axis}; });
   }
 }
 
-std::set<std::string> ArmTorque::names() const {
-  std::set<std::string> out;
-  for (const Part& p : part_) out.insert(p.name);
+std::set<InputId> ArmTorque::parts() const {
+  std::set<InputId> out;
+  for (const Part& p : part_) out.insert(p.id);
   return out;
 }
 
-void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const std::set<std::string>& wanted,
+void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const std::set<InputId>& wanted,
                          TorqueParts& out) const {
   const int n = joints_, samples = s.samples();
   std::vector<Binding> bindings;
-  for (const std::string& input : graph_.inputs()) {
-    const auto digits = input.find_first_of("0123456789");
-    const std::string quantity = input.substr(0, digits);
-    const int number = std::stoi(input.substr(digits));
+  for (const InputId& input : graph_.inputs()) {
     Binding b;
-    if (quantity == "base") b.value = base[static_cast<std::size_t>(number)];
-    else b.column = (quantity == "q" ? s.q : quantity == "qd" ? s.qd : s.qdd).col(number - 1).data();
+    if (input.quantity == Quantity::kBaseParameter) b.value = base[static_cast<std::size_t>(input.parameter)];
+    else if (input.quantity == Quantity::kPosition) b.column = s.q.col(input.row).data();
+    else b.column = (input.quantity == Quantity::kSpeed ? s.qd : s.qdd).col(input.row).data();
     bindings.push_back(b);
   }
   out.rigid.resize(samples, n), out.gravity.resize(samples, n);
@@ -57,7 +55,7 @@ void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const s
   std::vector<Expr> roots;
   std::vector<double*> target;
   for (std::size_t k = 0; k < part_.size(); ++k)
-    if (wanted.contains(part_[k].name)) roots.push_back(part_[k].value), target.push_back(place[k]);
+    if (wanted.contains(part_[k].id)) roots.push_back(part_[k].value), target.push_back(place[k]);
   Tape(graph_, roots).Evaluate(bindings, samples, target);
 }
 

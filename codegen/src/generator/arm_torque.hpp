@@ -20,15 +20,15 @@ class ArmTorque {
  public:
   explicit ArmTorque(const Model& model);
 
-  // base: values of the model's base parameters. wanted: parts, by the names of the graph inputs that stand for them
-  // (QuantitiesAsInputs); other names there mean nothing here, other parts are left as they are.
-  void Evaluate(const Signals& s, std::span<const double> base, const std::set<std::string>& wanted,
+  // base: values of the model's base parameters. wanted: the parts to compute, by the inputs that stand for them;
+  // other parts are left as they are, and inputs that are no part mean nothing here.
+  void Evaluate(const Signals& s, std::span<const double> base, const std::set<InputId>& wanted,
                 TorqueParts& out) const;
-  std::set<std::string> names() const;  // of all parts
+  std::set<InputId> parts() const;  // all of them
 
  private:
   struct Part {
-    std::string name;
+    InputId id;
     Expr value;
   };
   int joints_;

@@ -40,7 +40,7 @@ void ArmVectors::MakeSteps(const FrameChoice& choice) {
   double slide_before = 0;
   for (int j = 0; j < robot_.joints(); ++j) {
     const JointKinematics& k = robot_.joint[j].kinematics;
-    const Expr q = graph_.Input(InputName("q", j));
+    const Expr q = graph_.Input({Quantity::kPosition, j});
     Step fixed, moving;
     ExactSinCos(k.alpha_rad, fixed.sa, fixed.ca);
     double so, co;
@@ -79,8 +79,8 @@ ArmVectors::Vector* ArmVectors::Make(const std::string& name, int half, const Ve
   return v;
 }
 
-Expr ArmVectors::Rate(const char* quantity, int joint) const {
-  return motion_ ? graph_.Input(InputName(quantity, joint)) : graph_.Constant(0);
+Expr ArmVectors::Rate(Quantity quantity, int joint) const {
+  return motion_ ? graph_.Input({quantity, joint}) : graph_.Constant(0);
 }
 
 void ArmVectors::NameComponents(const Vector& v, int half) {
@@ -129,8 +129,8 @@ void ArmVectors::AddOrigin(int j, bool same_origin) {
   }
   if (!IsRevolute(robot_, j)) {
     const Vec at = In(a, 2 * j), w = In(omega_[j], 2 * j);
-    const Expr qd = Rate("qd", j);
-    a = Make("a" + link, 2 * j, at + Vec{2.0 * (w[1] * qd), -(2.0 * (w[0] * qd)), Rate("qdd", j)});
+    const Expr qd = Rate(Quantity::kSpeed, j);
+    a = Make("a" + link, 2 * j, at + Vec{2.0 * (w[1] * qd), -(2.0 * (w[0] * qd)), Rate(Quantity::kAcceleration, j)});
   }
   a_.push_back(a);
 }
@@ -162,9 +162,9 @@ void ArmVectors::AddRates(int j, bool lumped) {
   // Links on parallel axes turn as one about that axis: from `first` on, the angle and its rates are sums.
   int first = j;
   while (lumped && first > 0 && IsRevolute(robot_, first - 1) && step_[2 * first].ca == 1) --first;
-  Expr qd = Rate("qd", first), s = step_[2 * first + 1].s, c = step_[2 * first + 1].c;
+  Expr qd = Rate(Quantity::kSpeed, first), s = step_[2 * first + 1].s, c = step_[2 * first + 1].c;
   for (int k = first + 1; k <= j && revolute; ++k) {
-    qd = qd + Rate("qd", k);
+    qd = qd + Rate(Quantity::kSpeed, k);
     const Expr sk = step_[2 * k + 1].s, ck = step_[2 * k + 1].c, sum = ck * s + sk * c;
     c = ck * c - sk * s;
     s = sum;
@@ -179,10 +179,11 @@ void ArmVectors::AddRates(int j, bool lumped) {
     w->in[0] = dw->in[0] = none;
   } else {
     const Vec w_in = seen(omega_, j);
-    w->in[2 * j] = {w_in[0], w_in[1], w_in[2] + Rate("qd", j)};
+    w->in[2 * j] = {w_in[0], w_in[1], w_in[2] + Rate(Quantity::kSpeed, j)};
     const Vec turned = turn(seen(omega_, first)), d = turn(seen(alpha_, first));
     w->in[2 * j + 1] = {turned[0], turned[1], w->in[2 * j][2]};
-    dw->in[2 * j + 1] = {d[0] + turned[1] * qd, d[1] - turned[0] * qd, seen(alpha_, j)[2] + Rate("qdd", j)};
+    dw->in[2 * j + 1] = {d[0] + turned[1] * qd, d[1] - turned[0] * qd,
+                         seen(alpha_, j)[2] + Rate(Quantity::kAcceleration, j)};
     NameComponents(*w, 2 * j + 1);
     NameComponents(*dw, 2 * j + 1);
   }
@@ -222,7 +223,7 @@ Expr ArmVectors::Torque(int i, int j, int parameter, const std::array<int, Frame
            In(AccelerationTimesAxis(i, j, axes[FrameChoice::kMoment]), 2 * j + 1)[parameter - 1];
   if (parameter <= 9)
     return dot(z_[i], moment_[j][parameter - 4], axes[parameter == 9 ? FrameChoice::kSpin : FrameChoice::kInertia]);
-  return i == j && motion_ ? graph_.Input(InputName("qdd", j)) : graph_.Constant(0);
+  return i == j && motion_ ? graph_.Input({Quantity::kAcceleration, j}) : graph_.Constant(0);
 }
 
 ArmVectors::Vector* ArmVectors::AccelerationTimesAxis(int i, int j, int half) {

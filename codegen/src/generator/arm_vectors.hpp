@@ -42,7 +42,7 @@ class ArmVectors {
   };
   Vector* Make(const std::string& name) { return &pool_.emplace_back(Vector{name, {}}); }
   Vector* Make(const std::string& name, int half, const Vec& components);
-  Expr Rate(const char* quantity, int joint) const;  // the graph's input, or zero at rest
+  Expr Rate(Quantity quantity, int joint) const;  // the graph's input, or zero at rest
   Vec Outward(int half, const Vec& v) const;
   Vec Inward(int half, const Vec& v) const;
   void NameComponents(const Vector& v, int half);

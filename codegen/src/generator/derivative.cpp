@@ -100,7 +100,7 @@ bool Reads(Expr e, Expr input) {
 Expr TotalDerivative(Expr e, Expr parameter) {
   Graph& g = *e.graph();
   Expr sum = Derivative(e, parameter);
-  const std::string of = g.inputs()[g.nodes()[parameter.id()].a];
+  const std::string of = g.input(parameter).symbol;
   const std::size_t count = g.states().size();
   for (std::size_t k = 0; k < count; ++k) {
     const StateVariable s = g.states()[k];

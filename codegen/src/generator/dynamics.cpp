@@ -7,10 +7,10 @@ namespace armcal::codegen {
 namespace {
 
 // The rows with one quantity of every joint at zero, of joint `unit` at one (-1: of none).
-BodyRows At(Graph& g, BodyRows rows, const char* quantity, int unit) {
+BodyRows At(Graph& g, BodyRows rows, Quantity quantity, int unit) {
   std::unordered_map<int, Expr> at;
   for (int j = 0; j < static_cast<int>(rows.size()); ++j)
-    at.emplace(g.Input(InputName(quantity, j)).id(), g.Constant(j == unit));
+    at.emplace(g.Input({quantity, j}).id(), g.Constant(j == unit));
   for (auto& row : rows)
     for (Expr& e : row) e = Substitute(e, at);
   return rows;
@@ -26,21 +26,22 @@ Robot Weightless(Robot robot) {
 Expr BaseTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_columns, int i) {
   Expr sum = g.Constant(0);
   for (std::size_t d = 0; d < base_columns.size(); ++d)
-    sum = sum + rows[i][base_columns[d]] * g.Input("base" + std::to_string(d));
+    sum = sum +
+          rows[i][base_columns[d]] * g.Input({.quantity = Quantity::kBaseParameter, .parameter = static_cast<int>(d)});
   return sum;
 }
 
 BodyRows AccelerationRows(Graph& g, const Robot& robot, int joint) {
-  return At(g, At(g, BodyRegressor(g, Weightless(robot)), "qd", -1), "qdd", joint);
+  return At(g, At(g, BodyRegressor(g, Weightless(robot)), Quantity::kSpeed, -1), Quantity::kAcceleration, joint);
 }
 
 Dynamics MakeDynamics(Graph& g, const Robot& robot, const std::vector<int>& base_columns) {
   const int n = robot.joints();
   const BodyRows moving = BodyRegressor(g, Weightless(robot)), resting = BodyRegressor(g, robot, false);
-  const BodyRows steady = At(g, moving, "qdd", -1), still = At(g, moving, "qd", -1);
+  const BodyRows steady = At(g, moving, Quantity::kAcceleration, -1), still = At(g, moving, Quantity::kSpeed, -1);
   Dynamics out;
   for (int j = 0; j < n; ++j) {
-    const BodyRows column = At(g, still, "qdd", j);
+    const BodyRows column = At(g, still, Quantity::kAcceleration, j);
     out.mass.emplace_back();
     for (int i = 0; i <= j; ++i) out.mass[j].push_back(BaseTorque(g, column, base_columns, i));
     out.velocity.push_back(BaseTorque(g, steady, base_columns, j));

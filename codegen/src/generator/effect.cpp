@@ -1,4 +1,4 @@
-// generator - reads effect records; every word it accepts is listed here, no kind is known by name.
+// generator - reads effect records. No kind is known by name.
 #include "codegen/src/generator/effect.hpp"
 
 #include <algorithm>
@@ -6,17 +6,18 @@
 #include <limits>
 #include <sstream>
 
-#include "codegen/src/robot/toml_reader.hpp"
+#include "codegen/src/io/toml_reader.hpp"
 
 namespace armcal::codegen {
 namespace {
 
-// Everything that a record may read.
-constexpr const char* kInputs[] = {"q",           "qd",     "qdd",       "temp",        "t",
-                                   "dt",          "flag",   "tau_rigid", "tau_gravity", "Y",
-                                   "dY/dgravity", "M[:,j]", "tau_model", "tau_delayed"};
+// The words of each choice; their order is that of the enum.
+constexpr const char* kClassWords[] = {"static", "stateful", "run_state", "sensor"};
+constexpr const char* kScopeWords[] = {"joint", "pair", "arm", "body"};
+constexpr const char* kSearchWords[] = {"linear", "profile", "spectral", "spline", "onset", "window", "shared", "none"};
+constexpr const char* kActWords[] = {"", "gain", "delay", "censor"};
 
-std::string ExpressionText(const TomlReader& in, std::string_view key, const std::string& otherwise) {
+std::string ExpressionText(const io::TomlReader& in, std::string_view key, const std::string& otherwise) {
   if (!in.Has(key)) return otherwise;
   if (in.table()[key].is_string()) return in.Text(key);
   std::ostringstream text;
@@ -25,20 +26,32 @@ std::string ExpressionText(const TomlReader& in, std::string_view key, const std
   return text.str();
 }
 
-template <class List>
-void MustBeOneOf(const TomlReader& in, std::string_view key, const std::string& value, const List& allowed) {
-  if (std::find(std::begin(allowed), std::end(allowed), value) != std::end(allowed)) return;
-  std::string list;
-  for (const auto& a : allowed) list += (list.empty() ? "" : ", ") + std::string(a);
-  in.Fail(key, "one of " + list);
+// The position of the key's word in the list. An empty word cannot be chosen.
+template <class Words>
+int ReadChoice(const io::TomlReader& in, std::string_view key, const std::string& value, const Words& words) {
+  std::string known;
+  int at = 0;
+  for (const auto& word : words) {
+    if (value == word && !value.empty()) return at;
+    if (*word != '\0') known += (known.empty() ? "" : ", ") + std::string(word);
+    ++at;
+  }
+  in.Fail(key, "one of " + known);
 }
 
-LinearParameter ReadLinear(const TomlReader& in) {
+Quantity ReadInput(const io::TomlReader& in, const std::string& declared) {
+  if (const QuantityInfo* info = FindDeclared(declared)) return info->quantity;
+  std::string known;
+  for (const QuantityInfo& info : QuantityTable()) known += (known.empty() ? "" : ", ") + std::string(info.declared);
+  in.Fail("inputs", "one of " + known);
+}
+
+LinearParameter ReadLinear(const io::TomlReader& in) {
   in.AllowOnly({"name", "unit", "rows", "index", "sd", "amplitude", "bounds", "process_noise"});
   LinearParameter p;
   p.name = in.Text("name");
   p.unit = in.Text("unit");
-  const TomlReader rows = in.Table("rows");
+  const io::TomlReader rows = in.Table("rows");
   for (const auto& [row, expression] : rows.table()) p.rows[std::string(row.str())] = rows.Text(row.str());
   if (p.rows.empty()) in.Fail("rows", "at least one row = \"expression\"");
   p.index = in.Texts("index");
@@ -61,7 +74,7 @@ LinearParameter ReadLinear(const TomlReader& in) {
   return p;
 }
 
-RecordState ReadState(const TomlReader& in) {
+RecordState ReadState(const io::TomlReader& in) {
   in.AllowOnly({"name", "unit", "initial", "step", "settled"});
   RecordState s{in.Text("name"), in.Text("unit"), ExpressionText(in, "initial", "0"), in.Text("step"),
                 in.Text("settled", "")};
@@ -71,9 +84,12 @@ RecordState ReadState(const TomlReader& in) {
 
 }  // namespace
 
+std::string Word(EffectClass value) { return kClassWords[static_cast<int>(value)]; }
+std::string Word(EffectScope value) { return kScopeWords[static_cast<int>(value)]; }
+
 EffectRecord ReadEffect(const std::filesystem::path& path) {
-  const toml::table table = ParseToml(path);
-  const TomlReader in(table, path.string());
+  const toml::table table = io::ParseToml(path);
+  const io::TomlReader in(table, path.string());
   in.AllowOnly({"name",
                 "title",
                 "source",
@@ -108,19 +124,15 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
   r.kind = in.Text("kind", r.name);
   r.title = in.Text("title");
   r.source = in.Text("source", "");
-  r.kind_class = in.Text("class");
-  MustBeOneOf(in, "class", r.kind_class,
-              std::initializer_list<const char*>{"static", "stateful", "run_state", "sensor"});
-  r.scope = in.Text("scope");
-  MustBeOneOf(in, "scope", r.scope, std::initializer_list<const char*>{"joint", "pair", "arm", "body"});
-  r.place = in.Text("place", r.scope == "body" ? "flange" : "all");
-  r.inputs = in.Texts("inputs");
-  for (const std::string& input : r.inputs) MustBeOneOf(in, "inputs", input, kInputs);
+  r.effect_class = static_cast<EffectClass>(ReadChoice(in, "class", in.Text("class"), kClassWords));
+  r.scope = static_cast<EffectScope>(ReadChoice(in, "scope", in.Text("scope"), kScopeWords));
+  r.place = in.Text("place", r.scope == EffectScope::kBody ? "flange" : "all");
+  for (const std::string& input : in.Texts("inputs")) r.inputs.insert(ReadInput(in, input));
   r.signals = in.Texts("signals");
   r.let = in.Texts("let");
-  for (const TomlReader& linear : in.Tables("linear")) r.linear.push_back(ReadLinear(linear));
+  for (const io::TomlReader& linear : in.Tables("linear")) r.linear.push_back(ReadLinear(linear));
   if (r.linear.empty()) in.Fail("linear", "at least one [[linear]] parameter");
-  for (const TomlReader& t : in.Tables("nonlinear")) {
+  for (const io::TomlReader& t : in.Tables("nonlinear")) {
     t.AllowOnly({"name", "unit", "lower", "upper", "initial", "scale"});
     NonlinearParameter p;
     p.name = t.Text("name");
@@ -132,22 +144,23 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
     p.logarithmic = t.Text("scale", "linear") == "log";
     r.nonlinear.push_back(p);
   }
-  for (const TomlReader& t : in.Tables("state")) r.state.push_back(ReadState(t));
-  if (!r.state.empty() && r.kind_class == "static") in.Fail("class", "\"stateful\" where there is a [[state]]");
+  for (const io::TomlReader& t : in.Tables("state")) r.state.push_back(ReadState(t));
+  if (!r.state.empty() && r.effect_class == EffectClass::kStatic)
+    in.Fail("class", "\"stateful\" where there is a [[state]]");
   if (in.Has("apply")) {
-    const TomlReader apply = in.Table("apply");
+    const io::TomlReader apply = in.Table("apply");
     apply.AllowOnly({"how", "by"});
-    r.apply = {apply.Text("how"), apply.Text("by")};
-    MustBeOneOf(apply, "how", r.apply.how, std::initializer_list<const char*>{"gain", "delay", "censor"});
+    r.apply = {static_cast<SensorAct>(ReadChoice(apply, "how", apply.Text("how"), kActWords)), apply.Text("by")};
   }
-  if ((r.kind_class == "sensor") != in.Has("apply")) in.Fail("apply", "a table if, and only if, class is \"sensor\"");
+  if ((r.effect_class == EffectClass::kSensor) != in.Has("apply"))
+    in.Fail("apply", "a table if, and only if, class is \"sensor\"");
   r.adds_base = in.Texts("adds_base");
   r.replaces = in.Text("replaces", "");
   r.depends_on_estimate = in.Flag("depends_on_estimate", false);
   // What the measurement underwent, or what belongs to one run, is no property of the arm that a table could state.
-  const bool of_the_arm = r.kind_class == "static" || r.kind_class == "stateful";
+  const bool of_the_arm = r.effect_class == EffectClass::kStatic || r.effect_class == EffectClass::kStateful;
   r.on_target = in.Flag("on_target", of_the_arm);
-  if (r.on_target && !of_the_arm) in.Fail("on_target", "false where class is \"" + r.kind_class + "\"");
+  if (r.on_target && !of_the_arm) in.Fail("on_target", "false where class is \"" + Word(r.effect_class) + "\"");
   r.remedy = in.Text("remedy", "");
   if (r.on_target != r.remedy.empty()) in.Fail("remedy", "a sentence if, and only if, no model can hold the effect");
   r.separate = in.Text("separate", "");
@@ -158,12 +171,9 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
     in.Fail("separate", "what tells it from those of confusable_with");
   r.needs = in.Texts("needs");
   if (in.Has("search")) {
-    const TomlReader s = in.Table("search");
+    const io::TomlReader s = in.Table("search");
     s.AllowOnly({"how", "signal", "grid", "minimum_s", "after"});
-    r.search.how = s.Text("how");
-    MustBeOneOf(s, "how", r.search.how,
-                std::initializer_list<const char*>{"linear", "profile", "spectral", "spline", "onset", "window",
-                                                   "shared", "none"});
+    r.search.how = static_cast<SearchWay>(ReadChoice(s, "how", s.Text("how"), kSearchWords));
     r.search.signal = s.Text("signal", "");
     r.search.grid = static_cast<int>(s.Number("grid", 10));
     r.search.minimum_s = s.Number("minimum_s", 0);

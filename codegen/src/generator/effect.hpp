@@ -1,12 +1,23 @@
-// generator - one effect record as read from its file; knows no robot.
+// generator - one effect record as read from its file.
 #pragma once
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "codegen/src/generator/quantity.hpp"
+
 namespace armcal::codegen {
+
+// Words of a record. Word() gives each as the file has it.
+enum class EffectClass { kStatic, kStateful, kRunState, kSensor };
+enum class EffectScope { kJoint, kPair, kArm, kBody };
+enum class SearchWay { kLinear, kProfile, kSpectral, kSpline, kOnset, kWindow, kShared, kNone };
+enum class SensorAct { kNone, kGain, kDelay, kCensor };  // kNone: no sensor record
+std::string Word(EffectClass value);
+std::string Word(EffectScope value);
 
 struct LinearParameter {
   std::string name, unit;
@@ -34,25 +45,26 @@ struct RecordState {
 
 // A sensor record's exact form: what the measurement underwent, and which parameter says how much.
 struct Apply {
-  std::string how;  // gain | delay | censor
+  SensorAct how = SensorAct::kNone;
   std::string by;
 };
 
 struct Search {
-  std::string how = "linear";  // linear | profile | spectral | spline | onset | window | shared | none
-  std::string signal;          // spectral, spline: over which signal
-  int grid = 10;               // profile: points per nonlinear parameter
-  double minimum_s = 0;        // onset: shortest stretch
-  std::string after;           // a simpler record: tried only where that one finds something on the same joints
+  SearchWay how = SearchWay::kLinear;
+  std::string signal;    // spectral, spline: over which signal
+  int grid = 10;         // profile: points per nonlinear parameter
+  double minimum_s = 0;  // onset: shortest stretch
+  std::string after;     // a simpler record: tried only where that one finds something on the same joints
 };
 
 struct EffectRecord {
   std::string name, title, source, path, text;
-  std::string kind;        // what a verdict calls it: its name, or "unknown" for a curve that names no cause
-  std::string kind_class;  // static | stateful | run_state | sensor
-  std::string scope;       // joint | pair | arm | body
-  std::string place;       // what a report calls the joints of an effect of the arm or a body: "all", "base", "flange"
-  std::vector<std::string> inputs, signals, let, confusable_with, needs;
+  std::string kind;  // what a verdict calls it: its name, or "unknown" for a curve that names no cause
+  EffectClass effect_class = EffectClass::kStatic;
+  EffectScope scope = EffectScope::kJoint;
+  std::string place;  // what a report calls the joints of an effect of the arm or a body: "all", "base", "flange"
+  std::set<Quantity> inputs;
+  std::vector<std::string> signals, let, confusable_with, needs;
   std::vector<LinearParameter> linear;
   std::vector<NonlinearParameter> nonlinear;
   std::vector<RecordState> state;
@@ -68,7 +80,9 @@ struct EffectRecord {
   Search search;
 
   // Another frequency, or another part of a signal's range, is another use on the same joints.
-  bool repeats() const { return search.how == "spectral" || (search.how == "spline" && generic_penalty > 0); }
+  bool repeats() const {
+    return search.how == SearchWay::kSpectral || (search.how == SearchWay::kSpline && generic_penalty > 0);
+  }
 };
 
 // Throws io::InputError: file, key, what was expected.

@@ -5,7 +5,7 @@
 
 #include "codegen/src/generator/emit_text.hpp"
 #include "codegen/src/generator/state_path.hpp"
-#include "host_sim/io/files.hpp"
+#include "codegen/src/io/atomic_write.hpp"
 
 namespace armcal::codegen {
 namespace {
@@ -51,7 +51,7 @@ std::vector<Assignment> JacobianAssignments(const Model& m) {
 
 Functions Statements(const Model& m) {
   Functions f;
-  const auto input = [&](const std::string& name) { return InputText(m, name); };
+  const auto input = [&](const InputId& id) { return InputText(m, id); };
   f.regressor = EmitStatements(m.graph(), RegressorAssignments(m), input, f.count);
   f.jacobian = EmitStatements(m.graph(), JacobianAssignments(m), input, f.jacobian_count);
   std::vector<Assignment> initial;

@@ -15,7 +15,7 @@ bool IsSine(const Node& n) { return n.op == Op::kSin || n.op == Op::kCos; }
 
 class Printer {
  public:
-  Printer(const Graph& graph, const std::function<std::string(const std::string&)>& input, Passport& passport)
+  Printer(const Graph& graph, const InputWriter& input, Passport& passport)
       : nodes_(graph.nodes()), graph_(graph), input_(input), passport_(passport) {}
 
   std::string Run(const std::vector<Assignment>& assignments) {
@@ -165,7 +165,7 @@ class Printer {
 
   const std::vector<Node>& nodes_;
   const Graph& graph_;
-  const std::function<std::string(const std::string&)>& input_;
+  const InputWriter& input_;
   Passport& passport_;
   std::vector<int> uses_, registers_, level_;
   std::ostringstream out_;
@@ -184,8 +184,8 @@ std::string NumberText(double value) {
   return s;
 }
 
-std::string EmitStatements(const Graph& graph, const std::vector<Assignment>& assignments,
-                           const std::function<std::string(const std::string&)>& input, Passport& passport) {
+std::string EmitStatements(const Graph& graph, const std::vector<Assignment>& assignments, const InputWriter& input,
+                           Passport& passport) {
   return Printer(graph, input, passport).Run(assignments);
 }
 

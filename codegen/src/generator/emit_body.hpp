@@ -17,9 +17,12 @@ struct Assignment {
   std::string heading;  // a comment line before it where it differs from the one before; may be empty
 };
 
+// The C++ text of a graph input.
+using InputWriter = std::function<std::string(const InputId& input)>;
+
 // Statements that compute all assignments, in their order: each value just before its first use, so that few are alive
 // at a time. input: C++ text of a graph input by name.
-std::string EmitStatements(const Graph& graph, const std::vector<Assignment>& assignments,
-                           const std::function<std::string(const std::string&)>& input, Passport& passport);
+std::string EmitStatements(const Graph& graph, const std::vector<Assignment>& assignments, const InputWriter& input,
+                           Passport& passport);
 
 }  // namespace armcal::codegen

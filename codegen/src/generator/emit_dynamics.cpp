@@ -12,8 +12,9 @@ std::string Function(const Model& m, Graph& g, const char* comment, const char* 
   Passport count;
   const std::string statements = EmitStatements(
       g, assignments,
-      [&](const std::string& name) {
-        return name.rfind("base", 0) == 0 ? "base[" + name.substr(4) + "]" : InputText(m, name);
+      [&](const InputId& id) {
+        return id.quantity == Quantity::kBaseParameter ? "base[" + std::to_string(id.parameter) + "]"
+                                                       : InputText(m, id);
       },
       count);
   return std::string("  // ") + comment + "; " + CountText(count) + ".\n  template <class T>\n  static void " + head +

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 namespace armcal::codegen {
 
@@ -36,18 +37,19 @@ std::string List(const std::vector<std::string>& items) {
   return "{\n" + out + line + "}";
 }
 
-std::string InputText(const Model& m, const std::string& name) {
-  if (name == "t" || name == "dt") return "x." + name;
-  if (name.rfind("base", 0) == 0) return "committed[" + std::to_string(m.front() + std::stoi(name.substr(4))) + "]";
+std::string InputText(const Model& m, const InputId& input) {
+  const auto at = [](const std::string& array, std::size_t k) { return array + "[" + std::to_string(k) + "]"; };
+  if (input.quantity == Quantity::kBaseParameter) return at("committed", m.front() + input.parameter);
+  if (input.quantity == Quantity::kCoordinate) return at("p", input.parameter);
+  if (const QuantityInfo* info = FindQuantity(input.quantity))
+    return info->indexing == Indexing::kNone ? std::string("x.") + info->word
+                                             : at(std::string("x.") + info->word, input.row);
   for (int k = 0; k < m.nonlinear(); ++k)
-    if (m.unknowns()[k].name == name) return "eta[" + std::to_string(k) + "]";
+    if (m.unknowns()[k].name == input.symbol) return at("eta", k);
   const auto& states = m.graph().states();
   for (std::size_t k = 0; k < states.size(); ++k)
-    if (states[k].name == name) return "state[" + std::to_string(k) + "]";
-  const auto digits = name.find_first_of("0123456789");
-  const std::string quantity = name.substr(0, digits), number = name.substr(digits);
-  if (quantity == "p") return "p[" + number + "]";
-  return "x." + quantity + "[" + std::to_string(std::stoi(number) - 1) + "]";
+    if (states[k].name == input.symbol) return at("state", k);
+  throw std::logic_error("an input without a place in the generated code: " + NameOf(input));
 }
 
 std::string Heading(const Model& m, const std::string& what) {

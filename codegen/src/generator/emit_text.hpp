@@ -12,10 +12,10 @@ namespace armcal::codegen {
 
 inline constexpr int kGeneratorVersion = 2;
 
-std::string TypeName(const std::string& robot);                   // er20_like -> Er20Like
-std::string Float(double value);                                  // as a float literal
-std::string List(const std::vector<std::string>& items);          // { a, b, ... } broken into lines
-std::string InputText(const Model& m, const std::string& input);  // C++ text of a graph input
+std::string TypeName(const std::string& robot);               // er20_like -> Er20Like
+std::string Float(double value);                              // as a float literal
+std::string List(const std::vector<std::string>& items);      // { a, b, ... } broken into lines
+std::string InputText(const Model& m, const InputId& input);  // C++ text of a graph input
 
 template <class F>
 std::string Indexed(int count, F text_of) {

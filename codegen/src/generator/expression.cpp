@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
 
 namespace armcal::codegen {
 namespace {
@@ -36,7 +36,7 @@ Expr Previous(Graph& g, const std::vector<Expr>& a) {
 
 Expr Lowpass(Graph& g, const std::vector<Expr>& a) {
   const auto step = [&](Expr y) {
-    const Expr rest = g.Unary(Op::kExp, -(g.Input("dt") / a[1]));
+    const Expr rest = g.Unary(Op::kExp, -(g.Input({Quantity::kTimeStep}) / a[1]));
     return a[0] + rest * (y - a[0]);
   };
   return step(g.State(StateName("lowpass", a), a[0], step));
@@ -45,7 +45,7 @@ Expr Lowpass(Graph& g, const std::vector<Expr>& a) {
 // A mass that follows x on a spring and a damper: y'' = w0^2 (x - y) + 2 zeta w0 (x' - y'), x straight between samples
 // (held, it would lead by half of dt): the exact solution after dt.
 Expr Spring(Graph& g, const std::vector<Expr>& a) {
-  const Expr x = a[0], w0 = a[1], zeta = a[2], dt = g.Input("dt");
+  const Expr x = a[0], w0 = a[1], zeta = a[2], dt = g.Input({Quantity::kTimeStep});
   const Expr damped = w0 * g.Unary(Op::kSqrt, g.Constant(1) - zeta * zeta), angle = damped * dt;
   const Expr decay = g.Unary(Op::kExp, -(zeta * w0 * dt));
   const Expr c = decay * g.Unary(Op::kCos, angle), s = decay * g.Unary(Op::kSin, angle) / damped;
@@ -69,7 +69,8 @@ Expr Play(Graph& g, const std::vector<Expr>& a) {
 }
 
 Expr Delay(Graph& g, const std::vector<Expr>& a, int taps) {
-  const Expr u = g.Binary(Op::kMin, g.Binary(Op::kMax, a[1] / g.Input("dt"), g.Constant(0)), g.Constant(taps));
+  const Expr u =
+      g.Binary(Op::kMin, g.Binary(Op::kMax, a[1] / g.Input({Quantity::kTimeStep}), g.Constant(0)), g.Constant(taps));
   Expr tap = a[0], sum = g.Constant(0);
   for (int k = 0; k <= taps; ++k) {
     const Expr weight =

@@ -27,9 +27,9 @@ Expr Graph::Constant(double value) {
   return Make(Op::kConstant, -1, -1, value == 0 ? 0.0 : value);  // no negative zero
 }
 
-Expr Graph::Input(const std::string& name) {
-  const auto [it, fresh] = input_ids_.try_emplace(name, static_cast<int>(inputs_.size()));
-  if (fresh) inputs_.push_back(name);
+Expr Graph::Input(const InputId& input) {
+  const auto [it, fresh] = input_ids_.try_emplace(input, static_cast<int>(inputs_.size()));
+  if (fresh) inputs_.push_back(input);
   return Make(Op::kInput, it->second, -1);
 }
 
@@ -42,7 +42,7 @@ void Graph::Name(Expr e, const std::string& name) {
 Expr Graph::State(const std::string& name, Expr initial, const std::function<Expr(Expr)>& next) {
   for (const StateVariable& s : states_)
     if (s.name == name) return s.value;
-  const Expr value = Input(name);
+  const Expr value = Symbol(name);
   const std::size_t k = states_.size();
   states_.push_back({name, value, initial, value});
   const Expr following = next(value);  // may make states of its own, or ask for this one

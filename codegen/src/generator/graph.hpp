@@ -6,9 +6,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <unordered_map>
 #include <vector>
+
+#include "codegen/src/generator/quantity.hpp"
 
 namespace armcal::codegen {
 
@@ -70,7 +73,9 @@ class Graph {
   Graph& operator=(const Graph&) = delete;
 
   Expr Constant(double value);
-  Expr Input(const std::string& name);  // the same name gives the same node
+  Expr Input(const InputId& input);  // the same input gives the same node
+  // A nonlinear parameter, or whatever else has nothing but a name.
+  Expr Symbol(const std::string& name) { return Input(SymbolId(name)); }
   Expr Unary(Op op, Expr a);
   Expr Binary(Op op, Expr a, Expr b);
   void Name(Expr e, const std::string& name);  // a readable name for the emitted temporary; the first one stays
@@ -79,7 +84,8 @@ class Graph {
   Expr State(const std::string& name, Expr initial, const std::function<Expr(Expr value)>& next);
 
   const std::vector<Node>& nodes() const { return nodes_; }
-  const std::vector<std::string>& inputs() const { return inputs_; }
+  const std::vector<InputId>& inputs() const { return inputs_; }
+  const InputId& input(Expr e) const { return inputs_[nodes_[e.id()].a]; }  // of an input node
   const std::unordered_map<int, std::string>& names() const { return names_; }
   const std::vector<StateVariable>& states() const { return states_; }
 
@@ -88,9 +94,9 @@ class Graph {
   Expr Negate(Expr a);
 
   std::vector<Node> nodes_;
-  std::vector<std::string> inputs_;
+  std::vector<InputId> inputs_;
   std::unordered_map<int, std::string> names_;
-  std::unordered_map<std::string, int> input_ids_;
+  std::map<InputId, int> input_ids_;
   std::vector<StateVariable> states_;
   std::unordered_map<std::string, int> known_;
 };

@@ -1,13 +1,14 @@
 // generator - binds a record's names to a robot's joints; the scopes joint, pair, arm and body differ only here.
 #include "codegen/src/generator/instance.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
 #include "codegen/src/generator/derivative.hpp"
 #include "codegen/src/generator/expression.hpp"
 #include "codegen/src/generator/rigid_body.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
 
 namespace armcal::codegen {
 namespace {
@@ -31,7 +32,7 @@ bool RobotConstant(const Joint& j, const std::string& name, double& value) {
 class Names {
  public:
   Names(Graph& g, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
-        const ModelQuantities& quantities)
+        const QuantitySource& quantities)
       : g_(g), record_(record), robot_(robot), joints_(joints), quantities_(quantities) {}
 
   int row = 0;        // the joint whose row is being written
@@ -79,47 +80,53 @@ class Names {
       if (equals != std::string::npos && defined == name && indices.empty())
         return value = ParseExpression(g_, line.substr(equals + 1), scope(), record_.path + ": let " + name), true;
     }
-    if ((name == "t" || name == "dt") && indices.empty()) return value = g_.Input(name), true;
-    if (name == "Y" && indices.size() == 2) return Body(indices, value);
-    if ((name == "M" || name == "dtau_dg") && indices.size() == 2) return TwoIndices(name, indices, value);
+    if (const QuantityInfo* info = FindWord(name)) return ReadQuantity(*info, indices, value);
     int joint = 0;
     if (!JointOf(indices, joint)) return false;
-    for (const char* quantity : {"q", "qd", "qdd", "temp", "flag"})
-      if (name == quantity) return value = g_.Input(InputName(quantity, joint)), true;
-    if (name == "tau_rigid") return value = quantities_.tau_rigid(joint), true;
-    if (name == "tau_gravity") return value = quantities_.tau_gravity(joint), true;
-    if (record_.kind_class == "sensor") {
-      if (name == "tau_model") return value = quantities_.tau_model(joint), true;
-      if (name == "tau_delayed") return value = quantities_.tau_delayed(joint), true;
-    }
     double constant = 0;
     if (RobotConstant(robot_.joint[joint], name, constant)) return value = g_.Constant(constant), true;
     return false;
   }
-  // M[row, joint] and dtau_dg[row, x | y | z]
-  bool TwoIndices(const std::string& name, const std::vector<std::string>& indices, Expr& value) {
-    int of_row = 0, joint = 0;
-    if (!JointOf({indices[0]}, of_row)) return false;
-    if (name == "M") return JointOf({indices[1]}, joint) && (value = quantities_.mass(of_row, joint), true);
-    const auto axis = std::string("xyz").find(indices[1]);
-    if (indices[1].size() != 1 || axis == std::string::npos) return false;
-    return value = quantities_.tilt(of_row, static_cast<int>(axis)), true;
-  }
-  // Y[flange, mx] or Y[flange, i] with a parameter name as the array index
-  bool Body(const std::vector<std::string>& indices, Expr& value) {
-    const int body = indices[0] == "flange" ? robot_.joints() - 1 : std::atoi(indices[0].c_str()) - 1;
-    const std::string& name = indices[1] == "i" ? index : indices[1];
-    if (body < 0 || body >= robot_.joints()) return false;
-    for (int p = 0; p < 10; ++p)
-      if (name == kBodyParameterName[p]) return value = quantities_.body(row, body, p), true;
-    return false;
+  bool ReadQuantity(const QuantityInfo& info, const std::vector<std::string>& indices, Expr& value) {
+    if (info.sensor_only && record_.effect_class != EffectClass::kSensor) return false;
+    InputId id{info.quantity};
+    switch (info.indexing) {
+      case Indexing::kNone:
+        if (!indices.empty()) return false;
+        break;
+      case Indexing::kJoint:
+        if (indices.size() > 1 || !JointOf(indices, id.row)) return false;
+        break;
+      case Indexing::kBody: {  // Y[flange, mx], Y[3, m], or Y[flange, i] with a parameter's name as the array index
+        if (indices.size() != 2) return false;
+        const std::string& name = indices[1] == "i" ? index : indices[1];
+        const auto at = std::find(std::begin(kBodyParameterName), std::end(kBodyParameterName), name);
+        id.row = row;
+        id.body = indices[0] == "flange" ? robot_.joints() - 1 : std::atoi(indices[0].c_str()) - 1;
+        id.parameter = static_cast<int>(at - std::begin(kBodyParameterName));
+        if (id.body < 0 || id.body >= robot_.joints() || id.parameter >= 10) return false;
+        break;
+      }
+      case Indexing::kRowJoint:
+        if (indices.size() != 2 || !JointOf({indices[0]}, id.row) || !JointOf({indices[1]}, id.body)) return false;
+        break;
+      case Indexing::kRowAxis: {
+        if (indices.size() != 2 || indices[1].size() != 1 || !JointOf({indices[0]}, id.row)) return false;
+        const auto axis = std::string("xyz").find(indices[1]);
+        if (axis == std::string::npos) return false;
+        id.parameter = static_cast<int>(axis);
+        break;
+      }
+    }
+    value = quantities_(id);
+    return true;
   }
 
   Graph& g_;
   const EffectRecord& record_;
   const Robot& robot_;
   const std::vector<int>& joints_;
-  const ModelQuantities& quantities_;
+  const QuantitySource& quantities_;
 };
 
 double ConstantValue(Graph& g, const std::string& text, const Robot& robot, const std::vector<int>& joints,
@@ -167,34 +174,34 @@ void MakeStates(Graph& g, const EffectRecord& record, const std::string& prefix,
 
 }  // namespace
 
-ModelQuantities QuantitiesAsInputs(Graph& graph) {
-  return {
-      [&graph](int j) { return graph.Input(InputName("tau_rigid", j)); },
-      [&graph](int j) { return graph.Input(InputName("tau_gravity", j)); },
-      [&graph](int row, int body, int p) { return graph.Input(EntryName("Y", row, body) + "_" + std::to_string(p)); },
-      [&graph](int row, int j) { return graph.Input(EntryName("M", row, j)); },
-      [&graph](int row, int axis) { return graph.Input(EntryName("G", row, axis)); },
-      [&graph](int j) { return graph.Input(InputName("tau_model", j)); },
-      [&graph](int j) { return graph.Input(InputName("tau_delayed", j)); }};
+QuantitySource QuantitiesAsInputs(Graph& graph) {
+  return [&graph](const InputId& id) { return graph.Input(id); };
 }
 
 std::vector<std::vector<int>> JointSets(const EffectRecord& record, int n) {
   std::vector<std::vector<int>> sets;
-  if (record.scope == "joint")
-    for (int j = 0; j < n; ++j) sets.push_back({j});
-  else if (record.scope == "pair")
-    for (int j = 0; j < n; ++j)
-      for (int k = 0; k < n; ++k)
-        if (j != k) sets.push_back({j, k});
-  if (record.scope == "arm" || record.scope == "body") sets.push_back({});
+  switch (record.scope) {
+    case EffectScope::kJoint:
+      for (int j = 0; j < n; ++j) sets.push_back({j});
+      break;
+    case EffectScope::kPair:
+      for (int j = 0; j < n; ++j)
+        for (int k = 0; k < n; ++k)
+          if (j != k) sets.push_back({j, k});
+      break;
+    case EffectScope::kArm:
+    case EffectScope::kBody:
+      sets.push_back({});
+      break;
+  }
   return sets;
 }
 
 EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
-                           const ModelQuantities& quantities, int ordinal) {
-  const std::size_t expected = record.scope == "joint" ? 1 : (record.scope == "pair" ? 2 : 0);
+                           const QuantitySource& quantities, int ordinal) {
+  const std::size_t expected = record.scope == EffectScope::kJoint ? 1 : (record.scope == EffectScope::kPair ? 2 : 0);
   if (joints.size() != expected)
-    throw io::InputError(record.path + ": scope: \"" + record.scope + "\" takes " + std::to_string(expected) +
+    throw io::InputError(record.path + ": scope: \"" + Word(record.scope) + "\" takes " + std::to_string(expected) +
                          " joint(s), not " + std::to_string(joints.size()));
   EffectInstance out;
   out.record = &record;
@@ -215,7 +222,7 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
                     p.logarithmic};
     if (!(u.lower <= u.initial && u.initial <= u.upper))
       throw io::InputError(where + ": expected lower <= initial <= upper");
-    names.unknowns[p.name] = g.Input(u.name);
+    names.unknowns[p.name] = g.Symbol(u.name);
     out.unknowns.push_back(u);
   }
   MakeStates(g, record, prefix, suffix, names, out);
@@ -243,7 +250,7 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
         else if (const int at = std::atoi(row.c_str()); joints.empty() && at >= 1 && at <= robot.joints())
           targets = {at - 1};
         else
-          throw io::InputError(where + ": expected a row of scope \"" + record.scope +
+          throw io::InputError(where + ": expected a row of scope \"" + Word(record.scope) +
                                "\": j, k, all or, without joints of its own, a joint's number");
         for (const int i : targets) {
           names.row = i;
@@ -254,7 +261,7 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
       out.columns.push_back(std::move(c));
     }
   }
-  if (record.kind_class == "static" && g.states().size() > states_before)
+  if (record.effect_class == EffectClass::kStatic && g.states().size() > states_before)
     throw io::InputError(record.path + ": class: expected \"stateful\", since an expression has memory");
   return out;
 }

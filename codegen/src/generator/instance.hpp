@@ -37,24 +37,17 @@ struct EffectInstance {
   std::vector<Expr> settled;  // each 1 once its state no longer remembers how it started, 0 before; empty: always
 };
 
-// Quantities that are not plain inputs, all of the committed model. Either graph inputs (host, whole logs) or
-// expressions.
-struct ModelQuantities {
-  std::function<Expr(int joint)> tau_rigid, tau_gravity;
-  std::function<Expr(int row, int body, int parameter)> body;
-  std::function<Expr(int row, int joint)> mass;  // entry of M of (1)
-  std::function<Expr(int row, int axis)> tilt;   // torque per m/s^2 of gravity along the base frame's x, y, z
-  std::function<Expr(int joint)> tau_model, tau_delayed;
-};
+// The value of a quantity of QuantityTable, wherever an effect reads one: a graph input (host, whole logs) or an
+// expression.
+using QuantitySource = std::function<Expr(const InputId& id)>;
 
-// Plain graph inputs named tau_rigid1.., tau_gravity1.., tau_model1.., tau_delayed1.., Y<row>_<body>_<parameter>,
-// M<row>_<joint>, G<row>_<axis>; row, body, joint, axis and parameter counted from 0.
-ModelQuantities QuantitiesAsInputs(Graph& graph);
+// Every quantity as an input of the graph.
+QuantitySource QuantitiesAsInputs(Graph& graph);
 
 // Throws io::InputError naming the record where an expression does not parse or does not fit the scope. ordinal: 1 for
 // the first use of the record on these joints; a second harmonic of the same ripple is 2 and gets names of its own.
 EffectInstance Instantiate(Graph& graph, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
-                           const ModelQuantities& quantities, int ordinal = 1);
+                           const QuantitySource& quantities, int ordinal = 1);
 
 // The joint sets on which a record may be tried: each joint, each ordered pair, or the whole arm once.
 std::vector<std::vector<int>> JointSets(const EffectRecord& record, int joints);

@@ -5,7 +5,7 @@
 
 #include "codegen/src/generator/derivative.hpp"
 #include "codegen/src/generator/dynamics.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
 
 namespace armcal::codegen {
 namespace {
@@ -30,7 +30,7 @@ Model::Model(const Robot& robot, const Catalogue& catalogue) : robot_(robot) {
   base_ = FindBaseParameters(*graph_, body_rows_, robot_, TiltRows(catalogue));
   rigid_ = static_cast<int>(base_.column.size());
   gravity_rows_ = BodyRegressor(*graph_, robot_, false);
-  AddEffects(catalogue, Quantities());
+  AddEffects(catalogue);
   PlaceColumns();
   MakeReady();
   states_ = static_cast<int>(graph_->states().size());
@@ -70,24 +70,35 @@ Expr Model::CommittedTorque(const BodyRows& rows, int joint) {
   return BaseTorque(*graph_, rows, base_.column, joint);
 }
 
-ModelQuantities Model::Quantities() {
-  const auto not_here = [this](int) -> Expr {
-    throw io::InputError(robot_.path + ": effect: a sensor record acts on the measurement, not on the torque");
-  };
-  return {[this](int j) { return CommittedTorque(body_rows_, j); },
-          [this](int j) { return CommittedTorque(gravity_rows_, j); },
-          // about the file's frame: slid parameters = S parameters, so a column is a sum of slid ones
-          [this, S = Eigen::MatrixXd(SlideMap(robot_))](int row, int body, int p) {
-            Expr sum = graph_->Constant(0);
-            for (int k = 0; k < kBodyBlock; ++k)
-              sum = sum + S(kBodyBlock * body + k, kBodyBlock * body + p) * body_rows_[row][kBodyBlock * body + k];
-            return sum;
-          },
-          [this](int row, int j) { return CommittedTorque(AccelerationRows(*graph_, robot_, j), row); },
-          [this](int row, int axis) { return CommittedTorque(TiltedRows(axis), row); }, not_here, not_here};
+// What an effect reads of the committed model, as an expression.
+Expr Model::QuantityOf(const InputId& id) {
+  switch (id.quantity) {
+    case Quantity::kRigidTorque:
+      return CommittedTorque(body_rows_, id.row);
+    case Quantity::kGravityTorque:
+      return CommittedTorque(gravity_rows_, id.row);
+    case Quantity::kBodyColumn: {  // about the file's frame: slid parameters = S parameters, a sum of slid columns
+      if (!slide_.size()) slide_ = SlideMap(robot_);
+      const int first = kBodyBlock * id.body;
+      Expr sum = graph_->Constant(0);
+      for (int k = 0; k < kBodyBlock; ++k)
+        sum = sum + slide_(first + k, first + id.parameter) * body_rows_[id.row][first + k];
+      return sum;
+    }
+    case Quantity::kMassMatrix:
+      return CommittedTorque(AccelerationRows(*graph_, robot_, id.body), id.row);
+    case Quantity::kGravitySlope:
+      return CommittedTorque(TiltedRows(id.parameter), id.row);
+    case Quantity::kModelTorque:
+    case Quantity::kDelayedTorque:
+      throw io::InputError(robot_.path + ": effect: a sensor record acts on the measurement, not on the torque");
+    default:
+      return graph_->Input(id);
+  }
 }
 
-void Model::AddEffects(const Catalogue& catalogue, const ModelQuantities& quantities) {
+void Model::AddEffects(const Catalogue& catalogue) {
+  const auto quantities = [this](const InputId& id) { return QuantityOf(id); };
   std::vector<EffectUse> uses = robot_.effect;
   EffectUse law;
   law.effect = kFrictionLaw;
@@ -106,7 +117,7 @@ void Model::AddEffects(const Catalogue& catalogue, const ModelQuantities& quanti
                            " is for the host only");
     const EffectRecord& record = record_.emplace(found.name, found).first->second;
     std::vector<std::vector<int>> sets;
-    if (record.scope == "joint")
+    if (record.scope == EffectScope::kJoint)
       for (const int j : use.joints) sets.push_back({j});
     else sets.push_back(use.joints);
     if (sets.empty()) throw io::InputError(where + ": expected joints = [...]");
@@ -153,9 +164,9 @@ void Model::MakeJacobian() {
     if (is_rigid(k)) continue;
     const int number = k < front_ ? k : k - rigid_;
     const EffectInstance& owner = effect_[effect_column_[number].effect];
-    const Expr p = graph_->Input("p" + std::to_string(k));
+    const Expr p = graph_->Input({.quantity = Quantity::kCoordinate, .parameter = k});
     for (const EffectUnknown& u : owner.unknowns) {
-      const Expr eta = graph_->Input(u.name);
+      const Expr eta = graph_->Symbol(u.name);
       const auto at = std::find_if(unknown_.begin(), unknown_.end(),
                                    [&](const EffectUnknown& other) { return other.name == u.name; });
       for (const auto& [i, e] : effect_column(number).rows) {

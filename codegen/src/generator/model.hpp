@@ -94,16 +94,16 @@ class Model {
   const std::vector<std::vector<Expr>>& rows() const { return rows_; }  // [joint][column]
   const std::vector<std::vector<Expr>>& jacobian() const {
     return jacobian_;
-  }  // [joint][eta]; input p<k>: coordinate k
+  }  // [joint][eta]; reads kCoordinate inputs
 
  private:
   BodyRows TiltedRows(int axis);
   BodyRows TiltRows(const Catalogue& catalogue);
   Expr CommittedTorque(const BodyRows& rows, int joint);
-  ModelQuantities Quantities();
+  Expr QuantityOf(const InputId& id);
   void MakeReady();
   void MakeJacobian();
-  void AddEffects(const Catalogue& catalogue, const ModelQuantities& quantities);
+  void AddEffects(const Catalogue& catalogue);
   void PlaceColumns();
   void MakeTable();
   const EffectColumn& effect_column(int k) const {
@@ -115,6 +115,7 @@ class Model {
   Robot robot_;
   std::unique_ptr<Graph> graph_ = std::make_unique<Graph>();
   BaseParameters base_;
+  Eigen::MatrixXd slide_;  // SlideMap, once something asks for it
   int front_ = 0, rigid_ = 0, dense_ = 0;
   std::vector<int> front_begin_, row_begin_, column_joint_;
   Catalogue record_;  // those in use; effect_ points into it

@@ -15,32 +15,32 @@ struct Model::Bound {
 // states: how many of the graph's states the roots need.
 Model::Bound Model::Bind(const Signals& s, std::span<const double> committed, std::span<const double> eta,
                          int states) const {
-  std::map<std::string, Binding> value;
+  std::map<InputId, Binding> value;
   for (int j = 0; j < joints(); ++j) {
-    value[InputName("q", j)].column = s.q.col(j).data();
-    value[InputName("qd", j)].column = s.qd.col(j).data();
-    value[InputName("qdd", j)].column = s.qdd.col(j).data();
-    if (s.temp.cols() > j) value[InputName("temp", j)].column = s.temp.col(j).data();
+    value[{Quantity::kPosition, j}].column = s.q.col(j).data();
+    value[{Quantity::kSpeed, j}].column = s.qd.col(j).data();
+    value[{Quantity::kAcceleration, j}].column = s.qdd.col(j).data();
+    if (s.temp.cols() > j) value[{Quantity::kTemperature, j}].column = s.temp.col(j).data();
   }
-  if (s.t.size()) value["t"].column = s.t.data();
+  if (s.t.size()) value[{Quantity::kTime}].column = s.t.data();
   for (int d = 0; d < rigid_ && !committed.empty(); ++d)
-    value["base" + std::to_string(d)].value = committed[front_ + d];
+    value[{.quantity = Quantity::kBaseParameter, .parameter = d}].value = committed[front_ + d];
   for (int k = 0; k < nonlinear(); ++k)
-    value[unknown_[k].name].value = eta.empty() ? table_[parameters() - nonlinear() + k].mean : eta[k];
+    value[SymbolId(unknown_[k].name)].value = eta.empty() ? table_[parameters() - nonlinear() + k].mean : eta[k];
   Bound bound;
   std::vector<char> restart;
   if (states > 0) {
     bound.dt = SampleSteps(s.t, s.samples(), robot_.sample_ticks / robot_.tick_rate_Hz, restart);
-    value["dt"] = BindSteps(bound.dt);
+    value[{Quantity::kTimeStep}] = BindSteps(bound.dt);
   }
   const auto in_order = [&] {
     bound.input.clear();
-    for (const std::string& input : graph_->inputs()) bound.input.push_back(value[input]);
+    for (const InputId& input : graph_->inputs()) bound.input.push_back(value[input]);
   };
   in_order();
   if (states > 0) {
     bound.state = StatePath(*graph_, states, bound.input, s.samples(), restart);
-    for (int k = 0; k < states; ++k) value[graph_->states()[k].name].column = bound.state.col(k).data();
+    for (int k = 0; k < states; ++k) value[SymbolId(graph_->states()[k].name)].column = bound.state.col(k).data();
     in_order();
   }
   return bound;
@@ -80,9 +80,8 @@ void Model::Jacobian(const Signals& s, std::span<const double> committed, std::s
                      std::span<const double> eta, std::vector<Eigen::MatrixXd>& row) const {
   Bound bound = Bind(s, committed, eta, states_ + sensitivities());
   for (std::size_t i = 0; i < graph_->inputs().size(); ++i)
-    if (const std::string& name = graph_->inputs()[i];
-        name[0] == 'p' && name.find_first_not_of("0123456789", 1) == name.npos)
-      bound.input[i].value = p[std::stoi(name.substr(1))];
+    if (const InputId& input = graph_->inputs()[i]; input.quantity == Quantity::kCoordinate)
+      bound.input[i].value = p[input.parameter];
   EvaluateRows(*graph_, jacobian_, bound.input, s.samples(), row);
 }
 

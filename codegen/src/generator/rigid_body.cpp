@@ -8,11 +8,6 @@
 
 namespace armcal::codegen {
 
-std::string InputName(const char* quantity, int joint) { return quantity + std::to_string(joint + 1); }
-std::string EntryName(const char* quantity, int row, int column) {
-  return quantity + std::to_string(row) + "_" + std::to_string(column);
-}
-
 BodyRows BodyRegressor(Graph& g, const Robot& robot, bool motion, const FrameChoice& choice) {
   const int n = robot.joints();
   BodyRows row(n, std::vector<Expr>(kBodyBlock * n, g.Constant(0)));

@@ -16,10 +16,6 @@ namespace armcal::codegen {
 inline constexpr int kBodyBlock = 11;
 using BodyRows = std::vector<std::vector<Expr>>;  // [joint][kBodyBlock body + parameter]
 
-// Names "q1", "qd1", "qdd1" ... of the graph inputs of joint i (0-based).
-std::string InputName(const char* quantity, int joint);
-std::string EntryName(const char* quantity, int row, int column);
-
 // Where each dot product is taken. It changes the number of operations and no value, but for the slides: those move the
 // origins that the body parameters refer to.
 struct FrameChoice {

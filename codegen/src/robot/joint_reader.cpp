@@ -26,9 +26,9 @@ constexpr std::string_view kDriveKeys[] = {"name",
                                            "encoder",
                                            "motor"};
 
-Motor ReadMotor(const TomlReader& in, bool prismatic) {
+Motor ReadMotor(const io::TomlReader& in, bool prismatic) {
   Motor m;
-  const TomlReader encoder = in.Table("encoder"), motor = in.Table("motor");
+  const io::TomlReader encoder = in.Table("encoder"), motor = in.Table("motor");
   encoder.AllowOnly({"counts_per_turn", "zero_counts"});
   motor.AllowOnly(
       {"gear_ratio", "current_A_per_lsb", "torque_constant_NmpA", "torque_constant_tolerance", "rotor_inertia_kgm2"});
@@ -47,9 +47,9 @@ Motor ReadMotor(const TomlReader& in, bool prismatic) {
 
 }  // namespace
 
-void AllowDriveKeys(const TomlReader& in) { in.AllowOnly(kDriveKeys); }
+void AllowDriveKeys(const io::TomlReader& in) { in.AllowOnly(kDriveKeys); }
 
-void ReadDrive(const TomlReader& in, Joint& j, bool limited) {
+void ReadDrive(const io::TomlReader& in, Joint& j, bool limited) {
   const bool prismatic = j.kinematics.type == JointType::kPrismatic;
   const char* const position = prismatic ? "position_limit_m" : "position_limit_deg";
   const char* const speed = prismatic ? "speed_limit_mps" : "speed_limit_degps";
@@ -71,7 +71,7 @@ void ReadDrive(const TomlReader& in, Joint& j, bool limited) {
   if (j.has_motor) j.motor = ReadMotor(in, prismatic);
 }
 
-Joint ReadJoint(const TomlReader& in, bool has_prior) {
+Joint ReadJoint(const io::TomlReader& in, bool has_prior) {
   Joint j;
   const std::string_view body[] = {"type", "alpha_deg", "a_m", "d_m", "offset_deg", "offset_m", "link"};
   in.AllowOnly(kDriveKeys, body);
@@ -86,7 +86,7 @@ Joint ReadJoint(const TomlReader& in, bool has_prior) {
   j.kinematics.theta_rad = in.Number("offset_deg", 0) * kRadPerDeg;
   ReadDrive(in, j, false);
   if (!has_prior) return j;
-  const TomlReader link = in.Table("link");
+  const io::TomlReader link = in.Table("link");
   link.AllowOnly({"mass_kg", "center_m", "inertia_kgm2"});
   j.link.mass_kg = link.Positive("mass_kg");
   const auto center = link.Numbers("center_m", 3), inertia = link.Numbers("inertia_kgm2", 6);

@@ -1,11 +1,11 @@
 // robot - reads [payload] and makes a link carry it; knows no other table.
 #include "codegen/src/robot/payload.hpp"
 
+#include "codegen/src/io/toml_reader.hpp"
 #include "codegen/src/robot/body.hpp"
-#include "codegen/src/robot/toml_reader.hpp"
 
 namespace armcal::codegen {
-Payload ReadPayload(const TomlReader& in) {
+Payload ReadPayload(const io::TomlReader& in) {
   in.AllowOnly({"mass_kg", "center_m", "inertia_kgm2"});
   Payload p;
   p.mass_kg = in.Positive("mass_kg");
@@ -22,8 +22,8 @@ Payload ReadPayload(const TomlReader& in) {
 }
 
 Payload ReadPayload(const std::filesystem::path& path) {
-  const toml::table table = ParseToml(path);
-  const TomlReader in(table, path.string());
+  const toml::table table = io::ParseToml(path);
+  const io::TomlReader in(table, path.string());
   in.AllowOnly({"payload"});
   return ReadPayload(in.Table("payload"));
 }

@@ -15,9 +15,11 @@
 
 #include "codegen/src/robot/robot.hpp"
 
-namespace armcal::codegen {
-
+namespace armcal::io {
 class TomlReader;
+}
+
+namespace armcal::codegen {
 
 struct Payload {
   double mass_kg = 0;
@@ -26,7 +28,7 @@ struct Payload {
 };
 
 // in: the [payload] table itself. Throws io::InputError: no mass, an inertia without a centre, an unknown key.
-Payload ReadPayload(const TomlReader& in);
+Payload ReadPayload(const io::TomlReader& in);
 // A file that holds nothing but that table.
 Payload ReadPayload(const std::filesystem::path& path);
 

@@ -10,7 +10,7 @@ namespace armcal::codegen {
 namespace {
 
 // {xyz_m, rpy_deg}, each may be absent.
-Eigen::Isometry3d ReadFrame(const TomlReader& in) {
+Eigen::Isometry3d ReadFrame(const io::TomlReader& in) {
   in.AllowOnly({"xyz_m", "rpy_deg"});
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   if (in.Has("xyz_m")) T.translation() = Eigen::Vector3d(in.Numbers("xyz_m", 3).data());
@@ -19,13 +19,13 @@ Eigen::Isometry3d ReadFrame(const TomlReader& in) {
 }
 
 // Kinematics, bodies and limits from the URDF; one [[joint]] table per movable joint, found by its name, says the rest.
-void ReadUrdfRobot(const TomlReader& in, Robot& r, Eigen::Isometry3d& base, Eigen::Isometry3d& flange) {
+void ReadUrdfRobot(const io::TomlReader& in, Robot& r, Eigen::Isometry3d& base, Eigen::Isometry3d& flange) {
   if (in.Has("dh")) in.Fail("dh", "either dh or urdf");
   UrdfChain chain = ReadUrdf(std::filesystem::path(in.file()).parent_path() / in.Text("urdf"));
   base = chain.base, flange = chain.flange;
   r.joint = std::move(chain.joint);
   std::vector<bool> told(r.joint.size(), false);
-  for (const TomlReader& table : in.Tables("joint")) {
+  for (const io::TomlReader& table : in.Tables("joint")) {
     AllowDriveKeys(table);
     const std::string name = table.Text("name");
     std::size_t j = 0;
@@ -40,7 +40,7 @@ void ReadUrdfRobot(const TomlReader& in, Robot& r, Eigen::Isometry3d& base, Eige
     if (!told[j]) in.Fail("joint", "a [[joint]] table with name = \"" + r.joint[j].name + "\"");
 }
 
-std::vector<int> ReadBodyParameters(const TomlReader& in, std::string_view key, int joints) {
+std::vector<int> ReadBodyParameters(const io::TomlReader& in, std::string_view key, int joints) {
   std::vector<int> out;
   for (const std::string& name : in.Texts(key)) {
     int found = -1;
@@ -64,7 +64,7 @@ Eigen::Isometry3d ConvertStandardDh(std::vector<Joint>& joints) {
   return ModifiedDh({JointType::kRevolute, alpha, a, 0, 0});
 }
 
-EffectUse ReadEffectUse(const TomlReader& in, int joints) {
+EffectUse ReadEffectUse(const io::TomlReader& in, int joints) {
   in.AllowOnly({"name", "joints", "state", "mean", "nonlinear"});
   EffectUse use;
   use.effect = in.Text("name");
@@ -78,7 +78,7 @@ EffectUse ReadEffectUse(const TomlReader& in, int joints) {
     }
   for (const auto* key : {"mean", "nonlinear"}) {
     if (!in.Has(key)) continue;
-    const TomlReader values = in.Table(key);
+    const io::TomlReader values = in.Table(key);
     auto& target = std::string_view(key) == "mean" ? use.mean : use.nonlinear;
     for (const auto& [k, v] : values.table()) target[std::string(k.str())] = values.Number(k.str());
   }
@@ -88,8 +88,8 @@ EffectUse ReadEffectUse(const TomlReader& in, int joints) {
 }  // namespace
 
 Robot ReadRobot(const std::filesystem::path& path) {
-  const toml::table table = ParseToml(path);
-  const TomlReader in(table, path.string());
+  const toml::table table = io::ParseToml(path);
+  const io::TomlReader in(table, path.string());
   in.AllowOnly(
       {"name",           "title",        "source",       "gravity_mps2", "dh",      "sign_law",   "sign_width_radps",
        "sign_width_mps", "tick_rate_Hz", "sample_ticks", "prior",        "control", "joint",      "effect",
@@ -115,7 +115,7 @@ Robot ReadRobot(const std::filesystem::path& path) {
     if (in.Text("prior") != "none") in.Fail("prior", "\"none\" or a table");
     r.has_prior = false;
   } else if (in.Has("prior")) {
-    const TomlReader prior = in.Table("prior");
+    const io::TomlReader prior = in.Table("prior");
     prior.AllowOnly({"link_relative_sd", "center_floor_m", "inertia_floor_ratio", "friction_relative_sd"});
     r.link_relative_sd = prior.Number("link_relative_sd", r.link_relative_sd);
     r.center_floor_m = prior.Number("center_floor_m", r.center_floor_m);
@@ -128,7 +128,7 @@ Robot ReadRobot(const std::filesystem::path& path) {
   } else {
     const std::string dh = in.Text("dh");
     if (dh != "modified" && dh != "standard") in.Fail("dh", "\"modified\" or \"standard\"");
-    for (const TomlReader& joint : in.Tables("joint")) r.joint.push_back(ReadJoint(joint, r.has_prior));
+    for (const io::TomlReader& joint : in.Tables("joint")) r.joint.push_back(ReadJoint(joint, r.has_prior));
     if (dh == "standard") flange = ConvertStandardDh(r.joint);
   }
   const int n = r.joints();
@@ -140,21 +140,21 @@ Robot ReadRobot(const std::filesystem::path& path) {
   r.tool_xyz_m = Components(flange.translation()), r.tool_rotation = RowMajor(flange.linear());
   if (in.Has("payload")) {
     if (!r.has_prior) in.Fail("payload", "links with bodies to carry it; prior = \"none\" leaves them out");
-    const TomlReader clamped = in.Table("payload");
+    const io::TomlReader clamped = in.Table("payload");
     const Payload payload = ReadPayload(clamped);
     if (!payload.inertia_kgm2) clamped.Fail("inertia_kgm2", "6 numbers");
     r.joint.back().link = Carrying(r.joint.back().link, flange, payload);
   }
   if (in.Has("parameters")) {
-    const TomlReader set = in.Table("parameters");
+    const io::TomlReader set = in.Table("parameters");
     set.AllowOnly({"set", "prefer", "omit"});
     const std::string kind = set.Text("set", "base");
     if (kind != "base" && kind != "standard") set.Fail("set", "\"base\" or \"standard\"");
     r.parameters = {kind == "standard", ReadBodyParameters(set, "prefer", n), ReadBodyParameters(set, "omit", n)};
   }
-  for (const TomlReader& use : in.Tables("effect")) r.effect.push_back(ReadEffectUse(use, n));
+  for (const io::TomlReader& use : in.Tables("effect")) r.effect.push_back(ReadEffectUse(use, n));
   if (in.Has("control")) {
-    const TomlReader control = in.Table("control");
+    const io::TomlReader control = in.Table("control");
     r.control.structure = control.Text("structure");
     r.control.rate_Hz = control.Positive("rate_Hz");
     r.control.kp_Nmprad = control.Numbers("kp_Nmprad", n);

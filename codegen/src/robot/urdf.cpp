@@ -8,9 +8,9 @@
 #include <sstream>
 #include <utility>
 
+#include "codegen/src/io/input_error.hpp"
 #include "codegen/src/robot/body.hpp"
 #include "codegen/src/robot/frames.hpp"
-#include "host_sim/io/input_error.hpp"
 
 namespace armcal::codegen {
 namespace {

@@ -1,5 +1,5 @@
 // calibration tests - batch least squares against Eigen's QR of the stacked rows, its second path, and its memory.
-#include "host_sim/calibration/batch_gram.hpp"
+#include "host_sim/identify/calibration/batch_gram.hpp"
 
 #include <gtest/gtest.h>
 #include <malloc.h>

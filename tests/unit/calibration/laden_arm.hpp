@@ -5,10 +5,10 @@
 #include <fstream>
 #include <random>
 
-#include "host_sim/plant/dynamics.hpp"
-#include "host_sim/plant/truth.hpp"
+#include "host_sim/machine/plant/dynamics.hpp"
+#include "host_sim/machine/plant/truth.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::tests {
 
@@ -19,7 +19,7 @@ inline std::string ReadAll(const std::string& path) {
 
 // A robot file with `more` at its end, in a temporary folder.
 inline std::string RobotWith(const std::string& more, const std::string& name = "er20_like") {
-  static const io::test::TemporaryFolder folder;  // until the program ends
+  static const files::test::TemporaryFolder folder;  // until the program ends
   return folder.Write(name + ".toml", ReadAll("codegen/robots/" + name + ".toml") + more).string();
 }
 

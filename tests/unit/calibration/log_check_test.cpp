@@ -1,9 +1,9 @@
 // calibration tests - a good log of a simulated arm passes; each planted fault is refused and named.
-#include "host_sim/calibration/log_check.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
 
 #include <gtest/gtest.h>
 
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::calibration {
@@ -35,7 +35,7 @@ class LogCheck : public testing::Test {
   }
   SyntheticArm arm_;
   Dataset data_;
-  io::Log log_;
+  logs::Log log_;
 };
 
 TEST_F(LogCheck, OfAGoodLog_SaysNothing) { EXPECT_EQ(Said(), ""); }
@@ -85,7 +85,7 @@ TEST_F(LogCheck, OfAClockThatJumps_NamesTheLine) {
 
 TEST_F(LogCheck, OfAFewMissingSamples_IsALineAndOfManyARefusal) {
   const auto without = [this](int first, int count) {
-    io::Log cut = log_;
+    logs::Log cut = log_;
     const Eigen::Index rest = log_.t.size() - first - count;
     cut.t.segment(first, rest) = log_.t.tail(rest);
     cut.q.middleRows(first, rest) = log_.q.bottomRows(rest);

@@ -5,17 +5,17 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
-#include "host_sim/calibration/body_barrier.hpp"
-#include "host_sim/calibration/payload.hpp"
+#include "host_sim/identify/calibration/body_barrier.hpp"
+#include "host_sim/identify/calibration/payload.hpp"
 #include "tests/unit/calibration/laden_arm.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::calibration {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using io::test::ErrorOf;
+using files::test::ErrorOf;
 using tests::LadenArm;
 
 // Half the arm's rating; its centre is off the flange's axis.
@@ -254,7 +254,7 @@ TEST(Payload, FileThatIsIncomplete_IsRefusedNamingTheKey) {
       if (as_robot) {
         codegen::ReadRobot(tests::RobotWith(text, "er20_like"));
       } else {
-        const io::test::TemporaryFolder folder;
+        const files::test::TemporaryFolder folder;
         codegen::ReadPayload(folder.Write("payload.toml", text));
       }
     });

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "host_sim/calibration/weighted_fit.hpp"
+#include "host_sim/identify/calibration/weighted_fit.hpp"
 #include "tests/unit/codegen/kdl_arm.hpp"
 
 namespace armcal::tests {

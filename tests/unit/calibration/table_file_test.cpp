@@ -3,15 +3,15 @@
 
 #include "armcal/estimator/image.hpp"
 #include "codegen/generated/er20_like/model.hpp"
-#include "host_sim/calibration/table_file.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::calibration {
 namespace {
 
-using io::test::ErrorOf;
-using io::test::TemporaryFolder;
+using files::test::ErrorOf;
+using files::test::TemporaryFolder;
 using tests::Er20Model;
 
 TableFile Changed() {

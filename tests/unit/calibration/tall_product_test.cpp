@@ -1,5 +1,5 @@
 // calibration tests - products of tall matrices against long-double sums, at every remainder of the kernel's tiles.
-#include "host_sim/calibration/tall_product.hpp"
+#include "host_sim/identify/calibration/tall_product.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,9 +3,9 @@
 
 #include <Eigen/Cholesky>
 
-#include "host_sim/calibration/map_readout.hpp"
-#include "host_sim/calibration/table_file.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/calibration/map_readout.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::calibration {

@@ -29,13 +29,13 @@ class ArmTorqueOf : public testing::TestWithParam<const char*> {
     s_.t = VectorXd::LinSpaced(kSamples, 0, 1);
   }
   int n() const { return robot_.joints(); }
-  void Evaluate(const VectorXd& bodies, const std::set<std::string>& wanted, codegen::TorqueParts& out) const {
+  void Evaluate(const VectorXd& bodies, const std::set<codegen::InputId>& wanted, codegen::TorqueParts& out) const {
     const VectorXd base = model_.base_map() * bodies;
     arm_.Evaluate(s_, {base.data(), static_cast<std::size_t>(base.size())}, wanted, out);
   }
   codegen::TorqueParts Parts(const VectorXd& bodies) const {
     codegen::TorqueParts out;
-    Evaluate(bodies, arm_.names(), out);
+    Evaluate(bodies, arm_.parts(), out);
     return out;
   }
   // Relative to the largest torque; every part of every sample.
@@ -99,7 +99,12 @@ TEST_P(ArmTorqueOf, KdlsBodies_IsKdlsTorquePartByPart) {
 TEST_P(ArmTorqueOf, SomeParts_AreThoseAloneThatChange) {
   const codegen::TorqueParts before = Parts(bodies_), after = Parts(2 * bodies_);
   codegen::TorqueParts some = before;
-  Evaluate(2 * bodies_, {"tau_gravity2", "M1_0", "G1_2", "tau_model1"}, some);
+  Evaluate(2 * bodies_,
+           {{codegen::Quantity::kGravityTorque, 1},
+            {codegen::Quantity::kMassMatrix, 1, 0},
+            {codegen::Quantity::kGravitySlope, 1, 0, 2},
+            {codegen::Quantity::kModelTorque, 0}},
+           some);
   codegen::TorqueParts expected = before;
   expected.gravity.col(1) = after.gravity.col(1);
   expected.mass[1][0] = after.mass[1][0], expected.tilt[1][2] = after.tilt[1][2];

@@ -5,7 +5,7 @@
 
 #include "codegen/src/generator/expression.hpp"
 #include "codegen/src/generator/state_path.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
 
 namespace armcal::tests {
 namespace {
@@ -18,9 +18,10 @@ using codegen::Graph;
 Expr Parse(Graph& g, const std::string& text) {
   const codegen::Scope scope{[&](const std::string& name, const std::vector<std::string>& index, Expr& value) {
                                if (index.size() == 1 && name == "v" && (index[0] == "1" || index[0] == "2"))
-                                 return value = g.Input("v" + index[0]), true;
+                                 return value = g.Symbol("v" + index[0]), true;
                                if (!index.empty() || (name != "x" && name != "p" && name != "dt")) return false;
-                               return value = g.Input(name), true;
+                               return value = name == "dt" ? g.Input({codegen::Quantity::kTimeStep}) : g.Symbol(name),
+                                      true;
                              },
                              [&](Expr e) { return g.Unary(codegen::Op::kTanh, 100.0 * e); }};
   return codegen::ParseExpression(g, text, scope, "record.toml: rows.j of a");
@@ -80,7 +81,7 @@ TEST(Expression, WrongText_IsRefusedWithItsColumn) {
 
 double At(const std::string& text, double x, double p) {
   Graph g;
-  g.Input("x"), g.Input("p");
+  g.Symbol("x"), g.Symbol("p");
   return codegen::Tape(g, {Parse(g, text)}).EvaluateAt<double>(std::vector<double>{x, p})[0];
 }
 
@@ -102,7 +103,7 @@ TEST(Expression, Sign_IsThePlainOne_AndSgnTheCallers) {
 std::vector<double> RunOver(const std::string& text, const std::vector<double>& x, double p, double dt,
                             int restart_at = 0) {
   Graph g;
-  g.Input("x"), g.Input("p"), g.Input("dt");
+  g.Symbol("x"), g.Symbol("p"), g.Input({codegen::Quantity::kTimeStep});
   const Expr e = Parse(g, text);
   const int samples = static_cast<int>(x.size());
   std::vector<Binding> bindings(g.inputs().size());
@@ -130,7 +131,7 @@ TEST(Memory, Previous_IsTheSampleBefore_AtTheFirstItself) {
 
 TEST(Memory, States_AreThoseThatAnExpressionHangsOn_OthersAreNotRun) {
   Graph g;
-  g.Input("x"), g.Input("p"), g.Input("dt");
+  g.Symbol("x"), g.Symbol("p"), g.Input({codegen::Quantity::kTimeStep});
   const Expr slow = Parse(g, "lowpass(previous(x), p)");
   const std::size_t own = g.states().size();
   const Expr other = Parse(g, "previous(x*x)");
@@ -138,7 +139,7 @@ TEST(Memory, States_AreThoseThatAnExpressionHangsOn_OthersAreNotRun) {
   ASSERT_EQ(g.states().size(), 3u);
   EXPECT_EQ(codegen::StatesOf(g, {slow}), (std::vector<char>{1, 1, 0}));
   EXPECT_EQ(codegen::StatesOf(g, {other}), (std::vector<char>{0, 0, 1}));
-  EXPECT_EQ(codegen::StatesOf(g, {g.Input("x")}), (std::vector<char>{0, 0, 0}));
+  EXPECT_EQ(codegen::StatesOf(g, {g.Symbol("x")}), (std::vector<char>{0, 0, 0}));
   std::vector<Binding> bindings(g.inputs().size());
   bindings[0].column = kSignal.data(), bindings[1].value = 0.02, bindings[2].value = 0.01;
   const std::vector<char> restart(kSignal.size(), 0);

@@ -18,7 +18,8 @@ Log Motion(const codegen::Graph& graph, int samples) {
   Log log;
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1, 1);
-  for (const std::string& name : graph.inputs()) {
+  for (const codegen::InputId& input : graph.inputs()) {
+    const std::string name = TestName(input);
     if (name.find('.') != std::string::npos || name.find(' ') != std::string::npos) continue;  // parameters
     const double a = unit(random), w = 0.05 + 0.1 * std::abs(unit(random)), phase = unit(random);
     for (int k = 0; k < samples; ++k)
@@ -38,7 +39,7 @@ TEST(Gradients, AlongARun_EqualComplexSteps_ForEveryRecord) {
       for (const auto& [row, e] : c.rows) columns.push_back(e);
     for (const auto& u : run.instance().unknowns) {
       slopes.clear();
-      const codegen::Expr parameter = run.graph().Input(u.name);
+      const codegen::Expr parameter = run.graph().Symbol(u.name);
       for (const codegen::Expr& e : columns) slopes.push_back(codegen::TotalDerivative(e, parameter));
       const Log log = Motion(run.graph(), 150);
       const auto along = run.Run<double>(slopes, log, {});
@@ -89,12 +90,12 @@ TEST(Derivative, OfEveryFunction_EqualsAComplexStepOfItsFormula) {
   for (const Case& c : kCases) {
     codegen::Graph g;
     const codegen::Scope scope{[&](const std::string& name, const std::vector<std::string>&, codegen::Expr& value) {
-                                 return value = g.Input(name), name == "x" || name == "p";
+                                 return value = g.Symbol(name), name == "x" || name == "p";
                                },
                                [&](codegen::Expr e) { return g.Unary(codegen::Op::kSign, e); }};
-    g.Input("x"), g.Input("p");
+    g.Symbol("x"), g.Symbol("p");
     const codegen::Expr e = codegen::ParseExpression(g, c.text, scope, "test");
-    const codegen::Tape tape(g, {e, codegen::Derivative(e, g.Input("p"))});
+    const codegen::Tape tape(g, {e, codegen::Derivative(e, g.Symbol("p"))});
     for (const double x : {-1.7, -0.4, 0.3, 0.62, 2.1})
       for (const double p : {0.45, 0.9, 1.6}) {
         const auto got = tape.EvaluateAt<double>(std::vector<double>{x, p});

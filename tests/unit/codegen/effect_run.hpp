@@ -28,8 +28,19 @@ inline const codegen::Robot& Arm() {
 
 // Where a record of this scope goes in these tests: joint 2, joints 5 and 6, or the whole arm.
 inline std::vector<int> JointsFor(const codegen::EffectRecord& record) {
-  if (record.scope == "joint") return {1};
-  return record.scope == "pair" ? std::vector<int>{4, 5} : std::vector<int>{};
+  if (record.scope == codegen::EffectScope::kJoint) return {1};
+  return record.scope == codegen::EffectScope::kPair ? std::vector<int>{4, 5} : std::vector<int>{};
+}
+
+// This suite's own names of a graph's inputs: "q2", "M3_1", "Y1_5_0", "G0_2", "stribeck.vs2". Rows, columns, bodies and
+// parameters count from 0, joints from 1.
+inline std::string TestName(const codegen::InputId& i) {
+  using codegen::Quantity;
+  const auto numbers = [](int a, int b) { return std::to_string(a) + "_" + std::to_string(b); };
+  if (i.quantity == Quantity::kBodyColumn) return "Y" + numbers(i.row, i.body) + "_" + std::to_string(i.parameter);
+  if (i.quantity == Quantity::kMassMatrix) return "M" + numbers(i.row, i.body);
+  if (i.quantity == Quantity::kGravitySlope) return "G" + numbers(i.row, i.parameter);
+  return codegen::NameOf(i);
 }
 
 using Log = std::map<std::string, std::vector<double>>;  // graph input -> one value a sample
@@ -58,7 +69,8 @@ class EffectRun {
     std::vector<std::vector<T>> out;
     for (int k = 0; k < samples; ++k) {
       std::vector<T> inputs;
-      for (const std::string& name : graph_.inputs()) inputs.push_back(Value<T>(name, k, log, eta, wiggled));
+      for (const codegen::InputId& input : graph_.inputs())
+        inputs.push_back(Value<T>(TestName(input), k, log, eta, wiggled));
       if (k == 0) state = start.EvaluateAt<T>(inputs);
       for (std::size_t s = 0; s < count; ++s) inputs[graph_.nodes()[graph_.states()[s].value.id()].a] = state[s];
       std::vector<T> all = step.EvaluateAt<T>(inputs);

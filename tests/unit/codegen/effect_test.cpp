@@ -9,7 +9,7 @@
 #include <set>
 
 #include "codegen/src/generator/model.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
 #include "tests/unit/codegen/effect_run.hpp"
 
 namespace armcal::tests {
@@ -34,30 +34,20 @@ TEST(Catalogue, HasARecordForEveryKind_AndNoOther) {
   EXPECT_EQ(found, expected);
 }
 
-// "M3_1" -> "M[:,j]", "qdd2" -> "qdd": the word of the closed list that stands for a graph input.
-std::string InputWord(const std::string& graph_input) {
-  const std::string word = graph_input.substr(0, graph_input.find_first_of("0123456789"));
-  return word == "M" ? "M[:,j]" : word == "G" ? "dY/dgravity" : word;
-}
-
 // What a record declares is what its expressions do: inputs, estimate, memory.
 TEST(Catalogue, EveryRecord_ReadsWhatItDeclares) {
-  const std::set<std::string> of_the_estimate = {"tau_rigid",   "tau_gravity", "tau_model",
-                                                 "tau_delayed", "M[:,j]",      "dY/dgravity"};
   for (const auto& [name, record] : Records()) {
     EffectRun run(name, JointsFor(record));
-    std::set<std::string> read, parameters;
-    for (const auto& u : run.instance().unknowns) parameters.insert(u.name);
-    for (const auto& s : run.graph().states()) parameters.insert(s.name);
     bool estimate = false;
-    for (const std::string& input : run.graph().inputs())
-      if (!parameters.contains(input))
-        read.insert(InputWord(input)), estimate |= of_the_estimate.contains(InputWord(input));
-    for (const std::string& input : read)
-      EXPECT_NE(std::count(record.inputs.begin(), record.inputs.end(), input), 0) << name << " reads " << input;
+    for (const codegen::InputId& input : run.graph().inputs()) {
+      const codegen::QuantityInfo* info = codegen::FindQuantity(input.quantity);
+      if (info == nullptr) continue;  // a parameter or a state
+      EXPECT_TRUE(record.inputs.contains(input.quantity)) << name << " reads " << info->declared;
+      estimate |= info->of_estimate;
+    }
     EXPECT_EQ(record.depends_on_estimate, estimate) << name;
-    if (record.kind_class != "sensor") {
-      EXPECT_EQ(record.kind_class == "stateful", !run.graph().states().empty()) << name;
+    if (record.effect_class != codegen::EffectClass::kSensor) {
+      EXPECT_EQ(record.effect_class == codegen::EffectClass::kStateful, !run.graph().states().empty()) << name;
     }
   }
 }
@@ -72,7 +62,7 @@ TEST(Catalogue, EveryRecord_NamesRealThings) {
       EXPECT_TRUE(Records().at(record.replaces).friction_law) << name;
     }
     EXPECT_FALSE(record.title.empty() || record.source.empty() || record.signals.empty()) << name;
-    if (record.kind_class != "sensor") continue;
+    if (record.effect_class != codegen::EffectClass::kSensor) continue;
     bool known = false;
     for (const auto& p : record.linear) known |= p.name == record.apply.by;
     for (const auto& p : record.nonlinear) known |= p.name == record.apply.by;
@@ -141,6 +131,9 @@ TEST_F(BadFile, Record_IsRefusedWithFileAndKey) {
   ExpectError([&] { codegen::ReadEffect(Write("x.toml", head + "colour = 1\n")); }, "colour");
   ExpectError([&] { codegen::ReadEffect(Write("x.toml", "name = \"y\"\n")); }, "name");
   ExpectError([&] { codegen::ReadEffect(Write("x.toml", head + "inputs = [\"torque\"]\n")); }, "inputs");
+  // Flags are in no sample of the model: neither drive nor diagnosis could evaluate them.
+  ExpectError([&] { codegen::ReadEffect(Write("x.toml", head + "inputs = [\"flag\"]\n")); },
+              "inputs: expected one of q, ");
   ExpectError([&] { codegen::ReadEffect(Write("x.toml", "name = \n")); }, "line 1");
   const auto record = codegen::ReadEffect(
       Write("x.toml", head + "[[linear]]\nname = \"a\"\nunit = \"N*m\"\nrows = { j = \"qd*frequency\" }\n"));

@@ -17,8 +17,8 @@ inline codegen::Model EveryEffect() {
     codegen::EffectUse use;
     use.effect = name;
     if (!record.replaces.empty()) use.joints = {free_joint++};
-    else if (record.scope == "joint") use.joints = {1};
-    else if (record.scope == "pair") use.joints = {4, 5};
+    else if (record.scope == codegen::EffectScope::kJoint) use.joints = {1};
+    else if (record.scope == codegen::EffectScope::kPair) use.joints = {4, 5};
     if (name == "backlash") use.nonlinear["gap"] = 5e-3;  // many float steps of a position wide
     robot.effect.push_back(use);
   }

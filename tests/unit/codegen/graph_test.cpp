@@ -5,7 +5,7 @@
 
 #include "codegen/src/generator/expression.hpp"
 #include "codegen/src/generator/tape.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
 
 namespace armcal::tests {
 namespace {
@@ -16,7 +16,7 @@ using codegen::Op;
 
 TEST(Graph, EqualExpressions_AreOneNode) {
   Graph g;
-  const Expr a = g.Input("a"), b = g.Input("b");
+  const Expr a = g.Symbol("a"), b = g.Symbol("b");
   EXPECT_EQ((a * b + a).id(), (a + b * a).id());
   EXPECT_EQ((-(a - b)).id(), (b - a).id());
   EXPECT_EQ(((-a) * (-b)).id(), (a * b).id());
@@ -29,13 +29,13 @@ double Value(const std::string& text, double x, double y = 0) {
   Graph g;
   const codegen::Scope scope{[&](const std::string& name, const std::vector<std::string>& indices, Expr& e) {
                                if (!indices.empty() || (name != "x" && name != "y")) return false;
-                               return e = g.Input(name), true;
+                               return e = g.Symbol(name), true;
                              },
                              [&](Expr e) { return g.Unary(Op::kSign, e); }};
   const Expr e = codegen::ParseExpression(g, text, scope, "test");
   const codegen::Tape tape(g, {e});
   std::vector<double> inputs;
-  for (const auto& name : g.inputs()) inputs.push_back(name == "x" ? x : y);
+  for (const auto& input : g.inputs()) inputs.push_back(input.symbol == "x" ? x : y);
   return tape.EvaluateAt<double>(inputs)[0];
 }
 
@@ -81,7 +81,7 @@ TEST(Expression, Errors_NameTheColumn) {
 
 TEST(Tape, BlockEvaluation_EqualsPointEvaluation) {
   Graph g;
-  const Expr a = g.Input("a"), b = g.Input("b");
+  const Expr a = g.Symbol("a"), b = g.Symbol("b");
   const Expr e = g.Unary(Op::kExp, a * b) + g.Unary(Op::kAbs, a - b) * (0.5 * b);
   const codegen::Tape tape(g, {e, a, g.Unary(Op::kExp, b) * b});
   const int samples = 203;  // no multiple of the block

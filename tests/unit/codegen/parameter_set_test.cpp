@@ -6,8 +6,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "codegen/src/io/input_error.hpp"
 #include "codegen/src/robot/frames.hpp"
-#include "host_sim/io/input_error.hpp"
 #include "tests/unit/codegen/rigid_oracle.hpp"
 
 namespace armcal::tests {

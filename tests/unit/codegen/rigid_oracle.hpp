@@ -72,13 +72,13 @@ inline State RandomState(int n, std::mt19937_64& random) {
   return s;
 }
 
-// One value per graph input "q1", "qd1", "qdd1" ...
+// One value per graph input: a joint's position, speed or acceleration.
 inline std::vector<double> InputValues(const codegen::Graph& graph, const State& s) {
   std::vector<double> x;
-  for (const std::string& name : graph.inputs()) {
-    const auto digits = name.find_first_of("0123456789");
-    const VectorXd& v = digits == 1 ? s.q : (digits == 2 ? s.qd : s.qdd);
-    x.push_back(v[std::stoi(name.substr(digits)) - 1]);
+  for (const codegen::InputId& input : graph.inputs()) {
+    const bool position = input.quantity == codegen::Quantity::kPosition;
+    const VectorXd& v = position ? s.q : (input.quantity == codegen::Quantity::kSpeed ? s.qd : s.qdd);
+    x.push_back(v[input.row]);
   }
   return x;
 }

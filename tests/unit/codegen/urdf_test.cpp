@@ -9,8 +9,8 @@
 #include <kdl_parser/kdl_parser.hpp>
 #include <sstream>
 
+#include "codegen/src/io/input_error.hpp"
 #include "codegen/src/robot/urdf.hpp"
-#include "host_sim/io/input_error.hpp"
 #include "tests/unit/codegen/rigid_oracle.hpp"
 
 namespace armcal::tests {

@@ -1,8 +1,8 @@
 // diagnosis tests - the guard of the second bandwidth: what a derivation of the motion leaves behind is no effect.
 #include <gtest/gtest.h>
 
-#include "host_sim/calibration/delay.hpp"
-#include "host_sim/diagnosis/diagnose.hpp"
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
+#include "host_sim/identify/calibration/delay.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::diagnosis {

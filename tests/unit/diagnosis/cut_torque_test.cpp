@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "host_sim/diagnosis/diagnose.hpp"
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::diagnosis {

@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-#include "host_sim/diagnosis/diagnose.hpp"
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::diagnosis {
@@ -167,7 +167,8 @@ TEST(HeldOutLog, SaysThatItFollows_OnlyWhatItConfirms) {
                      for (int k = 0; k < d.samples(); ++k) d.tau(k, kChangedJoint) += k % 2 ? size_Nm : -size_Nm;
                    });
     bool follows = false;
-    for (const Term& t : j.terms()) follows = follows || (t.confirmed && t.record->kind_class == "run_state");
+    for (const Term& t : j.terms())
+      follows = follows || (t.confirmed && t.record->effect_class == codegen::EffectClass::kRunState);
     EXPECT_EQ(j.held_out.tracking.empty(), !follows) << size_Nm;
   }
 }

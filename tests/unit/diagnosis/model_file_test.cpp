@@ -8,8 +8,8 @@
 #include <fstream>
 
 #include "codegen/src/generator/emit.hpp"
-#include "host_sim/diagnosis/model_file.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/diagnose/diagnosis/model_file.hpp"
 
 namespace armcal::diagnosis {
 namespace {
@@ -21,7 +21,7 @@ const codegen::Catalogue& Records() {
   return records;
 }
 
-bool CanBeFound(const codegen::EffectRecord& r) { return !r.friction_law && r.search.how != "none"; }
+bool CanBeFound(const codegen::EffectRecord& r) { return !r.friction_law && r.search.how != codegen::SearchWay::kNone; }
 
 std::string Text(const fs::path& path) {
   std::ifstream in(path);

@@ -4,7 +4,7 @@
 #include <Eigen/QR>
 #include <random>
 
-#include "host_sim/diagnosis/metric.hpp"
+#include "host_sim/diagnose/diagnosis/metric.hpp"
 
 namespace armcal::diagnosis {
 namespace {

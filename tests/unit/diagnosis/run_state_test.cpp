@@ -3,8 +3,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "host_sim/diagnosis/run_state.hpp"
-#include "host_sim/diagnosis/work.hpp"
+#include "host_sim/diagnose/diagnosis/run_state.hpp"
+#include "host_sim/diagnose/diagnosis/work.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::diagnosis {
@@ -23,8 +23,8 @@ struct ShortRun {
       : arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 3),
         torque(arm.model()),
         data(arm.Run(seconds, 30)),
-        q(MakeQuantities(arm.model(), data, {"Y"})) {
-    Follow(arm.model(), torque, arm.truth(), {}, torque.names(), q);
+        q(MakeQuantities(arm.model(), data, {{codegen::Quantity::kBodyColumn, 0, kJoints - 1}})) {
+    Follow(arm.model(), torque, arm.truth(), {}, torque.parts(), q);
   }
   MatrixXd Zero() const { return MatrixXd::Zero(data.samples(), kJoints); }
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "host_sim/excitation/series.hpp"
+#include "host_sim/identify/excitation/series.hpp"
 
 namespace armcal::excitation::test {
 

@@ -1,14 +1,14 @@
 // excitation tests - whole trajectories: rest, limits, smoothness, and what the slow part contains.
-#include "host_sim/excitation/compose.hpp"
+#include "host_sim/identify/excitation/compose.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "host_sim/excitation/blend.hpp"
-#include "host_sim/excitation/slow_moves.hpp"
+#include "host_sim/identify/excitation/blend.hpp"
+#include "host_sim/identify/excitation/slow_moves.hpp"
 #include "tests/unit/excitation/arms.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::excitation {
 namespace {
@@ -41,7 +41,7 @@ TEST_F(ComposeTest, StartsAndEndsAtRestInOnePose) {
 
 TEST_F(ComposeTest, KeepsLimitsOnTheCheckGrid_AsReported) {
   const Composed c = OfPublishedSeries(observation_, {1, 6, 0.004, 0.1});
-  const TrajectorySpline spline(c.trajectory);
+  const trajectory::TrajectorySpline spline(c.trajectory);
   for (int j = 0; j < 6; ++j) {
     const codegen::Joint& joint = model_.robot().joint[j];
     double lowest = INFINITY, highest = -INFINITY, speed = 0, acceleration = 0;
@@ -63,7 +63,7 @@ TEST_F(ComposeTest, KeepsLimitsOnTheCheckGrid_AsReported) {
 
 TEST_F(ComposeTest, HasNoJumpInAccelerationAnywhere) {
   const Composed c = OfPublishedSeries(observation_, {1, 2, 0.004, 0.05});
-  const TrajectorySpline spline(c.trajectory);
+  const trajectory::TrajectorySpline spline(c.trajectory);
   VectorXd before = spline.Acceleration(0);
   for (double t = 0.004; t < spline.duration_s(); t += 0.004) {
     const VectorXd here = spline.Acceleration(t);
@@ -84,7 +84,7 @@ TEST_F(ComposeTest, SectionsFollowOneAnother_AndTheSeriesLastsItsPeriods) {
 
 TEST_F(ComposeTest, SlowPart_MovesEveryJointBothWaysSlowlyForSeconds) {
   const Composed c = OfPublishedSeries(observation_, {1, 6, 0.004, 0.05});
-  const TrajectorySpline spline(c.trajectory);
+  const trajectory::TrajectorySpline spline(c.trajectory);
   const auto slow =
       std::find_if(c.sections.begin(), c.sections.end(), [](const Section& s) { return s.name == "slow moves"; });
   ASSERT_NE(slow, c.sections.end());
@@ -112,7 +112,7 @@ TEST_F(ComposeTest, WhereTorqueLeavesNoRoomForASlowPart_SaysSo) {
   robot.joint[5].torque_limit_Nm = 8.2;  // above its Coulomb friction of 8 N m by less than the margin
   const codegen::Model weak = test::Arm(robot);
   const Observation observation(weak);
-  const std::string error = io::test::ErrorOf([&] { Compose(observation, test::PublishedSeries(), {}); });
+  const std::string error = files::test::ErrorOf([&] { Compose(observation, test::PublishedSeries(), {}); });
   EXPECT_NE(error.find("er20_like.toml"), std::string::npos);
   EXPECT_NE(error.find("limits"), std::string::npos);
 }

@@ -1,5 +1,5 @@
 // excitation tests - the criteria against plain linear algebra on K itself, and their derivatives.
-#include "host_sim/excitation/criterion.hpp"
+#include "host_sim/identify/excitation/criterion.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,12 +8,12 @@
 #include <Eigen/SVD>
 #include <cmath>
 
-#include "host_sim/excitation/objective.hpp"
-#include "host_sim/excitation/optimise.hpp"
-#include "host_sim/excitation/peaks.hpp"
-#include "host_sim/excitation/target.hpp"
+#include "host_sim/identify/excitation/objective.hpp"
+#include "host_sim/identify/excitation/optimise.hpp"
+#include "host_sim/identify/excitation/peaks.hpp"
+#include "host_sim/identify/excitation/target.hpp"
 #include "tests/unit/excitation/arms.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::excitation {
 namespace {
@@ -145,7 +145,7 @@ TEST(Observation, Places_FindAnEffectsColumns_AndNameOneThatIsNotThere) {
   EXPECT_EQ(observation.Places({"coulomb_viscous"}).size(), 4U);
   for (const int place : observation.Places({"coulomb_viscous:2"}))
     EXPECT_EQ(model.column_name(observation.columns()[place]).back(), '2');
-  EXPECT_NE(io::test::ErrorOf([&] { observation.Places({"stribeck:1"}); }).find("stribeck:1"), std::string::npos);
+  EXPECT_NE(files::test::ErrorOf([&] { observation.Places({"stribeck:1"}); }).find("stribeck:1"), std::string::npos);
 }
 
 // A search for the robot's own cond(K) does not look at two laws of low speed on one joint.
@@ -173,7 +173,7 @@ TEST(Target, OfWhatCannotBeAsked_SaysWhat) {
   const codegen::Robot robot = test::RobotFile("two_link");
   const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");
   for (const char* name : {"no_such", "stribeck:7", "stribeck:x", "stribeck:", "temp_viscous:1"}) {
-    const std::string error = io::test::ErrorOf([&] { Target(robot, records, std::vector<std::string>{name}); });
+    const std::string error = files::test::ErrorOf([&] { Target(robot, records, std::vector<std::string>{name}); });
     EXPECT_NE(error.find(name), std::string::npos) << error;
   }
 }

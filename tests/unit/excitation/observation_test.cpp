@@ -1,13 +1,13 @@
 // excitation tests - the condition number and torque against a singular value decomposition and a published trajectory.
-#include "host_sim/excitation/observation.hpp"
+#include "host_sim/identify/excitation/observation.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/SVD>
 #include <cmath>
 
-#include "host_sim/excitation/optimise.hpp"
-#include "host_sim/excitation/peaks.hpp"
+#include "host_sim/identify/excitation/optimise.hpp"
+#include "host_sim/identify/excitation/peaks.hpp"
 #include "tests/unit/excitation/arms.hpp"
 
 namespace armcal::excitation {

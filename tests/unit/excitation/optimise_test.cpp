@@ -1,14 +1,14 @@
 // excitation tests - the search: its gradient, its limits, and that it beats chance.
-#include "host_sim/excitation/optimise.hpp"
+#include "host_sim/identify/excitation/optimise.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "host_sim/excitation/peaks.hpp"
+#include "host_sim/identify/excitation/peaks.hpp"
 #include "tests/unit/excitation/arms.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::excitation {
 namespace {
@@ -138,7 +138,7 @@ TEST(Optimise, ForMotorsThatCannotHoldTheArm_SaysSo) {
   robot.joint[0].torque_limit_Nm = 0.1;
   const codegen::Model model = test::Arm(robot);
   const Observation observation(model);
-  EXPECT_NE(io::test::ErrorOf([&] { Optimise(observation, Searches(2)); }).find("limits"), std::string::npos);
+  EXPECT_NE(files::test::ErrorOf([&] { Optimise(observation, Searches(2)); }).find("limits"), std::string::npos);
 }
 
 TEST(Optimise, ForARobotWithoutPrior_IgnoresTorqueLimits) {

@@ -1,9 +1,9 @@
 // excitation tests - which effects a motion can be searched for that tells them apart: the catalogue, pair by pair.
 #include <gtest/gtest.h>
 
-#include "host_sim/excitation/optimise.hpp"
-#include "host_sim/excitation/target.hpp"
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/excitation/optimise.hpp"
+#include "host_sim/identify/excitation/target.hpp"
 #include "tests/unit/excitation/arms.hpp"
 
 namespace armcal::excitation {

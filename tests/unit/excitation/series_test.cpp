@@ -1,5 +1,5 @@
 // excitation tests - the curves against the survey's formula, difference quotients and what their family promises.
-#include "host_sim/excitation/series.hpp"
+#include "host_sim/identify/excitation/series.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "tests/unit/excitation/arms.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::excitation {
 namespace {
@@ -89,7 +89,7 @@ TEST(Series, EqualSplineWeights_AreAConstant) {
 
 TEST(Series, AnUnknownFamily_IsNamed) {
   for (const Family family : kFamilies) EXPECT_EQ(FamilyNamed(Name(family)), family);
-  EXPECT_NE(io::test::ErrorOf([] { FamilyNamed("bezier"); }).find("bezier"), std::string::npos);
+  EXPECT_NE(files::test::ErrorOf([] { FamilyNamed("bezier"); }).find("bezier"), std::string::npos);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // health - the verdict on joints whose trouble is known.
-#include "host_sim/health/joint_health.hpp"
+#include "host_sim/diagnose/health/joint_health.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "codegen/generated/er20_like/model.hpp"
-#include "host_sim/calibration/barrier_fit.hpp"
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "tests/unit/physical/read_out_case.hpp"
 
 namespace armcal::physical {

@@ -9,13 +9,13 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
-#include "host_sim/plant/arm.hpp"
-#include "tests/unit/io/temporary_folder.hpp"
+#include "host_sim/machine/plant/arm.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::plant::bench {
 
 inline std::string WriteText(const std::string& name, const std::string& text) {
-  static const io::test::TemporaryFolder folder;  // until the program ends
+  static const files::test::TemporaryFolder folder;  // until the program ends
   return folder.Write(name, text).string();
 }
 

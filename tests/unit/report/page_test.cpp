@@ -1,5 +1,5 @@
 // report tests - the page: complete, self-contained, harmless whatever text comes in.
-#include "host_sim/report/page.hpp"
+#include "host_sim/data/report/page.hpp"
 
 #include <gtest/gtest.h>
 

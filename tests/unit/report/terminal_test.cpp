@@ -3,8 +3,8 @@
 
 #include <cstdio>
 
-#include "host_sim/report/progress.hpp"
-#include "host_sim/report/table.hpp"
+#include "host_sim/data/report/progress.hpp"
+#include "host_sim/data/report/table.hpp"
 
 namespace armcal::report {
 namespace {

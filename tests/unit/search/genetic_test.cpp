@@ -1,5 +1,5 @@
 // search tests - the genetic algorithm on functions whose minimum is known.
-#include "host_sim/search/genetic.hpp"
+#include "host_sim/identify/search/genetic.hpp"
 
 #include <gtest/gtest.h>
 

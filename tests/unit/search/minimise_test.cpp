@@ -1,5 +1,5 @@
 // search tests - the gradient search on functions whose minimum is known.
-#include "host_sim/search/minimise.hpp"
+#include "host_sim/identify/search/minimise.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // search tests - every piece once, and an exception that comes out.
-#include "host_sim/search/parallel.hpp"
+#include "host_sim/identify/search/parallel.hpp"
 
 #include <gtest/gtest.h>
 

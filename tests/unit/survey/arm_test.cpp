@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "host_sim/calibration/prior.hpp"
-#include "host_sim/survey/platform.hpp"
+#include "host_sim/identify/calibration/prior.hpp"
+#include "host_sim/study/survey/platform.hpp"
 #include "tests/unit/survey/survey_arm.hpp"
 
 namespace armcal::survey {

@@ -1,5 +1,5 @@
 // survey tests - the two data files: limits, and spot checks of the printed figures against one another.
-#include "host_sim/survey/data_files.hpp"
+#include "host_sim/study/survey/data_files.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include <unistd.h>
 
-#include "host_sim/io/input_error.hpp"
+#include "codegen/src/io/input_error.hpp"
 
 namespace armcal::survey {
 namespace {
@@ -16,11 +16,11 @@ namespace {
 namespace fs = std::filesystem;
 
 const Levels& LevelFile() {
-  static const Levels levels = ReadLevels("host_sim/survey/levels.toml");
+  static const Levels levels = ReadLevels("host_sim/study/survey/levels.toml");
   return levels;
 }
 const Printed& Figures() {
-  static const Printed printed = ReadPrinted("host_sim/survey/printed.toml");
+  static const Printed printed = ReadPrinted("host_sim/study/survey/printed.toml");
   return printed;
 }
 
@@ -82,7 +82,7 @@ TEST(PrintedFigures, Table10_GrowthFollowsFromItsRows) {
 
 TEST(LevelLimits, WithALimitOutOfOrder_IsRefusedWithFileAndKey) {
   const fs::path path = fs::temp_directory_path() / ("armcal_levels_" + std::to_string(getpid()) + ".toml");
-  std::ifstream in("host_sim/survey/levels.toml");
+  std::ifstream in("host_sim/study/survey/levels.toml");
   std::string text((std::istreambuf_iterator<char>(in)), {});
   const auto at = text.find("A = 0.01");
   std::ofstream(path) << text.replace(at, 8, "A = 0.50");

@@ -1,11 +1,11 @@
 // survey tests - the indices of section 5 by hand on cases small enough for a pencil.
-#include "host_sim/survey/indices.hpp"
+#include "host_sim/study/survey/indices.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "host_sim/calibration/prior.hpp"
+#include "host_sim/identify/calibration/prior.hpp"
 #include "tests/unit/survey/survey_arm.hpp"
 
 namespace armcal::survey {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "host_sim/survey/tables.hpp"
+#include "host_sim/study/survey/tables.hpp"
 #include "tests/unit/survey/survey_arm.hpp"
 
 namespace armcal::survey::test {

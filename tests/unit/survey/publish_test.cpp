@@ -1,12 +1,12 @@
 // survey tests - findings as JSON and HTML: the shape that machines rely on.
-#include "host_sim/survey/publish.hpp"
+#include "host_sim/study/survey/publish.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_sim/survey/tables.hpp"
+#include "host_sim/study/survey/tables.hpp"
 
 namespace armcal::survey {
 namespace {

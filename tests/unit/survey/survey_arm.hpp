@@ -2,7 +2,7 @@
 // expectation.
 #pragma once
 
-#include "host_sim/survey/draws.hpp"
+#include "host_sim/study/survey/draws.hpp"
 
 namespace armcal::survey::test {
 
@@ -17,7 +17,7 @@ inline const codegen::Catalogue& AllRecords() {
 inline codegen::Model Arm(Law law, Bodies bodies) {
   return {Variant(File(), law, bodies, SetStribeck(File().joints())), AllRecords()};
 }
-inline Levels LevelFile() { return ReadLevels("host_sim/survey/levels.toml"); }
+inline Levels LevelFile() { return ReadLevels("host_sim/study/survey/levels.toml"); }
 
 // Found by another program in another language: cond(K) 4.37 with 48 columns, 4.40 with 60. Rows: joints; columns:
 // a1..a5, b1..b5, q0.

@@ -1,0 +1,44 @@
+// generator - looks for the checkout, then for the file.
+#include "codegen/src/generator/load.hpp"
+
+#include <cstdlib>
+
+#include "codegen/src/io/input_error.hpp"
+
+namespace armcal::codegen {
+
+namespace fs = std::filesystem;
+
+fs::path Home() {
+  const auto holds = [](const fs::path& p) {
+    return fs::is_directory(p / "codegen" / "robots") && fs::is_directory(p / "codegen" / "effects");
+  };
+  if (const char* home = std::getenv("ARMCAL_HOME")) {
+    if (!holds(home))
+      throw io::InputError(std::string("ARMCAL_HOME: ") + home + ": expected a folder that holds codegen/robots");
+    return home;
+  }
+  std::error_code error;
+  for (fs::path start : {fs::current_path(), fs::read_symlink("/proc/self/exe", error).parent_path()})
+    for (; !start.empty(); start = start.parent_path()) {
+      if (holds(start)) return start;
+      if (start == start.root_path()) break;
+    }
+  throw io::InputError("codegen/robots: not found from here; set ARMCAL_HOME to the armcal checkout");
+}
+
+fs::path RobotPath(const std::string& name_or_path) {
+  if (fs::is_regular_file(name_or_path)) return name_or_path;
+  const fs::path folder = Home() / "codegen" / "robots", path = folder / (name_or_path + ".toml");
+  if (fs::is_regular_file(path)) return path;
+  std::string known;
+  for (const auto& e : fs::directory_iterator(folder))
+    if (e.path().extension() == ".toml") known += (known.empty() ? "" : ", ") + e.path().stem().string();
+  throw io::InputError("robot " + name_or_path + ": expected a file or one of " + known);
+}
+
+Catalogue LoadCatalogue() { return ReadCatalogue(Home() / "codegen" / "effects"); }
+
+Model LoadModel(const std::string& robot) { return {ReadRobot(RobotPath(robot)), LoadCatalogue()}; }
+
+}  // namespace armcal::codegen

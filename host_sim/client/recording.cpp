@@ -1,0 +1,205 @@
+// client - arms the traces, lets the drive play or work, takes the pages; knows no log.
+#include "host_sim/client/recording.hpp"
+
+#include <fmt/core.h>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <thread>
+
+#include "armcal/estimator/trace_records.hpp"
+#include "armcal/link/registers.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/report/progress.hpp"
+#include "host_sim/data/trajectory/trajectory.hpp"
+#include "host_sim/machine/drive/vendor_registers.hpp"
+
+namespace armcal::client {
+namespace {
+
+namespace words = model::words;
+namespace reg = link::reg;
+
+struct Player {
+  drive::PlayerState state;
+  drive::StopReason reason;
+  std::uint32_t points, first_tick, last_tick;
+  bool moving() const { return state == drive::PlayerState::kBlending || state == drive::PlayerState::kPlaying; }
+};
+
+Player ReadPlayer(DriveClient& drive) {
+  const auto w = drive.ReadInput(drive::kPlayerStatus, drive::kPlayerStatusCount);
+  return {static_cast<drive::PlayerState>(w[0]), static_cast<drive::StopReason>(w[1]), words::GetU32(&w[2]),
+          words::GetU32(&w[4]), words::GetU32(&w[6])};
+}
+
+void Upload(DriveClient& drive, const trajectory::Trajectory& t) {
+  const int n = t.joints(), points = static_cast<int>(t.q.rows()), chunk = (drive::kPlayerPointsCount - 2) / (2 * n);
+  std::uint16_t setup[4];
+  words::PutU32(setup, points);
+  words::PutU32(setup + 2, static_cast<std::uint32_t>(std::lround(t.step_s * 1e6)));
+  drive.Write(drive::kPlayerSetup, setup);
+  report::Progress progress("load trajectory");
+  std::vector<std::uint16_t> w;
+  for (int first = 0; first < points; first += chunk) {
+    const int count = std::min(chunk, points - first);
+    w.assign(2 + 2 * n * count, 0);
+    words::PutU32(w.data(), first);
+    for (int k = 0; k < count * n; ++k) words::PutF32(&w[2 + 2 * k], static_cast<float>(t.q(first + k / n, k % n)));
+    drive.Write(drive::kPlayerPoints, w);
+    progress.Set(static_cast<double>(first + count) / points);
+  }
+}
+
+// Waits (the drive's own time decides, not ours) until `done` says so; ten seconds without it is a broken drive.
+template <class Done>
+void WaitFor(DriveClient& drive, const char* what, Done done) {
+  for (int k = 0; k < 2000; ++k) {
+    if (done()) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  throw LinkError(drive.name() + ": waited in vain for: " + what);
+}
+
+std::string Describe(const Player& p) {
+  switch (p.reason) {
+    case drive::StopReason::kTrackingError:
+      return "tracking error";
+    case drive::StopReason::kNoTrajectory:
+      return "no trajectory";
+    case drive::StopReason::kCommand:
+      return "stop command";
+    case drive::StopReason::kNone:
+      break;
+  }
+  return "no reason given";
+}
+
+// Traces 0 and, if asked for, 1, from the next sample's tick on until Stop.
+class Traces {
+ public:
+  Traces(DriveClient& drive, const RecordOptions& o, int sample_ticks) : drive_(drive) {
+    // windows of the trace and of the drive's own samples are the same ticks
+    TraceRequest request;
+    request.decimation = static_cast<std::uint16_t>(o.decimation > 0 ? o.decimation : sample_ticks);
+    request.start_tick = (drive.ReadStatus().tick / sample_ticks + 2) * sample_ticks;
+    request.channels = o.lean ? estimator::kRawMotion | estimator::kRawFlags : estimator::kRawAll;
+    ArmTrace(drive, 0, request);
+    reader_.emplace(drive, 0);
+    if (o.samples.empty()) return;
+    TraceRequest all;
+    all.channels = estimator::kSampleAll;
+    ArmTrace(drive, 1, all);
+    sample_reader_.emplace(drive, 1);
+  }
+  // How many records came; a moment's rest for the drive if none waited.
+  std::size_t Take(Recording& to) {
+    const std::size_t got = reader_->TakePage(to.raw) + (sample_reader_ ? sample_reader_->TakePage(to.samples) : 0);
+    if (got == 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    return got;
+  }
+  void Stop() {
+    TraceRequest off;
+    off.mode = TraceMode::kOff;
+    ArmTrace(drive_, 0, off);
+    if (sample_reader_) ArmTrace(drive_, 1, off);
+  }
+
+ private:
+  DriveClient& drive_;
+  std::optional<TraceReader> reader_, sample_reader_;
+};
+
+// The drive plays the trajectory.
+Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
+  const trajectory::Trajectory trajectory = trajectory::ReadTrajectory(o.trajectory, robot.joints());
+  Upload(drive, trajectory);
+  drive.WriteSingle(drive::kPlayerSpeed, static_cast<std::uint16_t>(o.speed_percent));
+  drive.WriteSingle(drive::kPlayerCommand, static_cast<std::uint16_t>(drive::PlayerCommand::kEnable));
+  WaitFor(drive, "axes enabled", [&] { return ReadPlayer(drive).state != drive::PlayerState::kDisabled; });
+  Traces traces(drive, o, robot.sample_ticks);
+  drive.WriteSingle(drive::kPlayerCommand, static_cast<std::uint16_t>(drive::PlayerCommand::kStart));
+  Recording recording;
+  Player player;
+  {
+    report::Progress progress("record");
+    int quiet = 0;  // looks in a row that found nothing after the motion
+    for (bool moved = false; quiet < 10;) {
+      const std::size_t got = traces.Take(recording);
+      player = ReadPlayer(drive);
+      moved = moved || player.moving() || player.state == drive::PlayerState::kFinished ||
+              player.state == drive::PlayerState::kStopped;
+      if (player.state == drive::PlayerState::kPlaying && !recording.raw.ticks.empty())
+        progress.Set(std::max(
+            0.0, static_cast<double>(static_cast<std::int32_t>(recording.raw.ticks.back() - player.first_tick)) /
+                     robot.tick_rate_Hz / trajectory.duration_s() * o.speed_percent / 100));
+      quiet = moved && !player.moving() && got == 0 ? quiet + 1 : 0;
+    }
+  }
+  traces.Stop();
+  drive.WriteSingle(drive::kPlayerCommand, static_cast<std::uint16_t>(drive::PlayerCommand::kDisable));
+  WaitFor(drive, "axes disabled", [&] { return ReadPlayer(drive).state == drive::PlayerState::kDisabled; });
+  if (player.state == drive::PlayerState::kStopped)
+    throw RefusedError(drive.name() + ": the motion was stopped: " + Describe(player), 0, core::Status::kHeld);
+  recording.played = {player.first_tick, player.last_tick};
+  return recording;
+}
+
+// The drive goes on with its work.
+Recording Watch(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
+  using Clock = std::chrono::steady_clock;
+  Traces traces(drive, o, robot.sample_ticks);
+  Recording recording;
+  TraceRecords& raw = recording.raw;
+  report::Progress progress("record");
+  Clock::time_point last = Clock::now();
+  for (double seconds = 0; seconds < o.seconds;) {
+    if (traces.Take(recording) > 0) last = Clock::now();
+    if (Clock::now() - last > std::chrono::seconds(10))
+      throw LinkError(drive.name() + ": not a record for ten seconds: its tick stands still");
+    if (raw.ticks.empty()) continue;
+    seconds = (raw.ticks.back() - raw.ticks.front()) / robot.tick_rate_Hz;
+    progress.Set(std::min(1.0, seconds / o.seconds));
+  }
+  traces.Stop();
+  recording.played = {raw.ticks.front(), raw.ticks.back() + raw.tick_step - 1};
+  return recording;
+}
+
+// Throws io::InputError, RefusedError.
+void CheckDrive(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
+  const Identity id = drive.ReadIdentity();
+  if (id.axes != robot.joints())
+    throw io::InputError(
+        fmt::format("{}: {} axes, robot {} has {}", drive.name(), id.axes, robot.name, robot.joints()));
+  const auto need = [&](std::uint32_t capability, const char* what) {
+    if ((id.capabilities & capability) == 0)
+      throw RefusedError(fmt::format("{}: serves no {}", drive.name(), what), 0, core::Status::kBadAddress);
+  };
+  need(reg::kHasRawTrace, "raw trace (Controller::Record)");
+  if (!o.samples.empty()) need(reg::kHasSampleTrace, "trace of processed samples, for --samples");
+  if (o.trajectory.empty()) return;
+  try {
+    (void)ReadPlayer(drive);
+  } catch (const RefusedError&) {
+    throw RefusedError(drive.name() +
+                           ": plays no trajectories; move the arm by its own controller, with --seconds "
+                           "instead of --trajectory",
+                       0, core::Status::kBadAddress);
+  }
+}
+
+}  // namespace
+
+Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
+  CheckDrive(drive, o, robot);
+  Recording recording = o.trajectory.empty() ? Watch(drive, o, robot) : Play(drive, o, robot);
+  const std::uint32_t lost = recording.raw.lost + recording.samples.lost;
+  if (lost > 0)
+    throw LinkError(
+        fmt::format("{}: the drive lost {} trace records because the link was too slow; nothing is glued over a gap",
+                    drive.name(), lost));
+  return recording;
+}
+
+}  // namespace armcal::client

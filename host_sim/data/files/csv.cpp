@@ -1,0 +1,148 @@
+// files - the CSV scanner and printer; knows no meaning of the columns.
+#include "host_sim/data/files/csv.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <string_view>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/files.hpp"
+
+namespace armcal::files {
+namespace {
+
+std::string_view Trim(std::string_view s) {
+  constexpr std::string_view kBlank = " \t\r";
+  const auto first = s.find_first_not_of(kBlank);
+  return first == s.npos ? std::string_view{} : s.substr(first, s.find_last_not_of(kBlank) - first + 1);
+}
+
+// Walks over the lines of a file and over the fields of a line without copying.
+class Scanner {
+ public:
+  Scanner(std::string where, std::string_view text) : where_(std::move(where)), rest_(text) {
+    if (rest_.starts_with("\xEF\xBB\xBF")) rest_.remove_prefix(3);
+  }
+
+  bool NextLine() {
+    if (rest_.empty()) return false;
+    const auto end = rest_.find('\n');
+    line_ = rest_.substr(0, end);
+    rest_.remove_prefix(end == rest_.npos ? rest_.size() : end + 1);
+    ++number_;
+    return true;
+  }
+
+  std::string_view line() const { return line_; }
+  bool blank() const { return Trim(line_).empty(); }
+
+  // Takes the next field off the line; false behind the last one.
+  bool NextField(std::string_view& field) {
+    if (line_.data() == nullptr) return false;
+    const auto end = line_.find(',');
+    field = line_.substr(0, end);
+    line_ = end == line_.npos ? std::string_view{} : line_.substr(end + 1);
+    return true;
+  }
+
+  [[noreturn]] void Fail(const std::string& what) const {
+    throw io::InputError(where_ + ":" + std::to_string(number_) + ": " + what);
+  }
+
+ private:
+  std::string where_;
+  std::string_view rest_;
+  std::string_view line_;
+  int number_ = 0;
+};
+
+std::vector<std::string> ScanHeader(Scanner& scan) {
+  if (!scan.NextLine() || scan.blank()) scan.Fail("is empty, expected a header line with column names");
+  if (scan.line().find(',') == std::string_view::npos && scan.line().find(';') != std::string_view::npos) {
+    scan.Fail("columns are separated by ';', expected ',' (and '.' in numbers)");
+  }
+  std::vector<std::string> names;
+  std::string_view field;
+  while (scan.NextField(field)) {
+    const std::string name(Trim(field));
+    if (name.empty()) scan.Fail("column " + std::to_string(names.size() + 1) + " has no name");
+    if (std::find(names.begin(), names.end(), name) != names.end()) scan.Fail("column '" + name + "' appears twice");
+    names.push_back(name);
+  }
+  return names;
+}
+
+double Number(const Scanner& scan, std::string_view field, const std::string& name) {
+  field = Trim(field);
+  if (field.starts_with('+')) field.remove_prefix(1);
+  double value = NAN;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (end != field.data() + field.size() || field.empty() || error == std::errc::invalid_argument) {
+    scan.Fail("column '" + name + "': '" + std::string(field) + "' is not a number");
+  }
+  if (error == std::errc::result_out_of_range) value = std::strtod(std::string(field).c_str(), nullptr);
+  if (!std::isfinite(value)) scan.Fail("column '" + name + "': '" + std::string(field) + "', expected a finite number");
+  return value;
+}
+
+}  // namespace
+
+NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool(const std::string& name)>& wanted) {
+  const std::string text = ReadWholeFile(path);
+  Scanner scan(path.string(), text);
+  const std::vector<std::string> header = ScanHeader(scan);
+  const std::size_t columns = header.size();
+
+  NumericTable table;
+  std::vector<bool> keep(columns);
+  for (std::size_t c = 0; c < columns; ++c) {
+    keep[c] = !wanted || wanted(header[c]);
+    (keep[c] ? table.names : table.ignored).push_back(header[c]);
+  }
+
+  std::vector<double> flat;  // row after row
+  flat.reserve(table.names.size() * static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n') + 1));
+  Eigen::Index rows = 0;
+  while (scan.NextLine()) {
+    if (scan.blank()) {
+      while (scan.NextLine()) {
+        if (!scan.blank()) scan.Fail("follows a blank line, expected the end of the file");
+      }
+      break;
+    }
+    std::string_view field;
+    std::size_t c = 0;
+    for (; scan.NextField(field); ++c) {
+      if (c < columns && keep[c]) flat.push_back(Number(scan, field, header[c]));
+    }
+    if (c != columns) {
+      scan.Fail("has " + std::to_string(c) + " fields, expected " + std::to_string(columns) + " as in the header");
+    }
+    ++rows;
+  }
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  table.values = Eigen::Map<const RowMajor>(flat.data(), rows, static_cast<Eigen::Index>(table.names.size()));
+  return table;
+}
+
+void WriteCsv(const std::filesystem::path& path, const NumericTable& table, const std::vector<int>& digits) {
+  std::string text;
+  text.reserve(static_cast<std::size_t>(table.values.size()) * 12 + 4096);
+  for (const std::string& name : table.names) (text += name) += ',';
+  text.back() = '\n';
+  char number[40];
+  for (Eigen::Index r = 0; r < table.values.rows(); ++r) {
+    for (Eigen::Index c = 0; c < table.values.cols(); ++c) {
+      const int precision = digits.empty() ? 9 : digits[static_cast<std::size_t>(c)];
+      const auto end =
+          std::to_chars(number, number + sizeof number, table.values(r, c), std::chars_format::general, precision).ptr;
+      text.append(number, end) += ',';
+    }
+    text.back() = '\n';
+  }
+  WriteWholeFile(path, text);
+}
+
+}  // namespace armcal::files

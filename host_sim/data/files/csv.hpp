@@ -1,0 +1,28 @@
+// files - a table of numbers with a header line, as CSV or gzip CSV; knows no meaning of its columns.
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace armcal::files {
+
+struct NumericTable {
+  std::vector<std::string> names;
+  Eigen::MatrixXd values;            // [rows x names]
+  std::vector<std::string> ignored;  // names in the file that were not wanted
+};
+
+// Reads the columns whose name is `wanted` (all of them without it), in the order of the file. Fields are separated by
+// commas; blanks around a field, CRLF and a byte-order mark are accepted; blank lines at the end too.
+// InputError with file, line, column and what was expected: unreadable file, empty or repeated name, a row of another
+// length than the header, a wanted field that is not a finite number. Unwanted fields are not read at all.
+NumericTable ReadCsv(const std::filesystem::path& path,
+                     const std::function<bool(const std::string& name)>& wanted = {});
+
+// Writes atomically, gzip if the name ends in ".gz". digits[c] significant digits in column c (9 if `digits` is empty).
+void WriteCsv(const std::filesystem::path& path, const NumericTable& table, const std::vector<int>& digits = {});
+
+}  // namespace armcal::files

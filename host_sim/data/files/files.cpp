@@ -1,0 +1,96 @@
+// files - whole files, plain or gzip, and their hash.
+#include "host_sim/data/files/files.hpp"
+
+#include <unistd.h>
+#include <zlib.h>
+
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <new>
+
+#include "codegen/src/io/atomic_write.hpp"
+#include "codegen/src/io/input_error.hpp"
+
+namespace armcal::files {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CloseGz {
+  void operator()(gzFile_s* f) const { gzclose(f); }
+};
+using GzHandle = std::unique_ptr<gzFile_s, CloseGz>;
+
+void RequireRegular(const fs::path& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) throw io::InputError(path.string() + ": no such file");
+  if (fs::is_directory(path, error)) throw io::InputError(path.string() + ": is a folder, expected a file");
+}
+
+// The text as a gzip file without name and time, so that equal texts give equal bytes.
+std::string Compressed(std::string_view text) {
+  z_stream stream = {};
+  constexpr int kLevel = 6, kGzipFormat = 15 + 16, kMemory = 8;
+  if (deflateInit2(&stream, kLevel, Z_DEFLATED, kGzipFormat, kMemory, Z_DEFAULT_STRATEGY) != Z_OK)
+    throw std::bad_alloc();
+  std::string out;
+  constexpr std::size_t kChunk_bytes = std::size_t{1} << 20;  // zlib counts in unsigned int
+  std::size_t at = 0;
+  int code = Z_OK;
+  do {
+    const std::string_view part = text.substr(at, kChunk_bytes);
+    at += part.size();
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(part.data()));
+    stream.avail_in = static_cast<unsigned>(part.size());
+    do {
+      const std::size_t used = out.size();
+      out.resize(used + kChunk_bytes);
+      stream.next_out = reinterpret_cast<Bytef*>(out.data() + used);
+      stream.avail_out = static_cast<unsigned>(kChunk_bytes);
+      code = deflate(&stream, at == text.size() ? Z_FINISH : Z_NO_FLUSH);
+      out.resize(out.size() - stream.avail_out);
+    } while (stream.avail_out == 0);
+  } while (code != Z_STREAM_END);
+  deflateEnd(&stream);
+  return out;
+}
+
+}  // namespace
+
+std::string ReadWholeFile(const fs::path& path) {
+  RequireRegular(path);
+  GzHandle in(gzopen(path.c_str(), "rb"));
+  if (!in) throw io::InputError(path.string() + ": cannot be opened");
+  gzbuffer(in.get(), 1u << 18);
+  std::string content;
+  std::size_t used = 0;
+  for (;;) {
+    content.resize(std::max<std::size_t>(std::size_t{1} << 20, 2 * used));
+    const int got = gzread(in.get(), content.data() + used,
+                           static_cast<unsigned>(std::min<std::size_t>(content.size() - used, std::size_t{1} << 30)));
+    int code = Z_OK;
+    gzerror(in.get(), &code);
+    if (got < 0 || (code != Z_OK && code != Z_STREAM_END)) {
+      throw io::InputError(path.string() + ": gzip data is damaged or cut short");
+    }
+    if (got == 0) break;
+    used += static_cast<std::size_t>(got);
+  }
+  content.resize(used);
+  return content;
+}
+
+void WriteWholeFile(const fs::path& path, std::string_view text) {
+  if (path.extension() == ".gz") io::AtomicWrite(path, Compressed(text));
+  else io::AtomicWrite(path, text);
+}
+
+std::string FileHash(const fs::path& path) {
+  RequireRegular(path);
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw io::InputError(path.string() + ": cannot be opened");
+  return Sha256(std::string(std::istreambuf_iterator<char>(in), {}));
+}
+
+}  // namespace armcal::files

@@ -1,0 +1,23 @@
+// files - whole files: read (plain or gzip), write, hash.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace armcal::files {
+
+// The whole content; gzip is recognised by its content, not by the name. InputError: cannot be opened, or is cut short.
+std::string ReadWholeFile(const std::filesystem::path& path);
+
+// Writes the text so that a reader sees the old file or the new one, never a part. A name that ends in ".gz" is
+// compressed; equal texts give equal bytes. Missing parent folders are made. InputError: cannot be written.
+void WriteWholeFile(const std::filesystem::path& path, std::string_view text);
+
+// SHA-256 of the file's bytes as they lie on disk, 64 hex digits. InputError: cannot be opened.
+std::string FileHash(const std::filesystem::path& path);
+
+// SHA-256 of a text, 64 hex digits (FIPS 180-4).
+std::string Sha256(std::string_view text);
+
+}  // namespace armcal::files

@@ -1,0 +1,178 @@
+// logs - reads a channel map; knows no robot.
+#include "host_sim/data/logs/channels.hpp"
+
+#include <toml++/toml.h>
+
+#include <array>
+#include <numbers>
+#include <string_view>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/files.hpp"
+
+namespace armcal::logs {
+namespace {
+
+struct Unit {
+  std::string_view name;
+  std::string_view dimension;
+  double si;  // value in SI = si x value + zero
+  double zero = 0;
+};
+
+constexpr double kDegree_rad = std::numbers::pi / 180;
+constexpr double kRpm = std::numbers::pi / 30;
+constexpr double kGravity = 9.80665;  // m/s^2, by definition of kgf
+
+// Position, speed and acceleration of a revolute joint in rad, of a prismatic one in m; torque in N m, force in N.
+constexpr Unit kUnits[] = {
+    {"s", "time", 1},
+    {"ms", "time", 1e-3},
+    {"us", "time", 1e-6},
+    {"rad", "position", 1},
+    {"deg", "position", kDegree_rad},
+    {"mrad", "position", 1e-3},
+    {"rev", "position", 2 * std::numbers::pi},
+    {"m", "position", 1},
+    {"mm", "position", 1e-3},
+    {"rad/s", "speed", 1},
+    {"deg/s", "speed", kDegree_rad},
+    {"rpm", "speed", kRpm},
+    {"m/s", "speed", 1},
+    {"mm/s", "speed", 1e-3},
+    {"rad/s^2", "acceleration", 1},
+    {"deg/s^2", "acceleration", kDegree_rad},
+    {"m/s^2", "acceleration", 1},
+    {"N*m", "torque", 1},
+    {"mN*m", "torque", 1e-3},
+    {"kN*m", "torque", 1e3},
+    {"kgf*m", "torque", kGravity},
+    {"N", "torque", 1},
+    {"kN", "torque", 1e3},
+    {"degC", "temperature", 1},
+    {"K", "temperature", 1, -273.15},
+    {"1", "flag", 1},
+};
+
+struct Rule {
+  std::string_view key;
+  std::string_view dimension;
+  bool required;
+};
+constexpr Rule kRules[] = {{"q", "position", true},        {"tau", "torque", true},        {"qd", "speed", false},
+                           {"qdd", "acceleration", false}, {"qref", "position", false},    {"tauff", "torque", false},
+                           {"ext", "torque", false},       {"temp", "temperature", false}, {"flag", "flag", false}};
+
+class MapReader {
+ public:
+  explicit MapReader(const std::filesystem::path& path) : file_(path.string()) {
+    try {
+      root_ = toml::parse(files::ReadWholeFile(path), file_);
+    } catch (const toml::parse_error& e) {
+      throw io::InputError(file_ + ":" + std::to_string(e.source().begin.line) + ": " + std::string(e.description()));
+    }
+  }
+
+  ChannelMap Read() {
+    ChannelMap map;
+    map.source = file_;
+    CheckTopLevelKeys();
+    map.joints = static_cast<int>(root_["joints"].value_or<std::int64_t>(0));
+    if (map.joints < 1 || map.joints > 64) Fail("joints", "expected a number of joints, 1 to 64");
+    joints_ = 1;
+    if (!root_["time"].is_table()) Fail("time", "expected a table with column and unit");
+    map.time = Channels("time", *root_["time"].as_table(), "time").front();
+    joints_ = static_cast<std::size_t>(map.joints);
+    for (const Rule& rule : kRules) {
+      const toml::table* table = root_[rule.key].as_table();
+      if (table == nullptr) {
+        if (rule.required) Fail(std::string(rule.key), "expected a table with column and unit");
+        continue;
+      }
+      const bool optional = (*table)["optional"].value_or(false);
+      if (optional && rule.required) Fail(std::string(rule.key) + ".optional", "this quantity is always needed");
+      map.quantities.push_back(
+          {std::string(rule.key), Channels(std::string(rule.key), *table, rule.dimension), optional});
+    }
+    return map;
+  }
+
+ private:
+  [[noreturn]] void Fail(const std::string& key, const std::string& expected) const {
+    throw io::InputError(file_ + ": " + key + ": " + expected);
+  }
+
+  void CheckTopLevelKeys() const {
+    for (const auto& [key, node] : root_) {
+      bool known = key == "joints" || key == "title" || key == "time";
+      for (const Rule& rule : kRules) known = known || key.str() == rule.key;
+      if (!known) Fail(std::string(key.str()), "unknown key, expected joints, title, time or a quantity");
+    }
+  }
+
+  const Unit& FindUnit(const std::string& key, const std::string& name, std::string_view dimension) const {
+    std::string expected;
+    for (const Unit& unit : kUnits) {
+      if (unit.dimension != dimension) continue;
+      if (unit.name == name) return unit;
+      expected += (expected.empty() ? "" : ", ") + std::string(unit.name);
+    }
+    Fail(key + ".unit", "'" + name + "' is no unit of " + std::string(dimension) + ", expected " + expected);
+  }
+
+  // A value for all joints, or a list of one per joint.
+  template <class T>
+  std::vector<T> PerJoint(const std::string& key, const toml::table& table, const char* name,
+                          const T& otherwise) const {
+    const toml::node* node = table.get(name);
+    if (node == nullptr) return std::vector<T>(joints_, otherwise);
+    const std::string where = key + "." + name;
+    const std::string kind = std::is_same_v<T, double> ? "number" : "text";
+    if (const auto one = node->value<T>()) return std::vector<T>(joints_, *one);
+    const toml::array* list = node->as_array();
+    if (list == nullptr || list->size() != joints_) {
+      Fail(where, "expected one " + kind + " or a list of " + std::to_string(joints_));
+    }
+    std::vector<T> values;
+    for (const toml::node& item : *list) {
+      const auto value = item.value<T>();
+      if (!value) Fail(where, "expected a list of " + kind + "s");
+      values.push_back(*value);
+    }
+    return values;
+  }
+
+  std::vector<Channel> Channels(const std::string& key, const toml::table& table, std::string_view dimension) const {
+    for (const auto& [name, node] : table) {
+      if (name != "column" && name != "unit" && name != "scale" && name != "offset" && name != "optional") {
+        Fail(key + "." + std::string(name.str()), "unknown key, expected column, unit, scale, offset or optional");
+      }
+    }
+    const auto columns = PerJoint<std::string>(key, table, "column", "");
+    const auto units = PerJoint<std::string>(key, table, "unit", dimension == "flag" ? "1" : "");
+    const auto scales = PerJoint<double>(key, table, "scale", 1.0);
+    const auto offsets = PerJoint<double>(key, table, "offset", 0.0);
+    std::vector<Channel> channels;
+    for (std::size_t j = 0; j < joints_; ++j) {
+      const Unit& unit = FindUnit(key, units[j], dimension);
+      std::string column = columns[j];
+      if (const auto at = column.find("{}"); at != column.npos) column.replace(at, 2, std::to_string(j + 1));
+      if (column.empty()) Fail(key + ".column", "expected the name of a column of the log");
+      for (const Channel& other : channels) {
+        if (other.column == column) Fail(key + ".column", "'" + column + "' is used for two joints");
+      }
+      channels.push_back({column, unit.si * scales[j], unit.si * offsets[j] + unit.zero});
+    }
+    return channels;
+  }
+
+  std::string file_;
+  toml::table root_;
+  std::size_t joints_ = 1;
+};
+
+}  // namespace
+
+ChannelMap ReadChannelMap(const std::filesystem::path& path) { return MapReader(path).Read(); }
+
+}  // namespace armcal::logs

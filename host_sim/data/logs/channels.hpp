@@ -1,0 +1,46 @@
+// logs - which column of a foreign log is which quantity; knows no robot.
+//
+// A map is a TOML file:
+//   joints = 6
+//   [time]
+//   column = "t_s"          # name in the log
+//   unit = "s"              # s, ms, us
+//   [q]                     # q and tau must be there; also qd qdd qref tauff ext temp flag
+//   column = "pos_{}_deg"   # {} stands for 1..n; or a list of n names
+//   unit = "deg"            # one for all joints, or a list of n
+//   scale = 1               # one or n, optional; value = unit(scale x column + offset)
+//   offset = [0, -90, 90, 0, 0, 0]
+//   optional = true         # leave the quantity out when its columns are not in the log
+// scale and offset are numbers; the unit is that of scale x column + offset.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace armcal::logs {
+
+// ours = gain x column + bias, in SI.
+struct Channel {
+  std::string column;
+  double gain = 1;
+  double bias = 0;
+};
+
+struct Quantity {
+  std::string name;            // "q", "tau", "qd", "qdd", "qref", "tauff", "ext", "temp", "flag"
+  std::vector<Channel> joint;  // n
+  bool optional = false;
+};
+
+struct ChannelMap {
+  int joints = 0;
+  Channel time;
+  std::vector<Quantity> quantities;
+  std::string source;
+};
+
+// InputError with file, key and what was expected.
+ChannelMap ReadChannelMap(const std::filesystem::path& path);
+
+}  // namespace armcal::logs

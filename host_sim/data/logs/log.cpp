@@ -1,0 +1,189 @@
+// logs - reads and writes logs; knows no model and no drive.
+#include "host_sim/data/logs/log.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/csv.hpp"
+#include "host_sim/data/logs/channels.hpp"
+
+namespace armcal::logs {
+namespace {
+
+// Splits "qdd12" into {"qdd", 12}; nothing if the name is not letters followed by a plain number from 1.
+struct JointName {
+  std::string quantity;
+  int joint = 0;
+};
+
+std::optional<JointName> SplitName(const std::string& name) {
+  const auto digit = name.find_first_of("0123456789");
+  if (digit == 0 || digit == name.npos || name[digit] == '0' || name.size() - digit > 2) return std::nullopt;
+  if (name.find_first_not_of("0123456789", digit) != name.npos) return std::nullopt;
+  return JointName{name.substr(0, digit), std::stoi(name.substr(digit))};
+}
+
+constexpr const char* kQuantities[] = {"q", "tau", "qd", "qdd", "qref", "tauff", "ext", "temp", "flag"};
+
+bool IsQuantity(const std::string& name) {
+  return std::find(std::begin(kQuantities), std::end(kQuantities), name) != std::end(kQuantities);
+}
+
+// The map of a file that already carries our names.
+ChannelMap OurNames(const std::string& file, const std::vector<std::string>& header) {
+  int joints = 0;
+  std::vector<std::string> present;
+  for (const std::string& name : header) {
+    const auto split = SplitName(name);
+    if (!split || !IsQuantity(split->quantity)) continue;
+    joints = std::max(joints, split->joint);
+    present.push_back(split->quantity);
+  }
+  if (joints == 0) {
+    throw io::InputError(file +
+                         ":1: no column 'q1', expected t, q1..qn, tau1..taun (foreign names: give a channel map)");
+  }
+  ChannelMap map{joints, {"t"}, {}, file};
+  for (const char* quantity : kQuantities) {
+    const bool required = std::string(quantity) == "q" || std::string(quantity) == "tau";
+    if (!required && std::find(present.begin(), present.end(), quantity) == present.end()) continue;
+    Quantity& added = map.quantities.emplace_back(Quantity{quantity, {}, false});
+    for (int j = 1; j <= joints; ++j) added.joint.push_back({quantity + std::to_string(j)});
+  }
+  return map;
+}
+
+class Columns {
+ public:
+  Columns(std::string file, const files::NumericTable& table) : file_(std::move(file)), table_(table) {}
+
+  Eigen::Index Find(const std::string& name) const {
+    const auto at = std::find(table_.names.begin(), table_.names.end(), name);
+    return at == table_.names.end() ? -1 : at - table_.names.begin();
+  }
+
+  Eigen::VectorXd Take(const Channel& channel) const {
+    const Eigen::Index c = Find(channel.column);
+    if (c < 0) throw io::InputError(file_ + ":1: expected a column '" + channel.column + "'");
+    return (channel.gain * table_.values.col(c).array() + channel.bias).matrix();
+  }
+
+  Eigen::MatrixXd Take(const Quantity& quantity) const {
+    if (quantity.optional) {
+      for (const Channel& channel : quantity.joint) {
+        if (Find(channel.column) < 0) return {};
+      }
+    }
+    Eigen::MatrixXd block(table_.values.rows(), static_cast<Eigen::Index>(quantity.joint.size()));
+    for (std::size_t j = 0; j < quantity.joint.size(); ++j)
+      block.col(static_cast<Eigen::Index>(j)) = Take(quantity.joint[j]);
+    return block;
+  }
+
+ private:
+  std::string file_;
+  const files::NumericTable& table_;
+};
+
+Eigen::MatrixXd& Block(Log& log, const std::string& quantity) {
+  if (quantity == "q") return log.q;
+  if (quantity == "tau") return log.tau;
+  if (quantity == "qd") return log.qd;
+  if (quantity == "qdd") return log.qdd;
+  if (quantity == "qref") return log.qref;
+  if (quantity == "tauff") return log.tauff;
+  if (quantity == "ext") return log.ext;
+  return log.temp;
+}
+
+double MedianStep(const Eigen::VectorXd& t) {
+  Eigen::VectorXd step = t.tail(t.size() - 1) - t.head(t.size() - 1);
+  std::nth_element(step.begin(), step.begin() + step.size() / 2, step.end());
+  return step[step.size() / 2];
+}
+
+void CheckTime(Log& log, const std::string& time_column, int min_samples) {
+  if (log.samples() < min_samples) {
+    throw io::InputError(log.source + ": has " + std::to_string(log.samples()) + " samples, expected at least " +
+                         std::to_string(min_samples));
+  }
+  for (Eigen::Index k = 1; k < log.samples(); ++k) {
+    if (log.t[k] > log.t[k - 1]) continue;
+    throw io::InputError(log.source + ":" + std::to_string(k + 2) + ": column '" + time_column + "': time " +
+                         (log.t[k] == log.t[k - 1] ? "is repeated" : "goes back") + ", expected it to rise");
+  }
+  if (log.samples() < 2) return;
+  const double median = MedianStep(log.t);
+  for (Eigen::Index k = 0; k + 1 < log.samples(); ++k) {
+    if (log.t[k + 1] - log.t[k] > 1.5 * median) log.gaps.push_back(static_cast<int>(k));
+  }
+}
+
+Log FromTable(const std::string& file, files::NumericTable table, const ChannelMap& map, int min_samples) {
+  const Columns columns(file, table);
+  Log log;
+  log.joints = map.joints;
+  log.source = file;
+  log.t = columns.Take(map.time);
+  for (const Quantity& quantity : map.quantities) {
+    if (quantity.name == "flag") log.flags = columns.Take(quantity).cast<int>();
+    else Block(log, quantity.name) = columns.Take(quantity);
+  }
+  log.ignored = std::move(table.ignored);
+  CheckTime(log, map.time.column, min_samples);
+  return log;
+}
+
+}  // namespace
+
+double Log::step_s() const {
+  if (samples() < 2) throw io::InputError(source + ": has no sample time, expected at least 2 samples");
+  return MedianStep(t);
+}
+
+Log ReadLog(const std::filesystem::path& path, int min_samples) {
+  files::NumericTable table = files::ReadCsv(path, [](const std::string& name) {
+    const auto split = SplitName(name);
+    return name == "t" || (split && IsQuantity(split->quantity));
+  });
+  const ChannelMap map = OurNames(path.string(), table.names);
+  return FromTable(path.string(), std::move(table), map, min_samples);
+}
+
+Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_samples) {
+  files::NumericTable table = files::ReadCsv(path, [&map](const std::string& name) {
+    if (name == map.time.column) return true;
+    for (const Quantity& quantity : map.quantities) {
+      for (const Channel& channel : quantity.joint) {
+        if (name == channel.column) return true;
+      }
+    }
+    return false;
+  });
+  return FromTable(path.string(), std::move(table), map, min_samples);
+}
+
+void WriteLog(const std::filesystem::path& path, const Log& log) {
+  const Eigen::MatrixXd flags = log.flags.cast<double>();
+  const std::pair<const char*, const Eigen::MatrixXd*> blocks[] = {
+      {"q", &log.q},         {"qd", &log.qd},   {"qdd", &log.qdd},   {"tau", &log.tau}, {"qref", &log.qref},
+      {"tauff", &log.tauff}, {"ext", &log.ext}, {"temp", &log.temp}, {"flag", &flags}};
+  files::NumericTable table;
+  table.names = {"t"};
+  for (const auto& [name, block] : blocks) {
+    for (Eigen::Index j = 1; j <= block->cols(); ++j) table.names.push_back(name + std::to_string(j));
+  }
+  table.values.resize(log.samples(), static_cast<Eigen::Index>(table.names.size()));
+  table.values.col(0) = log.t;
+  Eigen::Index at = 1;
+  for (const auto& [name, block] : blocks) {
+    if (block->cols() > 0) table.values.middleCols(at, block->cols()) = *block;
+    at += block->cols();
+  }
+  std::vector<int> digits(table.names.size(), 9);
+  digits.front() = 12;
+  files::WriteCsv(path, table, digits);
+}
+
+}  // namespace armcal::logs

@@ -1,0 +1,46 @@
+// logs - a log: what was measured on an arm, joint side, SI; knows no model and no drive.
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace armcal::logs {
+
+struct ChannelMap;
+
+// N samples of n joints. q in rad (m on a prismatic joint), tau in N m (N), measured torque on the joint side.
+// The optional blocks are 0 x 0 when the file does not carry them.
+struct Log {
+  int joints = 0;
+  Eigen::VectorXd t;                     // [N] s, strictly rising
+  Eigen::MatrixXd q, tau;                // [N x n]
+  Eigen::MatrixXd qd, qdd, qref, tauff;  // [N x n] or empty
+  Eigen::MatrixXd ext;                   // known external force along +q, N m (N)
+  Eigen::MatrixXd temp;                  // degrees Celsius
+  Eigen::MatrixXi flags;                 // as the drive sent them
+  std::string source;                    // the file's name
+  std::vector<int> gaps;                 // k where t[k+1] - t[k] > 1.5 x the median step
+  std::vector<std::string> ignored;      // columns of the file that mean nothing here
+
+  Eigen::Index samples() const { return t.size(); }
+  double step_s() const;  // the median sample time; InputError if there are fewer than two samples
+};
+
+inline constexpr int kMinSamples = 200;  // below this no statistic of the project means anything
+
+// Reads CSV or gzip CSV with our names: t, q1..qn, tau1..taun and optionally qd*, qdd*, qref*, tauff*, ext*, temp*,
+// flag*, each for all n joints. Other columns are listed in `ignored`.
+// InputError, one line with file, line, column and what was expected: column missing or twice, not a finite number,
+// rows of unequal length, time that does not rise, fewer than `min_samples` rows.
+Log ReadLog(const std::filesystem::path& path, int min_samples = kMinSamples);
+
+// The same for a foreign file whose columns, units and zero points `map` describes.
+Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_samples = kMinSamples);
+
+// Writes what the log holds under our names; gzip if the name ends in ".gz". Time with 12 significant digits, the rest
+// with 9. Atomic: a reader sees the old file or the new one.
+void WriteLog(const std::filesystem::path& path, const Log& log);
+
+}  // namespace armcal::logs

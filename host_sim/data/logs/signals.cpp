@@ -1,0 +1,213 @@
+// logs - the derivation of speed and acceleration; knows no model.
+#include "host_sim/data/logs/signals.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/logs/butterworth.hpp"
+#include "host_sim/data/logs/motion_band.hpp"
+#include "host_sim/data/logs/quintic_spline.hpp"
+
+namespace armcal::logs {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kLowest_Hz = 20;  // an arm's motion lies below; how far below, its position shows
+constexpr double kAboveMotion =
+    1.5;                            // of the motion's band: the filter takes 4 % of what is seen there, and less below
+constexpr double kHighest_Hz = 60;  // above, the current loop no longer follows
+constexpr double kHighestOfRate = 0.4;   // the filter needs room below half the rate
+constexpr double kShareOfJitter = 0.07;  // encoder noise adds 0.25 % to the torque's noise power at this share
+constexpr double kShareOfWidth =
+    0.05;                           // friction is a hundred times the noise, and a slow joint is within the width often
+constexpr double kEdgePeriods = 3;  // of the lowest cut-off that are not settled at an end
+constexpr double kWideGap = 5;      // sample times over which a spline may still bridge
+constexpr double kIrregular = 1e-4;      // time jitter over sample time below which a grid counts as uniform
+constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
+
+VectorXd Difference(const VectorXd& x) { return x.tail(x.size() - 1) - x.head(x.size() - 1); }
+
+double Median(std::vector<double> x) {
+  if (x.empty()) return 0;
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  std::nth_element(x.begin(), middle, x.end());
+  return *middle;
+}
+
+// Standard deviation of white noise under a smooth signal, from its difference of some order: robust against the few
+// samples where the signal itself jumps. Samples at rest (no difference at all) say nothing and are left out.
+double NoiseUnderSmooth(VectorXd x, int order) {
+  double power = 1;  // sum of squared binomials: what white noise of variance 1 becomes
+  for (int k = 1; k <= order; ++k) {
+    if (x.size() < 2) return 0;
+    x = Difference(x);
+    power *= (4.0 * k - 2) / k;
+  }
+  std::vector<double> size;
+  for (const double value : x) {
+    if (value != 0) size.push_back(std::abs(value));
+  }
+  return Median(std::move(size)) / kNormalMad / std::sqrt(power);
+}
+
+// The encoder step: the smallest change of q that the log shows, if the other small changes are multiples of it.
+// Without a step to see, the smallest of thousands of changes means nothing.
+double EncoderStep(const VectorXd& q) {
+  constexpr double kSmall = 10, kOff = 0.1, kShare = 0.8;  // steps; of a step; of the small changes
+  constexpr int kFew = 5;
+  const VectorXd change = Difference(q).cwiseAbs();
+  double smallest = INFINITY;
+  for (const double x : change)
+    if (x > 0) smallest = std::min(smallest, x);
+  if (!std::isfinite(smallest)) return 0;
+  int small = 0, multiples = 0;
+  for (const double x : change) {
+    if (x == 0 || x > kSmall * smallest) continue;
+    ++small;
+    multiples += std::abs(x / smallest - std::round(x / smallest)) < kOff;
+  }
+  return small >= kFew && multiples >= kShare * small ? smallest : 0;
+}
+
+struct Piece {
+  Index first, count;
+};
+
+// The log cut at wide gaps.
+std::vector<Piece> Pieces(const Log& log) {
+  std::vector<Piece> pieces;
+  const double widest_s = kWideGap * log.step_s();
+  Index first = 0;
+  for (const int gap : log.gaps) {
+    if (log.t[gap + 1] - log.t[gap] <= widest_s) continue;
+    pieces.push_back({first, gap + 1 - first});
+    first = gap + 1;
+  }
+  pieces.push_back({first, log.samples() - first});
+  return pieces;
+}
+
+VectorXd EvenGrid(const VectorXd& t) { return VectorXd::LinSpaced(t.size(), t[0], t[t.size() - 1]); }
+
+bool IsUniform(const VectorXd& t) {
+  const double step = (t[t.size() - 1] - t[0]) / static_cast<double>(t.size() - 1);
+  return (t - EvenGrid(t)).cwiseAbs().maxCoeff() < kIrregular * step;
+}
+
+// q as it would have been sampled evenly; a time that jitters would otherwise look like noise of q.
+Eigen::MatrixXd OnEvenGrid(const VectorXd& t, const Eigen::MatrixXd& q) {
+  if (t.size() < QuinticSpline::kMinSamples || IsUniform(t)) return q;
+  return QuinticSpline(t, q).Evaluate(EvenGrid(t), 0);
+}
+
+void DerivePiece(const VectorXd& t, const Eigen::MatrixXd& q, const Piece& piece, Derivatives& out) {
+  const Index count = t.size();
+  const double rate_Hz = static_cast<double>(count - 1) / (t[count - 1] - t[0]);
+  Eigen::MatrixXd smooth = OnEvenGrid(t, q);
+  // A position that needs no smoothing gets none: every filter rings where friction turns and acceleration jumps.
+  for (Index j = 0; j < q.cols(); ++j)
+    if (out.cutoff_Hz[j] < kHighestOfRate * rate_Hz)
+      smooth.col(j) = ZeroPhaseLowPass(smooth.col(j), out.cutoff_Hz[j], rate_Hz);
+  const QuinticSpline spline(EvenGrid(t), smooth);
+  out.q.middleRows(piece.first, count) = spline.Evaluate(t, 0);
+  out.qd.middleRows(piece.first, count) = spline.Evaluate(t, 1);
+  out.qdd.middleRows(piece.first, count) = spline.Evaluate(t, 2);
+  const double edge_s =
+      kEdgePeriods / out.cutoff_Hz.minCoeff();  // the reflection there bends q: 1 % of qdd after 1.5 periods
+  for (Index k = 0; k < count; ++k) {
+    out.settled[piece.first + k] = t[k] - t[0] >= edge_s && t[count - 1] - t[k] >= edge_s;
+  }
+}
+
+}  // namespace
+
+JointNoise EstimateNoise(const Log& log, int joint) {
+  const std::vector<Piece> pieces = Pieces(log);
+  const Piece longest =
+      *std::max_element(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.count < b.count; });
+  const VectorXd t = log.t.segment(longest.first, longest.count);
+  const VectorXd q = log.q.col(joint).segment(longest.first, longest.count);
+  const VectorXd tau = log.tau.col(joint).segment(longest.first, longest.count);
+  // Orders: q moves smoothly over six samples, torque over two; beyond that the difference shows the noise alone.
+  const VectorXd even = OnEvenGrid(t, q);
+  const double noise = std::max(EncoderStep(q) / std::sqrt(12.0), NoiseUnderSmooth(even, 6));
+  const double rate_Hz = static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]);
+  return {noise, NoiseUnderSmooth(tau, 2), MotionBand_Hz(even, noise, rate_Hz)};
+}
+
+double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, double sign_width_radps) {
+  // White noise s in q has the density 2 s^2 / rate; through gain 1 / (1 + (f/c)^8) and k derivatives its variance is
+  // s^2 (2 pi)^2k c^(2k + 1) (2 / rate) times the integral of x^2k / (1 + x^8)^2 over x > 0.
+  constexpr double kIntegral[] = {0.2657, 0.1594};  // of one derivative, of two
+  constexpr double kTwoPi = 2 * std::numbers::pi;
+  const double s = noise.position_rad * std::sqrt(2 / rate_Hz),
+               highest_Hz = std::min(kHighest_Hz, kHighestOfRate * rate_Hz);
+  const double speed = s * kTwoPi * std::sqrt(kIntegral[0]),
+               torque = inertia * s * std::pow(kTwoPi, 2) * std::sqrt(kIntegral[1]);
+  double cutoff_Hz = highest_Hz;
+  if (torque > 0) cutoff_Hz = std::min(cutoff_Hz, std::pow(kShareOfJitter * noise.torque_Nm / torque, 2.0 / 5));
+  if (speed > 0) cutoff_Hz = std::min(cutoff_Hz, std::pow(kShareOfWidth * sign_width_radps / speed, 2.0 / 3));
+  return std::min(std::max(cutoff_Hz, std::min(kLowest_Hz, kAboveMotion * noise.band_Hz)), highest_Hz);
+}
+
+// What the user has set.
+static VectorXd SetCutoffs_Hz(const Log& log, const Bandwidth& bandwidth) {
+  const double half_Hz = 0.5 / log.step_s(), cutoff_Hz = bandwidth.cutoff_Hz * bandwidth.scale;
+  if (bandwidth.cutoff_Hz >= half_Hz)
+    throw io::InputError(fmt::format("{}: cut-off {:g} Hz, expected below half the sample rate, {:g} Hz", log.source,
+                                     bandwidth.cutoff_Hz, half_Hz));
+  const double length_s = log.t[log.samples() - 1] - log.t[0], least_Hz = 2 * kEdgePeriods / length_s;
+  if (cutoff_Hz <= least_Hz)
+    throw io::InputError(
+        fmt::format("{}: cut-off {:g} Hz, expected above {:.2g} Hz: the filter needs {:g} periods of it "
+                    "at either end of the log",
+                    log.source, bandwidth.cutoff_Hz, least_Hz / bandwidth.scale, kEdgePeriods));
+  return VectorXd::Constant(log.joints, cutoff_Hz);
+}
+
+// The most sensitive of the joints' torques decides.
+static VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity) {
+  const double rate_Hz = 1 / log.step_s();
+  std::vector<JointNoise> noise;
+  for (int j = 0; j < log.joints; ++j) noise.push_back(EstimateNoise(log, j));
+  VectorXd out = VectorXd::Constant(log.joints, INFINITY);
+  for (int j = 0; j < log.joints; ++j) {
+    const double width = sensitivity.sign_width_radps.size() ? sensitivity.sign_width_radps[j] : INFINITY;
+    for (int row = 0; row < log.joints; ++row) {
+      const JointNoise seen{noise[j].position_rad, noise[row].torque_Nm, noise[j].band_Hz};
+      out[j] = std::min(out[j], ChooseCutoff_Hz(seen, std::abs(sensitivity.inertia(row, j)), rate_Hz, width));
+    }
+  }
+  return out;
+}
+
+Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const Bandwidth& bandwidth) {
+  const Eigen::MatrixXd& inertia = sensitivity.inertia;
+  if (inertia.rows() != log.joints || inertia.cols() != log.joints) {
+    throw io::InputError(log.source + ": has " + std::to_string(log.joints) + " joints, the model has " +
+                         std::to_string(inertia.cols()));
+  }
+  if (log.samples() < QuinticSpline::kMinSamples)
+    throw io::InputError(log.source + ": too few samples for derivatives");
+  Derivatives out;
+  out.q = log.q;
+  out.qd = out.qdd = Eigen::MatrixXd::Zero(log.samples(), log.joints);
+  out.settled = Eigen::VectorXi::Zero(log.samples());
+  out.cutoff_Hz = bandwidth.cutoff_Hz > 0 ? SetCutoffs_Hz(log, bandwidth)
+                                          : VectorXd(ChooseCutoffs_Hz(log, sensitivity) * bandwidth.scale);
+  for (const Piece& piece : Pieces(log)) {
+    if (piece.count < QuinticSpline::kMinSamples) continue;
+    DerivePiece(log.t.segment(piece.first, piece.count), log.q.middleRows(piece.first, piece.count), piece, out);
+  }
+  return out;
+}
+
+}  // namespace armcal::logs

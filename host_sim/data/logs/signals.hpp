@@ -1,0 +1,52 @@
+// logs - position, speed and acceleration of a log from its sampled positions; knows no model. Torque is never
+// filtered: a low-pass would remove the ripple that one looks for.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+
+#include "host_sim/data/logs/log.hpp"
+
+namespace armcal::logs {
+
+// Shapes [N x n], on the log's own time grid.
+struct Derivatives {
+  Eigen::MatrixXd q, qd, qdd;  // rad, rad/s, rad/s^2 (m ...)
+  Eigen::VectorXd cutoff_Hz;   // [n] what each joint's q was filtered with
+  Eigen::VectorXi settled;     // [N] 0 within 3 periods of the lowest cut-off from an end or a wide gap, else 1
+};
+
+// What the choice of a joint's cut-off rests on.
+struct JointNoise {
+  double position_rad = 0;  // standard deviation of q's sample noise (encoder step / sqrt 12, or more if q is noisier)
+  double torque_Nm = 0;     // sample-to-sample jitter of the torque (standard deviation)
+  double band_Hz = std::numeric_limits<double>::infinity();  // up to which q moves more than its noise
+};
+JointNoise EstimateNoise(const Log& log, int joint);
+
+// What the noise of derived signals must stay small against.
+struct Sensitivity {
+  Eigen::MatrixXd inertia;                // [n x n] a typical mass matrix, kg m^2 (kg)
+  Eigen::VectorXd sign_width_radps = {};  // [n] speed over which friction changes its sign; empty: not looked at
+};
+
+// The highest cut-off below 60 Hz and 0.4 of the sample rate at which inertia x (noise of qdd that the encoder causes)
+// stays below 0.07 of the torque's jitter and the noise of qd below 0.05 of the speed over which friction changes sign;
+// but not below 20 Hz or, where that is less, 1.5 times the motion's band. inertia: joint side, kg m^2 (kg).
+double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz,
+                       double sign_width_radps = std::numeric_limits<double>::infinity());
+
+// The cut-off of all joints: chosen for each, or the user's own.
+struct Bandwidth {
+  double cutoff_Hz = 0;  // 0: ChooseCutoff_Hz
+  double scale = 1;      // multiplies either: 0.62 shows which findings hang on it
+};
+
+// q through a zero-phase Butterworth of order 4 (run forward and backward), then derivatives of a quintic spline.
+// An irregular grid is resampled by a quintic spline first. Positions are never carried across a gap of more than five
+// sample times; a piece too short for the spline keeps its q and has zero derivatives (settled = 0).
+// One joint's acceleration is in every joint's torque: the most sensitive one decides. InputError: wrong number of
+// inertias, fewer than 8 samples, a cut-off from half the sample rate on or so low that no sample is settled.
+Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const Bandwidth& bandwidth = {});
+
+}  // namespace armcal::logs

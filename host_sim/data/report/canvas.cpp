@@ -1,0 +1,117 @@
+// report - draws the frame of a picture; knows no series.
+#include "host_sim/data/report/canvas.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace armcal::report {
+
+std::string Escape(std::string_view text) {
+  std::string safe;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        safe += "&amp;";
+        break;
+      case '<':
+        safe += "&lt;";
+        break;
+      case '>':
+        safe += "&gt;";
+        break;
+      case '"':
+        safe += "&quot;";
+        break;
+      case '\'':
+        safe += "&#39;";
+        break;
+      default:
+        safe += c;
+    }
+  }
+  return safe;
+}
+
+Canvas::Canvas(const FrameText& text)
+    : text_(text),
+      left_(text.y_label.empty() ? 52 : 68),
+      right_(text.width_px - 20),
+      top_(text.title.empty() ? 12 : 34),
+      bottom_(text.height_px - (text.x_label.empty() ? 28 : 46)) {
+  if (!text_.title.empty()) Add(fmt::format("<text class='title' x='{}' y='20'>{}</text>", left_, Escape(text_.title)));
+}
+
+void Canvas::DrawXAxis(const Axis& axis) {
+  for (const double tick : axis.ticks()) {
+    const double x = X(axis.Place(tick));
+    Add(
+        fmt::format("<path class='grid' d='M{0:.1f} {1:.1f}V{2:.1f}'/><text class='tick' x='{0:.1f}' y='{3:.1f}' "
+                    "text-anchor='middle'>{4}</text>",
+                    x, top_, bottom_, bottom_ + 17, axis.Label(tick)));
+  }
+}
+
+void Canvas::DrawYAxis(const Axis& axis) {
+  for (const double tick : axis.ticks()) {
+    const double y = Y(axis.Place(tick));
+    Add(
+        fmt::format("<path class='grid' d='M{0:.1f} {1:.1f}H{2:.1f}'/><text class='tick' x='{3:.1f}' y='{4:.1f}' "
+                    "text-anchor='end'>{5}</text>",
+                    left_, y, right_, left_ - 7, y + 4, axis.Label(tick)));
+  }
+  const double zero = axis.Place(0);
+  if (zero > 0 && zero < 1) Add(fmt::format("<path class='zero' d='M{:.1f} {:.1f}H{:.1f}'/>", left_, Y(zero), right_));
+}
+
+void Canvas::DrawCategories(const std::vector<std::string>& names) {
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const double x = X((static_cast<double>(k) + 0.5) / static_cast<double>(names.size()));
+    Add(fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>", x, bottom_ + 17,
+                    Escape(names[k])));
+  }
+}
+
+void Canvas::DrawLegend(const std::vector<std::string>& names) {
+  constexpr double kLetter_px = 7.2, kSwatch_px = 30;  // about the mean width of a 12 px letter
+  double width = 0;
+  for (const std::string& name : names)
+    width += name.empty() ? 0 : kSwatch_px + kLetter_px * static_cast<double>(name.size());
+  // Right of the title if both fit into that line, else inside the plot area on a plate of its own.
+  const bool beside =
+      !text_.title.empty() && left_ + 7.5 * static_cast<double>(text_.title.size()) + width + 20 < right_;
+  double x = std::max(right_ - width - (beside ? 0 : 6), left_ + 6);
+  const double y = beside ? 15 : top_ + 13;
+  if (!beside && width > 0) {
+    Add(fmt::format("<rect class='plate' x='{:.1f}' y='{:.1f}' width='{:.1f}' height='20'/>", x - 4, y - 10,
+                    width + 4));
+  }
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (names[k].empty()) continue;
+    Add(fmt::format(
+        "<rect class='f{}' x='{:.1f}' y='{:.1f}' width='14' height='4' rx='2'/><text class='tick' x='{:.1f}' "
+        "y='{:.1f}'>{}</text>",
+        k % kColours, x, y - 2, x + 18, y + 4, Escape(names[k])));
+    x += kSwatch_px + kLetter_px * static_cast<double>(names[k].size());
+  }
+}
+
+std::string Canvas::Svg() const {
+  std::string svg = fmt::format("<svg viewBox='0 0 {0} {1}' style='max-width:{0}px' role='img' aria-label='{2}'>",
+                                text_.width_px, text_.height_px, Escape(text_.title));
+  svg += body_;
+  svg += fmt::format("<path class='axis' d='M{:.1f} {:.1f}V{:.1f}H{:.1f}'/>", left_, top_, bottom_, right_);
+  if (!text_.x_label.empty()) {
+    svg += fmt::format("<text class='label' x='{:.1f}' y='{}' text-anchor='middle'>{}</text>", (left_ + right_) / 2,
+                       text_.height_px - 8, Escape(text_.x_label));
+  }
+  if (!text_.y_label.empty()) {
+    const double middle = (top_ + bottom_) / 2;
+    svg += fmt::format(
+        "<text class='label' x='14' y='{0:.1f}' text-anchor='middle' transform='rotate(-90 14 {0:.1f})'>{1}</text>",
+        middle, Escape(text_.y_label));
+  }
+  return svg + "</svg>";
+}
+
+}  // namespace armcal::report

@@ -1,0 +1,132 @@
+// diagnosis - the terms' parameters, all free together: polished, and how sure they are.
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/diagnose/diagnosis/work.hpp"
+
+namespace armcal::diagnosis {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kStep = 1e-3;    // of an unknown's range or size, for the slope of its columns
+constexpr double kBlock_s = 0.5;  // over which noise may hang together
+
+// What the term's torque changes by per unit of its unknown number k.
+Columns Slope(const Chosen& term, const VectorXd& amplitude, std::size_t k, const Evidence& evidence) {
+  const auto& unknown = term.candidate->unknowns()[k % term.candidate->unknowns().size()];
+  const double step = kStep * std::min(unknown.upper - unknown.lower,
+                                       unknown.logarithmic ? std::abs(term.eta[k]) : unknown.upper - unknown.lower);
+  VectorXd held = amplitude;  // of a delay that has been applied the column is zero, and so is its estimate
+  for (int c = 0; c < held.size(); ++c)
+    if (term.candidate->column(c).fixed_amplitude) held[c] = term.candidate->column(c).amplitude;
+  std::vector<double> eta = term.eta;
+  eta[k] += step;
+  const Columns above = GatherColumns(*term.candidate, evidence, eta);
+  eta[k] -= 2 * step;
+  const Columns below = GatherColumns(*term.candidate, evidence, eta);
+  Columns out{above.joints, {}};
+  for (std::size_t r = 0; r < above.joints.size(); ++r)
+    out.block.emplace_back((above.block[r] - below.block[r]) * held / (2 * step));
+  return out;
+}
+
+// Columns of the terms' own unknowns, one after the other, side by side over all joints.
+Columns Slopes(const std::vector<std::pair<const Chosen*, std::size_t>>& unknowns,
+               const std::vector<const Chosen*>& terms, const Diagnosis::Work& w) {
+  Columns all;
+  for (int j = 0; j < w.model.joints() && !unknowns.empty(); ++j) {
+    all.joints.push_back(j);
+    all.block.emplace_back(MatrixXd::Zero(w.evidence.index[j].size(), static_cast<Eigen::Index>(unknowns.size())));
+  }
+  for (std::size_t u = 0; u < unknowns.size(); ++u) {
+    const auto& [term, k] = unknowns[u];
+    const auto t = static_cast<std::size_t>(std::find(terms.begin(), terms.end(), term) - terms.begin());
+    const Columns own = Slope(*term, w.estimate.amplitude[t], k, w.evidence);
+    for (std::size_t r = 0; r < own.joints.size(); ++r)
+      all.block[static_cast<std::size_t>(own.joints[r])].col(static_cast<Eigen::Index>(u)) = own.block[r];
+  }
+  return all;
+}
+
+// How well all joints are fitted: -2 log likelihood of white noise.
+double Deviance(const Diagnosis::Work& w) {
+  double sum = 0;
+  for (int j = 0; j < w.model.joints(); ++j) sum += 2 * w.evidence.index[j].size() * std::log(w.estimate.sigma[j]);
+  return sum;
+}
+
+}  // namespace
+
+void Diagnosis::Work::Polish() {
+  constexpr int kSteps = 8;
+  constexpr double kWorthIt = 1;     // gain of a step
+  constexpr double kLongest = 0.25;  // of an unknown's size, in one step
+  const std::vector<const Chosen*> terms = Confirmed(chosen);
+  std::vector<std::pair<const Chosen*, std::size_t>> unknowns;
+  std::vector<double*> value;
+  for (Chosen& c : chosen) {
+    const codegen::SearchWay how = c.candidate->record().search.how;
+    if (!c.confirmed || c.candidate->is_curve() ||
+        (how != codegen::SearchWay::kProfile && how != codegen::SearchWay::kSpectral))
+      continue;
+    for (std::size_t k = 0; k < c.eta.size(); ++k) {
+      unknowns.emplace_back(&c, k);
+      value.push_back(c.delay_s != 0 ? &c.delay_s : &c.eta[k]);
+    }
+  }
+  const auto solve = [&] {
+    AlignLogs();
+    Solve(terms);
+  };
+  solve();
+  for (int step = 0; step < kSteps && !unknowns.empty(); ++step) {
+    Prepare(terms);
+    const Gain gain = Metric(rows, WhiteNoise()).Try(Slopes(unknowns, terms, *this));
+    if (gain.gain < kWorthIt) return;
+    const double before = Deviance(*this);
+    std::vector<double> old;
+    for (std::size_t u = 0; u < unknowns.size(); ++u) {
+      const auto& all = unknowns[u].first->candidate->unknowns();
+      const auto& limits = all[unknowns[u].second % all.size()];
+      double& x = *value[u];
+      old.push_back(x);
+      const double longest = kLongest * std::abs(x);
+      x += std::clamp(gain.amplitude[static_cast<Eigen::Index>(u)], -longest, longest);
+      x = std::clamp(x, limits.lower, limits.upper);
+    }
+    solve();
+    if (Deviance(*this) < before) continue;
+    for (std::size_t u = 0; u < unknowns.size(); ++u) *value[u] = old[u];
+    solve();
+    return;
+  }
+}
+
+std::vector<Diagnosis::Work::Deviation> Diagnosis::Work::Deviations(const std::vector<const Chosen*>& terms) {
+  Prepare(terms);
+  const Metric metric(rows, WhiteNoise());
+  std::vector<std::pair<const Chosen*, std::size_t>> unknowns;
+  for (const Chosen* t : terms)
+    for (std::size_t k = 0; k < t->eta.size() && !t->candidate->is_curve(); ++k) unknowns.emplace_back(t, k);
+  const Columns all = Slopes(unknowns, terms, *this);
+  std::vector<const VectorXd*> time;
+  for (const auto* log : train) time.push_back(&log->s.t);
+  const MatrixXd P = metric.RobustCovariance(all, kBlock_s, time);
+  const int d = rows.coordinates();
+  const VectorXd x_sd = (rows.L * P.topLeftCorner(d, d) * rows.L.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+  const VectorXd eta_sd = P.diagonal().tail(P.rows() - d).cwiseMax(0).cwiseSqrt();
+  std::vector<Deviation> out;
+  int at = static_cast<int>(declared.active.size()), slope = 0;
+  for (const Chosen* t : terms) {
+    const int columns = t->candidate->columns(t->eta), count = static_cast<int>(t->eta.size());
+    out.push_back({x_sd.segment(at, columns), VectorXd::Zero(count)});
+    if (!t->candidate->is_curve()) out.back().eta = eta_sd.segment(slope, count), slope += count;
+    at += columns;
+  }
+  return out;
+}
+
+}  // namespace armcal::diagnosis

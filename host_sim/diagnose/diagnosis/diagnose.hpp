@@ -1,0 +1,92 @@
+// diagnosis - residual -> named cause -> terms to add, decided on the training logs alone; and their error on a
+// held-out log.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_sim/diagnose/diagnosis/search.hpp"
+#include "host_sim/identify/calibration/weighted_fit.hpp"
+
+namespace armcal::diagnosis {
+
+inline constexpr double kAccept = 15;  // score of a term: odds of about e^7 to one after all penalties
+
+// Another candidate, as it was found beside a term.
+struct Rival {
+  const codegen::EffectRecord* record = nullptr;
+  std::vector<int> joints;
+  double score = 0;
+};
+
+// How a held-out log refuted a term: who is predicted worse with it than without it.
+struct Refutation {
+  int joint = -1;                 // 0-based, of the term's own the one that got worst; -1: all joints together
+  bool beside_others = false;     // without it: the other terms alone; false: the declared model
+  double factor = 1;              // by which it makes the joint's error, or the product of all errors, larger
+  Eigen::VectorXd with, without;  // [n] RMS of measured minus predicted torque where the joint moves
+};
+
+struct Term {
+  const codegen::EffectRecord* record = nullptr;
+  std::vector<int> joints;                     // 0-based; empty: the whole arm or its flange
+  std::vector<codegen::EffectColumn> columns;  // names and units
+  std::vector<codegen::EffectUnknown> unknowns;
+  Eigen::VectorXd amplitude, sd;  // of the columns
+  std::vector<double> eta;
+  Eigen::VectorXd eta_sd;
+  double score = 0;
+  Eigen::VectorXd folds;               // improvement of chi^2 out of fold
+  std::vector<std::string> also_fits;  // kinds that this log cannot tell from it
+  std::vector<Rival> rivals;           // the runner-up, then those of also_fits that are not it
+  bool training_only = false;          // an event of the training log: it says nothing about the arm or another log
+  bool confirmed = true;               // false: the held-out log did not bear it out
+  std::optional<Refutation> refuted;   // why it is not confirmed
+};
+
+struct Finding {
+  std::vector<Term> terms;            // strongest first; empty: nothing is missing
+  calibration::Fit declared;          // the declared model, fitted on train
+  Eigen::VectorXd x;                  // filter coordinates and gains with the terms in
+  Eigen::VectorXd sigma, innovation;  // [n] residual and innovation standard deviation with the terms in
+  Eigen::VectorXd smallest;           // [n] RMS of the smallest effect that would have been seen
+};
+
+struct HeldOut {
+  Eigen::MatrixXd before, after;  // [N x n] residuals: measured minus predicted
+  std::string tracking;           // how run-state terms were followed; empty if there are none
+};
+
+// Decides on the training logs at construction; the held-out log is only judged. Throws io::InputError where logs do
+// not fit.
+class Diagnosis {
+ public:
+  struct Work;  // work.hpp; the room's own
+  // narrow: the training logs once more, derived with a lower bandwidth; a term that hangs on the bandwidth is then
+  // refused. Empty: not looked at.
+  Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
+            std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow = {});
+  ~Diagnosis();
+
+  const Finding& finding() const { return finding_; }
+
+  // Predicts the held-out log with and without the terms. Marks terms that worsen a joint of their own, or the product
+  // of all joints' errors, by more than 0.5 %, against the declared model or against the other terms, as not confirmed,
+  // says why, and leaves them out of `after`; kinds and nonlinear parameters do not change.
+  HeldOut Judge(const calibration::Dataset& test);
+
+  // One N x n torque a term on a log (run-state terms: as windows of that log's own time would give).
+  std::vector<Eigen::MatrixXd> TermTorque(const calibration::Dataset& data) const;
+
+  // The training logs as the declared model alone should explain them: aligned, the torque of the terms taken off.
+  std::vector<calibration::Dataset> WithoutTerms() const;
+
+ private:
+  const codegen::Model& model_;
+  Finding finding_;
+  std::unique_ptr<Work> work_;
+};
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,90 @@
+// diagnosis - terms as [[effect]] tables, and what no model holds as comments.
+#include "host_sim/diagnose/diagnosis/model_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+
+namespace armcal::diagnosis {
+
+namespace {
+
+// The declared file. What it names beside itself is named from anywhere, for the new file may lie elsewhere.
+std::string Declared(const std::filesystem::path& path) {
+  std::ifstream in(path);
+  std::string text;
+  const std::regex urdf("^\\s*urdf\\s*=\\s*[\"']([^\"']+)[\"'](.*)");
+  std::smatch found;
+  for (std::string line; std::getline(in, line);) {
+    if (std::regex_match(line, found, urdf))
+      line = fmt::format("urdf = \"{}\"{}", std::filesystem::absolute(path.parent_path() / found[1].str()).string(),
+                         found[2].str());
+    text += line + "\n";
+  }
+  return text;
+}
+
+// The declared law's own value of this column, as fitted: a law that takes its place has to do its work, too.
+double DeclaredShare(const codegen::Model& model, const Finding& finding, const Term& t, const std::string& key) {
+  for (const codegen::EffectInstance& e : model.effects()) {
+    if (t.record->replaces.empty() || e.record->name != t.record->replaces || e.joints != t.joints) continue;
+    for (const codegen::EffectColumn& column : e.columns)
+      for (int c = 0; c < model.columns(); ++c)
+        if (column.key == key && !model.is_rigid(c) && model.column_name(c) == column.name) return finding.x[c];
+  }
+  return 0;
+}
+
+std::string Parameter(const std::string& name, double value, double sd, const std::string& unit) {
+  return fmt::format("# {} = {:.5g}{} {}\n", name, value, sd > 0 ? fmt::format(" +- {:.2g}", sd) : "", unit);
+}
+
+std::string Comments(const Term& t, const std::string& provenance) {
+  std::string text = fmt::format("\n# Found by armcal diagnose: {}\n# Record: codegen/effects/{}.toml. {}\n",
+                                 t.record->title, t.record->name, provenance);
+  text += fmt::format("# Score {:.0f}, accepted above {:g}.\n", t.score, kAccept);
+  for (std::size_t k = 0; k < t.eta.size(); ++k)
+    text += Parameter(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Eigen::Index>(k)], t.unknowns[k].unit);
+  for (std::size_t c = 0; c < t.columns.size(); ++c)
+    if (!t.columns[c].fixed_amplitude)
+      text += Parameter(t.columns[c].name, t.amplitude[static_cast<Eigen::Index>(c)],
+                        t.sd[static_cast<Eigen::Index>(c)], t.columns[c].unit);
+  return text;
+}
+
+std::string EffectTable(const codegen::Model& model, const Finding& finding, const Term& t) {
+  std::string joints, mean, nonlinear;
+  for (const int j : t.joints) joints += fmt::format("{}{}", joints.empty() ? "" : ", ", j + 1);
+  for (std::size_t c = 0; c < t.columns.size(); ++c) {
+    const codegen::EffectColumn& column = t.columns[c];
+    if (column.fixed_amplitude) continue;  // the record's own
+    const double value = t.amplitude[static_cast<Eigen::Index>(c)] + DeclaredShare(model, finding, t, column.key);
+    mean += fmt::format("{}{} = {:.9e}", mean.empty() ? "" : ", ", column.key,
+                        std::clamp(value, column.lower, column.upper));
+  }
+  for (std::size_t k = 0; k < t.eta.size(); ++k)
+    nonlinear += fmt::format("{}{} = {:.9e}", nonlinear.empty() ? "" : ", ", t.unknowns[k].key, t.eta[k]);
+  std::string text = fmt::format("[[effect]]\nname = \"{}\"\nstate = \"estimated\"\n", t.record->name);
+  if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
+  if (!mean.empty()) text += fmt::format("mean = {{ {} }}\n", mean);
+  if (!nonlinear.empty()) text += fmt::format("nonlinear = {{ {} }}\n", nonlinear);
+  return text;
+}
+
+}  // namespace
+
+std::string ModelFile(const codegen::Model& model, const Finding& finding, const std::string& provenance) {
+  std::string text = Declared(model.robot().path);
+  for (const Term& t : finding.terms) {
+    if (!t.confirmed) continue;
+    text += Comments(t, provenance);
+    text += t.record->on_target ? EffectTable(model, finding, t)
+                                : fmt::format("# No model can hold it: {}.\n", t.record->remedy);
+  }
+  return text;
+}
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,119 @@
+// diagnosis - searches over a run's time: one window that a term is on, and short windows that stand alone.
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/diagnose/diagnosis/searcher.hpp"
+
+namespace armcal::diagnosis {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kMostWindows = 6;  // more are no isolated events
+constexpr int kDurations = 6;    // tried, from the shortest on, each 1.6 times the one before
+constexpr double kLonger = 1.6;
+constexpr int kStepsPerWindow = 8;
+constexpr double kOutlier = 4;  // times the noise: a few samples beyond are no event
+constexpr double kSeen = 0.7;   // share of a window's samples that are used at least
+
+struct Window {
+  double gain = 0, on = 0, off = 0;
+};
+
+// Where one of the shapes fits best; dense, used: [samples] residual and whether it counts. tried: places looked at.
+Window Strongest(const std::vector<VectorXd>& shapes, const VectorXd& dense, const VectorXd& used, const VectorXd& time,
+                 double& tried) {
+  const int samples = static_cast<int>(dense.size());
+  const double step_s = (time[samples - 1] - time[0]) / (samples - 1);
+  Window best;
+  tried = 0;
+  for (const VectorXd& shape : shapes) {
+    const int length = static_cast<int>(shape.size()), stride = std::max(1, length / kStepsPerWindow);
+    for (int at = 0; at + length <= samples; at += stride, ++tried) {
+      const auto seen = used.segment(at, length);
+      if (seen.sum() < kSeen * length) continue;
+      const double fit = shape.dot(dense.segment(at, length)), norm = (shape.array().square() * seen.array()).sum();
+      if (fit * fit > best.gain * norm) best = {fit * fit / norm, time[at], time[at] + length * step_s};
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+// Windows [on, off] on a grid of the log's time, not shorter than the record's minimum; then refined.
+void Searcher::Onset() {
+  const auto& t = e_.logs[0].data->s.t;
+  const double begin = t[0], end = t[t.size() - 1], minimum = c_.record().search.minimum_s;
+  if (e_.logs.size() != 1 || end - begin < 2 * minimum) return;  // times of several logs have no common origin
+  for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
+  best_.searched = 2;
+  best_.tried = 0.5 * kOnsetGrid * kOnsetGrid;
+  // Each cell of time once; a window is the sum of its cells.
+  std::vector<double> edge{begin - 1};
+  for (int k = 1; k < kOnsetGrid; ++k) edge.push_back(begin + (end - begin) * k / kOnsetGrid);
+  edge.push_back(end + 1);
+  std::vector<Projection> cell;
+  for (int k = 0; k < kOnsetGrid; ++k) cell.push_back(metric().Project(Gather({edge[k], edge[k + 1]})));
+  double most = 0;
+  std::vector<double> window;
+  for (int i = 0; i < kOnsetGrid; ++i) {
+    Projection sum = cell[i];
+    for (int k = i; k < kOnsetGrid; ++k) {
+      if (k > i) sum += cell[k];
+      if (edge[k + 1] - edge[i] < minimum || k - i + 1 == kOnsetGrid) continue;  // on all the time is no step
+      const double value = Value(sum).gain;
+      if (value > most) most = value, window = {edge[i], edge[k + 1]};
+    }
+  }
+  if (most > 0) Consider(window);
+  if (Promising()) RefineBest(0.5 / kOnsetGrid, kOnsetHalvings);
+  if (best_.eta[1] - best_.eta[0] < minimum) best_.gain = Gain{};
+}
+
+// Isolated windows one after the other, each where the shape that the record gives fits best what the ones before have
+// left.
+void Searcher::Windows() {
+  if (e_.logs.size() != 1) return;
+  const auto& time = e_.logs[0].data->s.t;
+  const int row = c_.rows()[0], samples = static_cast<int>(time.size());
+  const RowIndex& index = e_.index[row];
+  const double begin = time[0], end = time[samples - 1], step_s = (end - begin) / (samples - 1);
+  for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
+  std::vector<VectorXd> shapes;
+  for (int d = 0; d < kDurations; ++d) {
+    const double span = c_.record().search.minimum_s * std::pow(kLonger, d), from = 0.5 * (begin + end);
+    const int length = static_cast<int>(span / step_s);
+    std::vector<std::vector<VectorXd>> value;
+    c_.Evaluate(e_.logs[0], {from, from + span}, value);
+    shapes.push_back(value[0][0].segment(static_cast<int>((from - begin) / step_s), std::min(length, samples / 4)));
+  }
+  VectorXd residual = g_.metric.RawResidual(row);
+  std::vector<double> found;
+  for (int windows = 1; windows <= kMostWindows; ++windows) {
+    VectorXd dense = VectorXd::Zero(samples), used = dense;
+    const double noise = g_.metric.noise()[row].innovation, most = kOutlier * noise;
+    for (int i = 0; i < index.size(); ++i)
+      dense[index.sample[i]] = std::clamp(residual[i], -most, most), used[index.sample[i]] = 1;
+    double tried = 0;
+    const Window best = Strongest(shapes, dense, used, time, tried);
+    Found one = best_;
+    one.penalty = PenaltyOf(3, c_, e_), one.tried = tried;
+    if (best.gain < -Score(one, 0) * noise * noise) break;
+    best_.searched = 2 * windows;
+    best_.tried = std::pow(tried, windows);
+    const auto with = [&](const std::vector<double>& last) {
+      if (last[1] - last[0] < c_.record().search.minimum_s) return 0.0;
+      std::vector<double> all = found;
+      all.insert(all.end(), last.begin(), last.end());
+      return Consider(all);
+    };
+    const double width = (best.off - best.on) / (end - begin + 2);
+    const std::vector<double> last = Refine({best.on, best.off}, 0.25 * width, 3, with);
+    found.insert(found.end(), last.begin(), last.end());
+    residual = g_.metric.ResidualWith(GatherColumns(c_, e_, found), row);
+  }
+}
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,216 @@
+// diagnosis - which candidate is the next term, and whether one still earns its place.
+#include "host_sim/diagnose/diagnosis/selector.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/identify/methods/exogeneity.hpp"
+
+namespace armcal::diagnosis {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kRescored = 14;             // candidates whose likelihood is computed with their own noise model
+constexpr int kCurvesOfAJoint = 3;        // among these
+constexpr double kKeepsOutOfFold = 0.35;  // of its gain
+constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
+constexpr double kOnce = 0.8;              // of a trace in one fold: the others cannot tell of it
+constexpr double kIndistinguishable = 25;  // chi^2 left at most when one kind imitates another
+constexpr double kImitated = 0.1;          // and of the trace's own
+constexpr double kNear = 0.05;             // of a score: the logs do not tell which of two it is
+constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
+constexpr double kAsLarge = 0.5;           // of what it would gain there if it was as large as it seemed
+constexpr int kSharpenings = 3;
+constexpr double kNothing = 10;         // a gain that no score above zero can come from
+constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms differ a little from any record
+constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
+
+bool SharesJoint(const Candidate& a, const Candidate& b) {
+  return std::any_of(a.rows().begin(), a.rows().end(),
+                     [&](int j) { return std::find(b.rows().begin(), b.rows().end(), j) != b.rows().end(); });
+}
+
+}  // namespace
+
+bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
+  Grounds grounds(w_, terms);
+  std::vector<Candidate*> causes, events;
+  for (const auto& c : w_.candidates)
+    if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence))
+      (c->is_event() ? events : causes).push_back(c.get());
+  bursts_.clear();
+  if (Best(causes, terms, grounds, out)) return true;
+  // Whatever comes and goes with the motion looks like events, too: they are asked for last. A cause that showed once
+  // stands among them.
+  events.insert(events.end(), bursts_.begin(), bursts_.end());
+  return Best(events, terms, grounds, out);
+}
+
+bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chosen*>& terms, Grounds& grounds,
+                    Chosen& out) {
+  std::vector<Found> ranked = Rank(reach, grounds);
+  // A strong effect passes for noise, and under so much noise others look as good. Once it is known what it leaves,
+  // those that may be meant are searched again.
+  for (int round = 0; round < kSharpenings && !ranked.empty(); ++round) {
+    if (!grounds.Sharpen(GatherColumns(*ranked[0].candidate, w_.evidence, ranked[0].eta))) break;
+    reach.clear();
+    for (const Found& f : ranked) reach.push_back(f.candidate);
+    ranked = Rank(reach, grounds);
+  }
+  for (Found& f : ranked) Rescore(grounds, f);
+  Sort(ranked);
+  for (std::size_t k = 0; k < ranked.size(); ++k)
+    if (ranked[k].score > kAccept && Accept(grounds, terms, ranked, k, out)) return true;
+  return false;
+}
+
+bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
+  const Grounds grounds(w_, others, term.candidate);
+  Found f = Finish(SearchCandidate(*term.candidate, grounds.ground()), grounds.ground());
+  if (f.gain.gain <= 0) return false;
+  Rescore(grounds, f);
+  term.eta = f.eta;
+  term.found = f;
+  return f.score > kAccept;
+}
+
+std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds) {
+  std::vector<Found> ranked;
+  std::map<std::pair<std::string, std::vector<int>>, Found> something;
+  for (Candidate* c : candidates) {
+    const std::string& simpler = c->record().search.after;
+    const auto before = something.find({simpler, c->joints()});
+    if (!simpler.empty() && before == something.end()) continue;
+    const Found f = SearchCandidate(*c, grounds.ground(), simpler.empty() ? nullptr : &before->second);
+    gain_[c] = f.gain.gain;
+    if (f.score <= 0) continue;
+    ranked.push_back(f);
+    something.insert({{c->record().name, c->joints()}, f});
+  }
+  std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
+  // Many curves fit the same torque about as well: the best ones of a joint stand for the others.
+  std::map<std::vector<int>, int> curves;
+  std::erase_if(ranked, [&](const Found& f) {
+    return f.candidate->is_curve() && ++curves[f.candidate->rows()] > kCurvesOfAJoint;
+  });
+  if (ranked.size() > kRescored) ranked.resize(kRescored);
+  for (Found& f : ranked) f = Finish(f, grounds.ground());
+  std::erase_if(ranked, [](const Found& f) { return f.gain.gain <= 0; });  // out of bounds on all rows
+  std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
+  return ranked;
+}
+
+void Selector::Rescore(const Grounds& grounds, Found& f) const {
+  const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
+  const double with = grounds.metric().RefittedDeviance(c);
+  f.score = Score(f, grounds.DevianceWithout(c.joints) - with);
+}
+
+// The latest term touches none of its joints, and there was nothing on them before.
+bool Selector::IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const {
+  const auto known = gain_.find(&c);
+  return known != gain_.end() && !terms.empty() && known->second < kNothing &&
+         !SharesJoint(c, *terms.back()->candidate);
+}
+
+// By score; what is compiled in already wins among equals.
+void Selector::Sort(std::vector<Found>& ranked) const {
+  const auto standing = [this](const Found& f) {
+    const auto& names = w_.standby;
+    return f.score + (std::find(names.begin(), names.end(), f.candidate->record().name) != names.end() ? 1e-3 : 0);
+  };
+  std::sort(ranked.begin(), ranked.end(), [&](const Found& a, const Found& b) { return standing(a) > standing(b); });
+  if (ranked.empty() || !ranked[0].candidate->is_curve()) return;
+  const Found& curve = ranked[0];
+  const auto cause = std::find_if(ranked.begin(), ranked.end(), [&](const Found& f) {
+    return !f.candidate->is_curve() && f.candidate->rows() == curve.candidate->rows() && f.score > kAccept &&
+           f.gain.gain > kCauseExplains * curve.gain.gain;
+  });
+  if (cause != ranked.end()) std::rotate(ranked.begin(), cause, cause + 1);
+}
+
+// A chosen term, or one that is known to look like a chosen one on the same joints: the two together would only fit
+// noise, and apart from the training log's states they would fail.
+bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const {
+  return std::any_of(terms.begin(), terms.end(), [&](const Chosen* t) {
+    const auto& like = t->candidate->record().confusable_with;
+    const bool confusable = std::find(like.begin(), like.end(), c.record().name) != like.end();
+    return (t->candidate == &c && !c.record().repeats()) || (confusable && t->candidate->joints() == c.joints());
+  });
+}
+
+// Delay, elasticity and backlash look like what a derivation of speed and acceleration leaves: a term that is real
+// gains about as much when these are derived otherwise. One of high frequencies loses more; it must then be worth
+// accepting there, too, and be as large as it was.
+bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
+                                     const std::vector<NoiseModel>& noise) {
+  if (!w_.narrow) return true;
+  Diagnosis::Work& narrow = *w_.narrow;
+  narrow.estimate = w_.estimate;
+  narrow.FollowEstimate(w_.Reads(terms, f.candidate));
+  narrow.Prepare(terms);
+  const Metric metric(narrow.rows, noise);
+  const Columns c = GatherColumns(*f.candidate, narrow.evidence, f.eta);
+  const double left = metric.Try(c).gain;
+  if (left > kStays * gain.gain) return true;
+  return Score(f, left) > kAccept && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second &&
+         MotionIsClean(f.candidate->rows());
+}
+
+// Noise that derivation made is in the logs at every bandwidth, and what smooths it looks like elasticity: where it
+// biases the rows of these joints, a term cannot be told from it.
+bool Selector::MotionIsClean(const std::vector<int>& joints) const {
+  VectorXd z(w_.model.columns() + w_.model.nonlinear());
+  z << w_.estimate.x.head(w_.model.columns()), VectorXd::Map(w_.declared.eta.data(), w_.model.nonlinear());
+  const calibration::Exogeneity e =
+      calibration::TestExogeneity(w_.model, w_.train, calibration::SmoothedInstruments(w_.train), z);
+  return std::all_of(joints.begin(), joints.end(),
+                     [&](int j) { return e.joint[static_cast<std::size_t>(j)].exogenous; });
+}
+
+bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
+                      std::size_t k, Chosen& out) {
+  const Found& f = ranked[k];
+  const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
+  std::vector<NoiseModel> noise;
+  (void)grounds.metric().RefittedDeviance(c, &noise);
+  const Metric metric(w_.rows, noise);
+  const Gain gain = metric.Try(c);
+  const VectorXd folds = metric.FoldGains(c, kBlocks, kFolds, f.precision);
+  const bool holds = folds.sum() > kKeepsOutOfFold * gain.gain && (folds.array() > 0).count() >= kFoldsThatImprove;
+  const bool once = std::find(bursts_.begin(), bursts_.end(), f.candidate) != bursts_.end();
+  if (!holds && !f.candidate->is_event() && !once) {
+    if (!f.candidate->is_curve() && metric.LargestFold(c, gain.amplitude, kBlocks, kFolds) > kOnce)
+      bursts_.push_back(f.candidate);
+    return false;
+  }
+  if (!StaysAtLowerBandwidth(f, terms, gain, noise)) return false;
+  out = Chosen{};
+  out.candidate = f.candidate;
+  out.eta = f.eta;
+  out.found = f;
+  out.folds = folds;
+  for (std::size_t other = 0; other < ranked.size(); ++other) {
+    if (other == k) continue;
+    const Candidate& o = *ranked[other].candidate;
+    const std::string& kind = o.record().kind;
+    const Rival rival{&o.record(), o.joints(), ranked[other].score};
+    const bool runner_up = out.rivals.empty();
+    if (runner_up) out.rivals.push_back(rival);
+    const bool said = std::find(out.also_fits.begin(), out.also_fits.end(), kind) != out.also_fits.end();
+    if (!SharesJoint(o, *f.candidate) || kind == f.candidate->record().kind || kind != o.record().name || said)
+      continue;
+    const auto [taken, own] = metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].eta), c, gain.amplitude);
+    const double left = own - taken;
+    const bool same = left < kIndistinguishable && left < kImitated * own;
+    const bool near = std::abs(ranked[other].score - f.score) < kNear * f.score;
+    if ((!same && !near) || out.also_fits.size() >= kOtherNames) continue;
+    out.also_fits.push_back(kind);
+    if (!runner_up) out.rivals.push_back(rival);
+  }
+  return true;
+}
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,44 @@
+// diagnosis - chooses the next term: search, noise fitted anew, cross-validation, bandwidth; and whether a term still
+// earns its place.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "host_sim/diagnose/diagnosis/grounds.hpp"
+#include "host_sim/diagnose/diagnosis/work.hpp"
+
+namespace armcal::diagnosis {
+
+class Selector {
+ public:
+  explicit Selector(Diagnosis::Work& work) : w_(work) {}
+
+  // The best further term given those chosen; false if none is worth it.
+  bool Next(const std::vector<const Chosen*>& terms, Chosen& out);
+
+  // Searches a chosen term again with the others in; false if it no longer earns its place.
+  bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others);
+
+ private:
+  // The best of these candidates that can be accepted; false if none can.
+  bool Best(std::vector<Candidate*> reach, const std::vector<const Chosen*>& terms, Grounds& grounds, Chosen& out);
+  // The strongest candidates by white score.
+  std::vector<Found> Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds);
+  void Rescore(const Grounds& grounds, Found& f) const;
+  bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const;
+  bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
+  // Best first: by score, but a named cause before a curve that explains little more.
+  void Sort(std::vector<Found>& ranked) const;
+  bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
+                             const std::vector<NoiseModel>& noise);
+  bool MotionIsClean(const std::vector<int>& joints) const;
+  bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
+              std::size_t k, Chosen& out);
+
+  Diagnosis::Work& w_;
+  std::map<const Candidate*, double> gain_;  // as last searched
+  std::vector<Candidate*> bursts_;           // causes that this pass could not judge fold by fold
+};
+
+}  // namespace armcal::diagnosis

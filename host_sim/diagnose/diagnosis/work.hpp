@@ -1,0 +1,102 @@
+// diagnosis - the state of one diagnosis: logs, current terms, rows of the base model; the room's own.
+#pragma once
+
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
+
+namespace armcal::diagnosis {
+
+// A candidate that has been added, with its parameters.
+struct Chosen {
+  Candidate* candidate = nullptr;
+  std::vector<double> eta;
+  Found found;
+  Eigen::VectorXd folds;
+  std::vector<std::string> also_fits;
+  std::vector<Rival> rivals;
+  bool earns = true;  // its place beside the others, as last seen
+  bool confirmed = true;
+  double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
+};
+
+// Those that are, but for `without`.
+std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Chosen* without = nullptr);
+
+// What a term must stand beside: not the curves over its joints, which may take its place but cannot tell its cause.
+std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chosen& term);
+
+struct Diagnosis::Work {
+  Work(const codegen::Model& model, const codegen::Catalogue& catalogue,
+       std::vector<const calibration::Dataset*> train);
+
+  // x, amplitudes, sigma and model torque for the given terms (white metric, the same method with and without terms).
+  struct Estimate {
+    Eigen::VectorXd x;                       // filter columns and gains
+    std::vector<Eigen::VectorXd> amplitude;  // per term
+    Eigen::VectorXd sigma, innovation;
+  };
+  // Leaves the estimate.
+  void Solve(const std::vector<const Chosen*>& terms);
+  // Moves the chosen terms' unknowns to where everything together fits best: a search sees one at a time, over a model
+  // that was fitted without it. Leaves the estimate.
+  void Polish();
+  // Standard deviations of the terms' amplitudes and unknowns, all free together, at the estimate that Solve has left.
+  struct Deviation {
+    Eigen::VectorXd amplitude, eta;
+  };
+  std::vector<Deviation> Deviations(const std::vector<const Chosen*>& terms);
+
+  // What these terms read, and a candidate beside them.
+  std::set<codegen::InputId> Reads(const std::vector<const Chosen*>& terms, const Candidate* further = nullptr) const;
+  // The evidence's model torque and its parts at the estimate, as far as something reads them.
+  void FollowEstimate(const std::set<codegen::InputId>& reads);
+  // Refreshes base rows at the estimate, the given terms' columns included.
+  void Prepare(const std::vector<const Chosen*>& terms);
+  Eigen::VectorXd SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j);
+  std::vector<NoiseModel> WhiteNoise() const;
+  // Reads the logs' motion as much before their torque as the confirmed terms say, from now on.
+  void AlignLogs();
+  void SetDelay(double by_s);
+  void IndexRows();
+  void StartRows();
+  void FillDeclared(int j);
+  bool FillGain(int j);
+  void Bend(int j, const Eigen::VectorXd& slope);
+  void MakeCoordinates(int size);
+
+  const codegen::Model& model;
+  codegen::ArmTorque arm;
+  std::vector<const calibration::Dataset*> train;
+  std::vector<const calibration::Dataset*> logged;  // as given
+  std::vector<calibration::Dataset> delayed;        // train points here once a delay has been applied
+  double delay_s = 0;                               // applied
+  calibration::Prior prior;
+  calibration::Fit declared;
+  std::vector<std::unique_ptr<Candidate>> candidates;
+  Evidence evidence;
+  BaseRows rows;
+  Estimate estimate;
+  std::vector<Chosen> chosen;
+  std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept where it does not hang on the estimate
+  std::vector<char> bent;                               // [joint] 1: its declared rows must be filled anew
+  Eigen::VectorXd followed;                             // the estimate that the evidence is at ...
+  std::set<codegen::InputId> followed_reads;            // ... in these
+  std::vector<std::string> standby;                     // records compiled in, not yet estimated
+  std::set<codegen::InputId> all_reads;                 // of all candidates
+  std::unique_ptr<Work> narrow;  // the same logs at a lower bandwidth, without candidates of its own
+};
+
+// The chosen terms as they are now, with their deviations.
+void WriteTerms(Diagnosis::Work& work, Finding& finding);
+
+// What no estimate changes: steps, and the columns of the bodies that something reads.
+Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data,
+                          const std::set<codegen::InputId>& reads);
+// Model torque and its parts at x, as far as something reads them.
+void Follow(const codegen::Model& model, const codegen::ArmTorque& arm, const Eigen::VectorXd& x,
+            const std::vector<double>& eta, const std::set<codegen::InputId>& reads, Quantities& quantities);
+
+// Torque of a candidate with given parameters on a dataset, N x n.
+Eigen::MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities,
+                                const std::vector<double>& eta, const Eigen::VectorXd& amplitude);
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,43 @@
+// health - does a joint still fit its committed model, what does the change look like, since when; knows no connection.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "host_sim/client/residual_reader.hpp"
+#include "host_sim/diagnose/health/onset.hpp"
+#include "host_sim/diagnose/health/shapes.hpp"
+
+namespace armcal::health {
+
+enum class Verdict {
+  kFits,          // as it did when the table was adopted
+  kNoLongerFits,  // the residual has grown since
+  kNeverFitted,   // the residual was large from the start
+  kTooEarly,      // the joint has moved too little since the adoption
+};
+
+struct JointHealth {
+  int joint = 0;
+  Verdict verdict = Verdict::kTooEarly;
+  Explanation looks_like;      // without terms: cannot be told
+  std::optional<Onset> onset;  // of kNoLongerFits, if the history shows it
+  double elapsed_s = 0;        // since the adoption
+  double rms_then_Nm = 0, rms_now_Nm = 0, sigma_Nm = 0;
+  double rows = 0;  // judged: first and latest
+};
+
+// A change whose torque has an RMS below this share of one row's torque noise is not reported.
+inline constexpr double kSmallestInSigma = 0.4;
+// A model whose residual exceeds this multiple of the torque noise from the start never fitted.
+inline constexpr double kNeverInSigma = 2.0;
+// Latest rows below which nothing is said: 16 s of motion at 125 Hz.
+inline constexpr double kFewestLatestRows = 2048;
+
+JointHealth Judge(const client::JointResiduals& joint);
+
+// Joints, from 1, that no longer fit for the load's sake (gain, offset, torque by position, or untold, but no friction)
+// and whose onsets may be one: what another payload or a tilted base does. Empty unless there are two at least.
+std::vector<int> ChangedTogether(const std::vector<JointHealth>& joints);
+
+}  // namespace armcal::health

@@ -1,0 +1,50 @@
+// verdict - one diagnosis, and what shows it: text, JSON, page; knows no search.
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "host_sim/data/report/page.hpp"
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
+#include "host_sim/identify/methods/exogeneity.hpp"
+
+namespace armcal::verdict {
+
+// How to tell a term from a rival on the same joints: in their records' words and, where a motion alone does it, as a
+// command for a shell.
+struct Separation {
+  std::string from, how, command;  // command: empty where a motion does not do
+};
+
+// Everything that one diagnosis has to show.
+struct DiagnosisView {
+  const codegen::Model* model = nullptr;
+  const diagnosis::Finding* finding = nullptr;
+  const calibration::Dataset* test = nullptr;
+  const diagnosis::HeldOut* held_out = nullptr;
+  std::vector<Eigen::MatrixXd> term_torque;  // on the test log
+  double seconds = 0;
+  calibration::Exogeneity exogeneity;               // of the training logs, with the terms in
+  std::vector<std::vector<Separation>> separation;  // per term
+};
+
+// Means over bins of a signal, over the held-out log where the joint moves: the residual with the term's torque put
+// back, the term, and the residual. (diagnosis_dependence.cpp)
+struct Dependence {
+  int joint = 0;
+  std::string signal, torque;  // what they are, with unit
+  report::Series without, term, remains;
+};
+Dependence DependenceOf(const DiagnosisView& v, std::size_t term);
+
+// The verdict, its terms with their evidence, and the errors. (diagnosis_json.cpp)
+nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);
+
+// Verdict, table before / after, and for each term the residual over time and over the signal that gave it away.
+void AddDiagnosis(report::Page& page, const DiagnosisView& v);
+
+// Short lines for the terminal.
+std::string DiagnosisText(const DiagnosisView& v);
+
+}  // namespace armcal::verdict

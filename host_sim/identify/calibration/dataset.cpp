@@ -1,0 +1,138 @@
+// calibration - derives speeds and accelerations and decides which rows count.
+#include "host_sim/identify/calibration/dataset.hpp"
+
+#include <cmath>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/calibration/weighted_fit.hpp"
+
+namespace armcal::calibration {
+namespace {
+constexpr double kUnscored_s = 0.5;  // design: the first and last half second of a log are not scored
+constexpr int kFlagSaturated = 2, kFlagStale = 4;
+// A joint that has just stopped or is about to turn may stick while its smoothed speed is already above v_min: rows
+// this close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
+constexpr int kTurn = 2;
+constexpr int kPoses = 8;  // at a single one an entry of the mass matrix may vanish
+// Signals and masks for given inertias.
+Dataset Derive(const codegen::Model& model, const logs::Log& log, const Eigen::MatrixXd& inertia,
+               const logs::Bandwidth& bandwidth) {
+  const int n = model.joints(), samples = static_cast<int>(log.samples());
+  Eigen::VectorXd sign_width(n);
+  for (int j = 0; j < n; ++j)
+    sign_width[j] =
+        model.robot().sign_law == "tanh" ? model.robot().sign_width_radps : model.robot().joint[j].v_min_radps;
+  const logs::Derivatives derived = logs::DeriveSignals(log, {inertia, sign_width}, bandwidth);
+  Dataset d;
+  d.source = log.source;
+  d.s.t = log.t;
+  d.s.q = derived.q, d.s.qd = derived.qd, d.s.qdd = derived.qdd;
+  d.s.temp = log.temp;
+  d.cutoff_Hz = derived.cutoff_Hz;
+  d.reference = log.qref;
+  d.tau = log.tau;
+  if (log.ext.cols() == n) d.tau += log.ext;  // an external force along +q does part of the motor's work
+  d.moving.setZero(samples, n), d.used.setZero(samples, n), d.scored.setZero(samples);
+  const auto turning = [&](int k, int j) {
+    for (int m = std::max(0, k - kTurn); m <= std::min(samples - 1, k + kTurn); ++m)
+      if (d.s.qd(m, j) * d.s.qd(k, j) <= 0 || std::abs(d.s.qd(m, j)) <= model.robot().joint[j].v_min_radps) return true;
+    return false;
+  };
+  // A sign law that is smooth over more than v_min says that the joint does not stick: its friction is a function of
+  // speed at rest and near a turn, too.
+  const auto sticks = [&robot = model.robot()](int j) {
+    return robot.sign_law != "tanh" || robot.joint[j].v_min_radps > robot.sign_width_radps;
+  };
+  const double begin = log.t[0] + kUnscored_s, end = log.t[samples - 1] - kUnscored_s;
+  for (int k = 0; k < samples; ++k) {
+    d.scored[k] = log.t[k] >= begin && log.t[k] <= end;
+    for (int j = 0; j < n; ++j) {
+      d.moving(k, j) = std::abs(d.s.qd(k, j)) > model.robot().joint[j].v_min_radps;
+      const bool flagged = log.flags.cols() == n && (log.flags(k, j) & (kFlagSaturated | kFlagStale));
+      d.used(k, j) = derived.settled[k] && !flagged && (!sticks(j) || (d.moving(k, j) && !turning(k, j)));
+    }
+  }
+  return d;
+}
+
+}  // namespace
+
+Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& base) {
+  const int n = model.joints(), per_pose = n + 1;
+  codegen::Signals s;  // unit accelerations, one joint a sample, at each pose; the last sample, at rest, is gravity
+  s.q.resize(kPoses * per_pose, n), s.qd.setZero(kPoses * per_pose, n), s.qdd = s.qd;
+  for (int pose = 0; pose < kPoses; ++pose)
+    for (int j = 0; j < n; ++j) {
+      // the middle half of each range, evenly filled by multiples of irrational numbers
+      const double turns = 0.5 + pose * std::sqrt(2 + j * (j + 3));
+      const double share = 0.25 + 0.5 * (turns - std::floor(turns));
+      const auto& limits = model.robot().joint[j].position_limit_rad;
+      s.q.col(j).segment(pose * per_pose, per_pose).setConstant(limits[0] + share * (limits[1] - limits[0]));
+      s.qdd(pose * per_pose + j, j) = 1;
+    }
+  std::vector<Eigen::MatrixXd> row;
+  model.Regressor(s, {}, {}, row);
+  Eigen::MatrixXd square = Eigen::MatrixXd::Zero(n, n);
+  for (int r = 0; r < n; ++r) {
+    const Eigen::VectorXd torque = row[r].middleCols(model.front(), model.rigid()) * base;
+    for (int pose = 0; pose < kPoses; ++pose)
+      for (int j = 0; j < n; ++j)
+        square(r, j) += std::pow(torque[pose * per_pose + j] - torque[pose * per_pose + n], 2) / kPoses;
+  }
+  return square.cwiseSqrt();
+}
+
+Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::Bandwidth& bandwidth) {
+  const int n = model.joints();
+  if (log.joints != n)
+    throw io::InputError(log.source + ": " + std::to_string(log.joints) + " joints, expected " + std::to_string(n) +
+                         " (robot " + model.robot().name + ")");
+  Eigen::MatrixXd inertia = Eigen::MatrixXd::Zero(n, n);
+  if (model.robot().has_prior) {
+    Eigen::VectorXd bodies(model.body_parameters());
+    for (int k = 0; k < bodies.size(); ++k) bodies[k] = model.table()[k].mean;
+    inertia = TypicalMass(model, model.base_map() * bodies);
+  } else {
+    // A joint's torque limit over its acceleration limit is a heavy guess: a low cut-off, good enough for a first fit.
+    for (int j = 0; j < n; ++j)
+      inertia(j, j) = model.robot().joint[j].torque_limit_Nm / model.robot().joint[j].acceleration_limit_radps2;
+    const Dataset rough = Derive(model, log, inertia, {});
+    const Fit fit = WeightedFit(model, {&rough});
+    const Eigen::VectorXd guess = inertia.diagonal();
+    inertia = TypicalMass(model, fit.x.segment(model.front(), model.rigid()));
+    for (int j = 0; j < n; ++j) inertia(j, j) = std::min(inertia(j, j), guess[j]);
+  }
+  return Derive(model, log, inertia, bandwidth);
+}
+
+Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only) {
+  Eigen::VectorXd rms = Eigen::VectorXd::Zero(d.joints());
+  for (int j = 0; j < d.joints(); ++j) {
+    double sum = 0;
+    int count = 0;
+    for (int k = 0; k < d.samples(); ++k) {
+      if (!d.scored[k] || (moving_only && !d.moving(k, j))) continue;
+      sum += residual(k, j) * residual(k, j);
+      ++count;
+    }
+    rms[j] = count ? std::sqrt(sum / count) : 0;
+  }
+  return rms;
+}
+
+std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& data) {
+  std::map<std::string, Eigen::MatrixXd> out;
+  for (const auto& d : data) {
+    if (d.reference.size() == 0) return {};
+    out.emplace(d.source, d.reference);
+  }
+  return out;
+}
+
+std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data) {
+  std::vector<const Dataset*> out;
+  for (const auto& d : data) out.push_back(&d);
+  return out;
+}
+
+}  // namespace armcal::calibration

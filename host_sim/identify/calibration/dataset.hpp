@@ -1,0 +1,41 @@
+// calibration - a log made ready for estimation: signals of one instant, and which rows may be used; knows no method.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "codegen/src/generator/model.hpp"
+#include "host_sim/data/logs/log.hpp"
+#include "host_sim/data/logs/signals.hpp"
+
+namespace armcal::calibration {
+
+// N samples, n joints.
+struct Dataset {
+  codegen::Signals s;         // q, qd, qdd (derived from q where the log has no better), temp
+  Eigen::MatrixXd tau;        // [N x n] measured torque minus known external torque
+  Eigen::MatrixXi moving;     // [N x n] 1: |qd| > v_min of that joint
+  Eigen::MatrixXi used;       // [N x n] 1: row may be fitted (moving, signals settled, drive did not flag it)
+  Eigen::VectorXi scored;     // [N] 1: not within 0.5 s of an end of the log
+  Eigen::VectorXd cutoff_Hz;  // [n]
+  Eigen::MatrixXd reference;  // [N x n] commanded position; empty where the log has none
+  std::string source;
+
+  int samples() const { return s.samples(); }
+  int joints() const { return static_cast<int>(tau.cols()); }
+};
+
+// A chosen cut-off depends on the arm's inertia: from the prior, or, without one, from a first fit of this very log.
+Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::Bandwidth& bandwidth = {});
+
+// RMS over some poses of each entry of the mass matrix [n x n], for given base parameters.
+Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& base);
+
+// Root mean square of residual[:, j] over scored samples of each joint; moving_only: where that joint moves.
+Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only);
+
+// Commanded positions by the log's name; empty unless every log has them.
+std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& data);
+
+std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data);
+
+}  // namespace armcal::calibration

@@ -1,0 +1,118 @@
+// calibration - the prior mapped into filter coordinates; a diagonal one in (m, m c, I_o) would be worse than none.
+#include "host_sim/identify/calibration/prior.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace armcal::calibration {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+VectorXd ToCentre(const VectorXd& o) {
+  VectorXd c = o;
+  const double m = o[0];
+  const double x = o[1] / m, y = o[2] / m, z = o[3] / m;
+  c[1] = x, c[2] = y, c[3] = z;
+  c[4] -= m * (y * y + z * z), c[5] += m * x * y, c[6] += m * x * z;
+  c[7] -= m * (x * x + z * z), c[8] += m * y * z, c[9] -= m * (x * x + y * y);
+  return c;
+}
+
+VectorXd ToOrigin(const VectorXd& c) {
+  VectorXd o = c;
+  const double m = c[0], x = c[1], y = c[2], z = c[3];
+  o[1] = m * x, o[2] = m * y, o[3] = m * z;
+  o[4] += m * (y * y + z * z), o[5] -= m * x * y, o[6] -= m * x * z;
+  o[7] += m * (x * x + z * z), o[8] -= m * y * z, o[9] += m * (x * x + y * y);
+  return o;
+}
+
+MatrixXd OriginJacobian(const VectorXd& c) {
+  const double m = c[0], x = c[1], y = c[2], z = c[3];
+  MatrixXd J = MatrixXd::Identity(10, 10);
+  J.col(0) << 1, x, y, z, y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y;
+  J.col(1) << 0, m, 0, 0, 0, -m * y, -m * z, 2 * m * x, 0, 2 * m * x;
+  J.col(2) << 0, 0, m, 0, 2 * m * y, -m * x, 0, 0, -m * z, 2 * m * y;
+  J.col(3) << 0, 0, 0, m, 2 * m * z, 0, -m * x, 2 * m * z, -m * y, 0;
+  return J;
+}
+
+VectorXd BodyMean(const codegen::Model& model) {
+  VectorXd mean(model.body_parameters());
+  for (int k = 0; k < mean.size(); ++k) mean[k] = model.table()[k].mean;
+  return mean;
+}
+
+MatrixXd BodyCovariance(const codegen::Model& model) {
+  const VectorXd mean = BodyMean(model);
+  MatrixXd P = MatrixXd::Zero(mean.size(), mean.size());
+  for (int j = 0; j < model.joints(); ++j) {
+    VectorXd sd(11);
+    for (int k = 0; k < 11; ++k) {
+      const auto& p = model.table()[11 * j + k];
+      sd[k] = p.state == "estimated" || p.state == "considered" ? p.sd : 0;
+    }
+    const MatrixXd J = OriginJacobian(ToCentre(mean.segment(11 * j, 10)));
+    P.block(11 * j, 11 * j, 10, 10) = J * sd.head(10).cwiseAbs2().asDiagonal() * J.transpose();
+    P(11 * j + 10, 11 * j + 10) = sd[10] * sd[10];
+  }
+  return P;
+}
+
+Prior MakePrior(const codegen::Model& model) {
+  const int columns = model.columns(), n = model.joints();
+  Prior prior;
+  prior.columns = columns;
+  prior.informative = model.robot().has_prior;
+  prior.mean = VectorXd::Zero(columns + n);
+  prior.covariance = MatrixXd::Zero(columns + n, columns + n);
+  if (prior.informative) {
+    const MatrixXd& B = model.base_map();
+    prior.mean.segment(model.front(), model.rigid()) = B * BodyMean(model);
+    prior.covariance.block(model.front(), model.front(), model.rigid(), model.rigid()) =
+        B * BodyCovariance(model) * B.transpose();
+  }
+  for (int c = 0; c < columns; ++c) {
+    if (model.is_rigid(c)) {
+      prior.active.push_back(c);
+      continue;
+    }
+    const auto& p = model.table()[model.table_index(c)];
+    prior.mean[c] = p.mean;
+    prior.covariance(c, c) = p.sd * p.sd;
+    if (p.state == "estimated") prior.active.push_back(c);
+  }
+  for (int j = 0; j < n; ++j) {
+    const double tolerance = model.robot().joint[j].motor.torque_constant_tolerance;
+    prior.covariance(columns + j, columns + j) = tolerance * tolerance / 3;  // uniform over +- tolerance
+    if (tolerance > 0) prior.active.push_back(columns + j);
+  }
+  return prior;
+}
+
+VectorXd ReadOutBodies(const codegen::Model& model, const VectorXd& base) {
+  const MatrixXd P0 = BodyCovariance(model);
+  const VectorXd phi0 = BodyMean(model);
+  const MatrixXd& B = model.base_map();
+  return phi0 + P0 * B.transpose() * (B * P0 * B.transpose()).ldlt().solve(base - B * phi0);
+}
+
+Eigen::Matrix4d PseudoInertia(const double* b) {
+  const double half = 0.5 * (b[4] + b[7] + b[9]);
+  Eigen::Matrix4d J;
+  J << half - b[4], -b[5], -b[6], b[1], -b[5], half - b[7], -b[8], b[2], -b[6], -b[8], half - b[9], b[3], b[1], b[2],
+      b[3], b[0];
+  return J;
+}
+
+bool IsPhysical(const VectorXd& bodies) {
+  for (int j = 0; j < bodies.size() / 11; ++j) {
+    const Eigen::LLT<Eigen::Matrix4d> factor(PseudoInertia(&bodies[11 * j]));
+    if (factor.info() != Eigen::Success || bodies[11 * j + 10] < 0) return false;
+  }
+  return true;
+}
+
+}  // namespace armcal::calibration

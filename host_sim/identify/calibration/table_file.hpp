@@ -1,0 +1,61 @@
+// calibration - the parameter table as a file people can read, and as the words that the drive takes; knows no drive.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "host_sim/identify/calibration/map_readout.hpp"
+
+namespace armcal::calibration {
+
+struct TableRow {
+  std::string name, unit, state = "estimated";
+  double mean = 0, sd = 0, process_noise = 0;  // sd: prior, of (m, c, I about the centre, rotor) for bodies
+  int group = 0;
+  double posterior_sd = 0;  // of this identification; 0: not identified
+  bool from_prior = false;  // posterior / prior sd above 0.7: the data hardly say anything
+  double free_mean = 0;     // what the data alone would have moved it to; mean where not from_prior
+};
+
+struct TableJoint {
+  double sigma_Nm = 0, v_min_radps = 0, torque_limit_Nm = 0, torque_scale = 1;
+};
+
+struct TableFile {
+  std::string robot, note;
+  std::uint32_t schema = 0;
+  bool bumpless = false;
+  std::uint32_t blend_ms = 0;
+  double forgetting[4] = {1, 1, 1, 1};
+  std::vector<TableJoint> joint;
+  std::vector<TableRow> row;
+};
+
+inline constexpr double kFromPrior = 0.7;  // posterior / prior standard deviation above which a value is the prior's
+
+// The model's own numbers: CAD bodies, nominal friction.
+TableFile DefaultTable(const codegen::Model& model);
+
+// An identification as a table. `held`: the fit in which columns that the data hardly determine were kept at the prior;
+// `all`: the one in which nothing was held. Bodies come from the physical read-out of `held`.
+TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const Fit& held, const PhysicalReadOut& bodies,
+                          double log_step_s);
+
+// Friction and effect columns whose posterior / prior ratio is above kFromPrior.
+std::vector<int> HardlyDetermined(const codegen::Model& model, const Fit& fit);
+
+// Throws io::InputError: file, key, what was expected.
+TableFile ReadTable(const std::filesystem::path& path);
+void WriteTable(const std::filesystem::path& path, const TableFile& table);
+
+// The byte layout of armcal/model/parameters.hpp as 16-bit words, and back (names, units come from `like`).
+std::vector<std::uint16_t> EncodeTable(const TableFile& table);
+TableFile DecodeTable(const std::vector<std::uint16_t>& words, const TableFile& like);
+
+// Values of `from` into the layout `to`, by parameter name; rows that `from` does not know keep `to`'s. Returns their
+// names.
+std::vector<std::string> CarryOver(const TableFile& from, TableFile& to);
+
+}  // namespace armcal::calibration

@@ -1,0 +1,135 @@
+// calibration - normal equations in prior-scaled coordinates; weights are re-estimated until they settle.
+#include "host_sim/identify/calibration/weighted_fit.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace armcal::calibration {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kDetermined =
+    1e-10;  // share of the largest scaled eigenvalue below which a direction counts as unseen
+
+MatrixXd Pick(const MatrixXd& m, const std::vector<int>& index) {
+  MatrixXd out(index.size(), index.size());
+  for (std::size_t i = 0; i < index.size(); ++i)
+    for (std::size_t k = 0; k < index.size(); ++k) out(i, k) = m(index[i], index[k]);
+  return out;
+}
+
+VectorXd Pick(const VectorXd& v, const std::vector<int>& index) {
+  VectorXd out(index.size());
+  for (std::size_t i = 0; i < index.size(); ++i) out[i] = v[index[i]];
+  return out;
+}
+
+}  // namespace
+
+VectorXd SolveWithPrior(const Information& info, const VectorXd& weight, const Prior& prior,
+                        const std::vector<int>& active, MatrixXd* covariance) {
+  const int size = static_cast<int>(prior.mean.size());
+  MatrixXd H = MatrixXd::Zero(size, size);
+  VectorXd g = VectorXd::Zero(size);
+  for (std::size_t j = 0; j < info.gram.size(); ++j) {
+    H += weight[j] * info.gram[j];
+    g += weight[j] * (info.right[j] - info.gram[j] * prior.mean);  // in deviations from the prior mean
+  }
+  const MatrixXd Ha = Pick(H, active);
+  const VectorXd ga = Pick(g, active);
+  const int a = static_cast<int>(active.size());
+  VectorXd scale(a);
+  VectorXd step(a);
+  MatrixXd P(a, a);
+  if (prior.informative) {
+    // x = S z with P0 = S C S: (S H S + C^-1) z = S g, written as C^(1/2) so that a singular prior does no harm.
+    const MatrixXd P0 = Pick(prior.covariance, active);
+    scale = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
+    const MatrixXd C = scale.cwiseInverse().asDiagonal() * P0 * scale.cwiseInverse().asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C);
+    const MatrixXd L =
+        scale.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+    const MatrixXd M = L.transpose() * Ha * L + MatrixXd::Identity(a, a);
+    const Eigen::LLT<MatrixXd> factor(M);
+    step = L * factor.solve(L.transpose() * ga);
+    if (covariance) P = L * factor.solve(L.transpose());
+  } else {
+    scale = Ha.diagonal().cwiseSqrt();
+    for (int i = 0; i < a; ++i) scale[i] = scale[i] > 0 ? 1 / scale[i] : 0;
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(scale.asDiagonal() * Ha * scale.asDiagonal()));
+    const double floor = kDetermined * eigen.eigenvalues()[a - 1];
+    VectorXd inverse(a);
+    for (int i = 0; i < a; ++i) inverse[i] = eigen.eigenvalues()[i] > floor ? 1 / eigen.eigenvalues()[i] : 0;
+    const MatrixXd V = scale.asDiagonal() * eigen.eigenvectors();
+    step = V * (inverse.asDiagonal() * (V.transpose() * ga));
+    if (covariance) P = V * inverse.asDiagonal() * V.transpose();
+  }
+  VectorXd x = prior.mean;
+  for (int i = 0; i < a; ++i) x[active[i]] += step[i];
+  if (covariance) {
+    covariance->setZero(size, size);
+    for (int i = 0; i < a; ++i)
+      for (int k = 0; k < a; ++k) (*covariance)(active[i], active[k]) = P(i, k);
+  }
+  return x;
+}
+
+double VarianceInflation(const VectorXd& residual, const Eigen::VectorXi& used) {
+  const int samples = static_cast<int>(residual.size());
+  double variance = 0;
+  for (int k = 0; k < samples; ++k) variance += used[k] ? residual[k] * residual[k] : 0;
+  if (variance <= 0) return 1;
+  double factor = 1;
+  for (int lag = 1; lag < std::min(200, samples / 4); ++lag) {
+    double product = 0;
+    for (int k = lag; k < samples; ++k) product += used[k] && used[k - lag] ? residual[k] * residual[k - lag] : 0;
+    if (product <= 0) break;
+    factor += 2 * product / variance;
+  }
+  return factor;
+}
+
+Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& data, const std::vector<int>& held) {
+  const int n = model.joints(), columns = model.columns();
+  const Prior prior = MakePrior(model);
+  Fit fit;
+  for (const int c : prior.active)
+    if (std::find(held.begin(), held.end(), c) == held.end()) fit.active.push_back(c);
+  for (int k = 0; k < model.nonlinear(); ++k)
+    fit.eta.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
+  fit.x = prior.mean;
+  fit.sigma.resize(n);
+  for (int j = 0; j < n; ++j) fit.sigma[j] = model.robot().joint[j].torque_noise_Nm;
+  fit.inflation = VectorXd::Ones(n);
+  // The first pass has no estimate to take gain columns at; the weights settle within three.
+  for (fit.iterations = 1; fit.iterations <= 4; ++fit.iterations) {
+    fit.information = Information(n, columns + n);
+    for (const Dataset* d : data) fit.information += Accumulate(model, *d, fit.x.head(columns), fit.eta);
+    // right-hand side for kappa is linear about the current estimate: measured = Y p + kappa (Y p_now)
+    const VectorXd weight = fit.sigma.cwiseAbs2().cwiseInverse();
+    fit.x = SolveWithPrior(fit.information, weight, prior, fit.active, &fit.covariance);
+    for (int j = 0; j < n; ++j)
+      if (fit.information.rows[j] > 0)
+        fit.sigma[j] = std::max(1e-12, std::sqrt(fit.information.Residual(j, fit.x) / fit.information.rows[j]));
+  }
+  fit.inflation.setZero();
+  for (const Dataset* d : data) {
+    const MatrixXd left = d->tau - Predict(model, *d, fit.x, fit.eta);
+    for (int j = 0; j < n; ++j)
+      fit.inflation[j] += VarianceInflation(left.col(j), d->used.col(j)) / static_cast<double>(data.size());
+  }
+  const VectorXd weight = (fit.sigma.cwiseAbs2().cwiseProduct(fit.inflation)).cwiseInverse();
+  SolveWithPrior(fit.information, weight, prior, fit.active,
+                 &fit.covariance);  // what the data determine, honestly weighted
+  fit.sd = fit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  fit.prior_sd = prior.covariance.diagonal().cwiseSqrt();
+  if (!prior.informative) fit.prior_sd.setConstant(std::numeric_limits<double>::infinity());
+  return fit;
+}
+
+}  // namespace armcal::calibration

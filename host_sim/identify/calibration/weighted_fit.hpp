@@ -1,0 +1,39 @@
+// calibration - weighted least squares with prior in double; the reference that every other estimate is compared with.
+#pragma once
+
+#include <vector>
+
+#include "host_sim/identify/calibration/information.hpp"
+#include "host_sim/identify/calibration/prior.hpp"
+
+namespace armcal::calibration {
+
+struct Fit {
+  Eigen::VectorXd x;           // [columns + n] filter columns and torque gain deviations
+  Eigen::VectorXd sd;          // posterior standard deviation (0 where not active)
+  Eigen::VectorXd prior_sd;    // the prior's, in the same coordinates; infinity without prior
+  Eigen::MatrixXd covariance;  // of all coordinates
+  Eigen::VectorXd sigma;       // [n] residual standard deviation, used as weights
+  Eigen::VectorXd inflation;   // [n] variance factor for residuals that are not white
+  std::vector<int> active;
+  std::vector<double> eta;  // nonlinear parameters of the model
+  Information information;  // at the final estimate
+  int iterations = 0;
+
+  double ratio(int c) const { return prior_sd[c] > 0 ? sd[c] / prior_sd[c] : 1; }
+};
+
+// Iterates: weights from the residuals, gain and estimate-dependent columns from the estimate. `held`: coordinates kept
+// at the prior mean. Directions that no data and no prior determine stay at the prior mean.
+Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& data,
+                const std::vector<int>& held = {});
+
+// Minimum over active coordinates of the weighted residual plus the prior; returns x and (optionally) the covariance.
+Eigen::VectorXd SolveWithPrior(const Information& info, const Eigen::VectorXd& weight, const Prior& prior,
+                               const std::vector<int>& active, Eigen::MatrixXd* covariance);
+
+// 1 + 2 sum of autocorrelations up to the first negative one: what a sum over these residuals varies more than over
+// white ones.
+double VarianceInflation(const Eigen::VectorXd& residual, const Eigen::VectorXi& used);
+
+}  // namespace armcal::calibration

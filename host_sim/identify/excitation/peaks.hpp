@@ -1,0 +1,37 @@
+// excitation - the largest position, speed, acceleration and torque of a motion and their share of the limits.
+// Knows nothing of collisions.
+#pragma once
+
+#include <vector>
+
+#include "host_sim/data/trajectory/trajectory.hpp"
+#include "host_sim/identify/excitation/observation.hpp"
+#include "host_sim/identify/excitation/series.hpp"
+
+namespace armcal::excitation {
+
+inline constexpr double kCheckStep_s = 0.001;  // grid on which limits are checked: a drive's control tick
+
+// One joint. Shares: 1 is the limit; the position's share is the distance from the middle of its range.
+struct JointPeaks {
+  double lowest_rad = 0, highest_rad = 0, speed_radps = 0, acceleration_radps2 = 0, torque_Nm = 0;
+  double position_share = 0, speed_share = 0, acceleration_share = 0, torque_share = 0;
+};
+
+// Torque by the robot file's values; with prior = "none" nobody knows it: torque and its share are 0.
+std::vector<JointPeaks> FindPeaks(const Observation& observation, const codegen::Signals& s);
+
+// The largest share of any limit of any joint.
+double LargestShare(const std::vector<JointPeaks>& peaks);
+
+// Is it at most `share`, but for round-off?
+bool Keeps(const std::vector<JointPeaks>& peaks, double share);
+
+// The motion along the spline, on the check grid or any other: q, qd, qdd.
+codegen::Signals Sampled(const trajectory::TrajectorySpline& spline, double step_s = kCheckStep_s);
+
+// The series with its amplitude reduced (never enlarged) until every share is at most `share` on the check grid over
+// one period. False: not even the pose q0 keeps it.
+bool ScaleToLimits(const Observation& observation, double share, Series& series);
+
+}  // namespace armcal::excitation

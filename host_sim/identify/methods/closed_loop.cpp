@@ -1,0 +1,216 @@
+// methods - time stepping of the arm under its control law; knows no true arm.
+#include "host_sim/identify/methods/closed_loop.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+
+#include "codegen/src/generator/dynamics.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/logs/quintic_spline.hpp"
+
+namespace armcal::calibration {
+
+using codegen::Expr;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kSubsteps = 2;          // steps of one control period
+constexpr double kSlowest = 0.02;     // share of v_min at which friction of a joint about to move is taken
+constexpr double kRunaway_rad = 1e3;  // beyond: the parameters are no arm's
+constexpr int kMaxSweeps = 60;        // of the balance; a sweep's error falls by far more than half
+
+const codegen::Model& Checked(const codegen::Model& model) {
+  if (model.robot().control.structure != "pd_feedforward")
+    throw io::InputError(model.robot().path + ": control: expected structure = \"pd_feedforward\" with rate and gains");
+  return model;
+}
+
+// M (upper triangle, by column), V and G of (1), from base parameters as inputs.
+std::vector<Expr> DynamicsRoots(codegen::Graph& g, const codegen::Model& model) {
+  const codegen::Dynamics d = codegen::MakeDynamics(g, model.robot(), model.base_columns());
+  std::vector<Expr> roots;
+  for (const auto& column : d.mass) roots.insert(roots.end(), column.begin(), column.end());
+  roots.insert(roots.end(), d.velocity.begin(), d.velocity.end());
+  roots.insert(roots.end(), d.gravity.begin(), d.gravity.end());
+  return roots;
+}
+
+VectorXd Map(const std::vector<double>& v) { return VectorXd::Map(v.data(), static_cast<Eigen::Index>(v.size())); }
+
+}  // namespace
+
+LoopSimulator::LoopSimulator(const codegen::Model& model, const LoopSettings& settings)
+    : model_(Checked(model)), settings_(settings), effects_(model), dynamics_(graph_, DynamicsRoots(graph_, model)) {
+  const int n = model.joints();
+  kp_ = Map(model.robot().control.kp_Nmprad), kd_ = Map(model.robot().control.kd_Nmsprad);
+  limit_.resize(n), resolution_.resize(n);
+  for (int j = 0; j < n; ++j) {
+    const codegen::Joint& joint = model.robot().joint[j];
+    limit_[j] = joint.torque_limit_Nm;
+    resolution_[j] = 2 * std::numbers::pi / (joint.motor.counts_per_turn * std::abs(joint.motor.gear_ratio));
+  }
+  std::map<codegen::InputId, int> known;
+  for (int j = 0; j < n; ++j)
+    known[{codegen::Quantity::kPosition, j}] = j, known[{codegen::Quantity::kSpeed, j}] = n + j;
+  for (int d = 0; d < model.rigid(); ++d)
+    known[{.quantity = codegen::Quantity::kBaseParameter, .parameter = d}] = 2 * n + d;
+  for (const codegen::InputId& input : graph_.inputs()) source_.push_back(known.contains(input) ? known[input] : -1);
+  input_.assign(source_.size(), 0);
+  value_.resize(static_cast<std::size_t>(n * (n + 1) / 2 + 2 * n));
+  if (settings_.feedforward.size() == 0) settings_.feedforward = MakeProblem(model, {}).start;
+}
+
+void LoopSimulator::Dynamics(const VectorXd& q, const VectorXd& qd) {
+  const int n = model_.joints();
+  for (std::size_t i = 0; i < source_.size(); ++i)
+    if (const int s = source_[i]; s >= 0)
+      input_[i] = s < n ? q[s] : s < 2 * n ? qd[s - n] : z_[model_.front() + s - 2 * n];
+  dynamics_.EvaluateAt<double>(input_, scratch_, value_);
+  mass_.resize(n, n);
+  std::size_t k = 0;
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i <= j; ++i) mass_(i, j) = mass_(j, i) = value_[k++];
+  bias_ = VectorXd::Map(&value_[k], n) + VectorXd::Map(&value_[k + static_cast<std::size_t>(n)], n);
+}
+
+// The believed model's torque along the reference; friction takes the reference's direction, none below v_min.
+MatrixXd LoopSimulator::FeedForward(const codegen::Signals& s) const {
+  const int n = model_.joints(), columns = model_.columns();
+  const VectorXd& x = settings_.feedforward;
+  MatrixXd tau = MatrixXd::Zero(s.samples(), n);
+  model_.ForEachBlock(
+      s, {x.data(), static_cast<std::size_t>(columns)},
+      {x.data() + columns, static_cast<std::size_t>(model_.nonlinear())},
+      [&](int begin, int count, std::span<const double* const> root) {
+        for (int j = 0; j < n; ++j)
+          for (int c = 0; c < columns; ++c) {
+            if (model_.rows()[j][c].IsZero()) continue;
+            const double* value = root[static_cast<std::size_t>(j * columns + c)];
+            for (int k = 0; k < count; ++k)
+              if (model_.is_rigid(c) || std::abs(s.qd(begin + k, j)) > model_.robot().joint[j].v_min_radps)
+                tau(begin + k, j) += x[c] * value[k];
+          }
+      });
+  return tau;
+}
+
+// A v + friction(v) = right for the speeds qd_, friction between `backward` (v < 0) and `forward` (v > 0) at v = 0:
+// projected Gauss-Seidel, which converges because A is positive definite.
+void LoopSimulator::Balance(const VectorXd& right, const VectorXd& forward, const VectorXd& backward) {
+  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
+    double change = 0;
+    for (Eigen::Index i = 0; i < qd_.size(); ++i) {
+      const double rest = right[i] - A_.row(i).dot(qd_) + A_(i, i) * qd_[i];
+      const double upper = std::max(forward[i], backward[i]), lower = std::min(forward[i], backward[i]);
+      const double v = rest > upper ? (rest - upper) / A_(i, i) : rest < lower ? (rest - lower) / A_(i, i) : 0;
+      change = std::max(change, std::abs(v - qd_[i]));
+      qd_[i] = v;
+    }
+    if (change < 1e-12) return;
+  }
+}
+
+// law: the control law's torque at rest in q = 0; kp, kd: its gains, zero for a joint at its limit.
+void LoopSimulator::Step(double h, const VectorXd& law, const VectorXd& kp, const VectorXd& kd) {
+  const VectorXd before = qd_;
+  VectorXd side(qd_.size());
+  const auto friction = [&](double sign) {
+    for (Eigen::Index j = 0; j < qd_.size(); ++j)
+      side[j] = sign *
+                std::max(std::abs(before[j]), kSlowest * model_.robot().joint[static_cast<std::size_t>(j)].v_min_radps);
+    effects_.Set(0, q_, side, qdd_, {}, z_);
+    return effects_.Torque();
+  };
+  const VectorXd forward = friction(1), backward = friction(-1);
+  A_ = mass_ / h;
+  A_.diagonal() += kd + 0.5 * h * kp;
+  const VectorXd right = mass_ * before / h + law - kp.cwiseProduct(q_ + 0.5 * h * before) - bias_;
+  Balance(right, forward, backward);
+  tau_ = law - kp.cwiseProduct(q_ + 0.5 * h * (before + qd_)) - kd.cwiseProduct(qd_);
+}
+
+LoopRun LoopSimulator::Run(const VectorXd& t, const MatrixXd& reference, const VectorXd& z) {
+  const int n = model_.joints(), samples = static_cast<int>(t.size());
+  const double h = 1 / (model_.robot().control.rate_Hz * kSubsteps);
+  const int steps = std::max(1, static_cast<int>(std::ceil((t[samples - 1] - t[0]) / h - 1e-6)));
+  const logs::QuinticSpline spline(t, reference);
+  codegen::Signals ref;
+  ref.t = (VectorXd::LinSpaced(steps + 1, 0, steps) * h).array() + t[0];
+  ref.t = ref.t.cwiseMin(t[samples - 1]);
+  ref.q = spline.Evaluate(ref.t, 0), ref.qd = spline.Evaluate(ref.t, 1), ref.qdd = spline.Evaluate(ref.t, 2);
+  const MatrixXd ahead = FeedForward(ref);
+
+  z_ = z;
+  q_ = ref.q.row(0), qd_ = ref.qd.row(0), qdd_ = ref.qdd.row(0), tau_ = ahead.row(0);
+  MatrixXd q(steps + 1, n), qd(steps + 1, n), tau(steps + 1, n);
+  q.row(0) = q_, qd.row(0) = qd_, tau.row(0) = tau_;
+  LoopRun out;
+  VectorXd read_error = VectorXd::Zero(n), last_error = VectorXd::Zero(n), speed_error = VectorXd::Zero(n);
+  int done = 0;
+  for (int k = 1; k <= steps; ++k) {
+    if (settings_.encoder && (k - 1) % kSubsteps == 0) {
+      for (int j = 0; j < n; ++j) read_error[j] = resolution_[j] * std::round(q_[j] / resolution_[j]) - q_[j];
+      speed_error = (read_error - last_error) * model_.robot().control.rate_Hz;
+      last_error = read_error;
+    }
+    Dynamics(q_ + 0.5 * h * qd_, qd_ + 0.5 * h * qdd_);  // of the step's middle
+    const VectorXd before = qd_;
+    const VectorXd law = ahead.row(k).transpose() + kp_.cwiseProduct(ref.q.row(k).transpose() - read_error) +
+                         kd_.cwiseProduct(ref.qd.row(k).transpose() - speed_error);
+    Step(h, law, kp_, kd_);
+    if ((tau_.cwiseAbs() - limit_).maxCoeff() > 0) {  // joints at their limit give just that
+      VectorXd cut = law, kp = kp_, kd = kd_;
+      for (int j = 0; j < n; ++j)
+        if (std::abs(tau_[j]) > limit_[j]) cut[j] = std::copysign(limit_[j], tau_[j]), kp[j] = kd[j] = 0;
+      qd_ = before;
+      Step(h, cut, kp, kd);
+    }
+    qdd_ = (qd_ - before) / h;
+    q_ += 0.5 * h * (before + qd_);
+    if (!q_.allFinite() || q_.cwiseAbs().maxCoeff() > kRunaway_rad) break;
+    q.row(k) = q_, qd.row(k) = qd_, tau.row(k) = tau_;
+    done = k;
+  }
+  out.complete = done == steps;
+  // Between steps: speed and torque as straight lines. Acceleration and torque at a step: mean of the steps beside it.
+  out.s.t = t;
+  out.s.q.setConstant(samples, n, std::numeric_limits<double>::quiet_NaN());
+  out.s.qd = out.s.q, out.s.qdd = out.s.q, out.tau = out.s.q;
+  const auto slope = [&](int k) -> Eigen::RowVectorXd {
+    const int a = std::max(0, k - 1), b = std::min(done, k + 1);
+    return (qd.row(b) - qd.row(a)) / ((b - a) * h);
+  };
+  const auto torque = [&](int k) -> Eigen::RowVectorXd { return 0.5 * (tau.row(k) + tau.row(std::min(done, k + 1))); };
+  for (int i = 0; i < samples && done > 0; ++i) {
+    const double at = (t[i] - t[0]) / h;
+    const int k = std::min(static_cast<int>(at), steps - 1);
+    if (k + 1 > done) break;
+    const double share = at - k;
+    out.s.q.row(i) = (1 - share) * q.row(k) + share * q.row(k + 1);
+    out.s.qd.row(i) = (1 - share) * qd.row(k) + share * qd.row(k + 1);
+    out.s.qdd.row(i) = (1 - share) * slope(k) + share * slope(k + 1);
+    out.tau.row(i) = (1 - share) * torque(k) + share * torque(k + 1);
+  }
+  out.q_read = out.s.q;
+  for (int j = 0; j < n && settings_.encoder; ++j)
+    out.q_read.col(j) = resolution_[j] * (out.s.q.col(j) / resolution_[j]).array().round();
+  return out;
+}
+
+ClosedLoop MakeClosedLoop(const codegen::Model& model, std::map<std::string, MatrixXd> reference,
+                          const LoopSettings& settings) {
+  const auto simulator = std::make_shared<LoopSimulator>(model, settings);
+  return [simulator, reference = std::move(reference)](const Dataset& log, const VectorXd& z) {
+    const auto it = reference.find(log.source);
+    if (it == reference.end() || it->second.rows() != log.samples())
+      throw io::InputError(log.source + ": expected a reference (qref) for every sample");
+    return simulator->Run(log.s.t, it->second, z).s;
+  };
+}
+
+}  // namespace armcal::calibration

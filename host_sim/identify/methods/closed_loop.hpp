@@ -1,0 +1,62 @@
+// methods - the arm under its robot file's control law, with parameters that one chooses; knows no true arm.
+//
+// pd_feedforward: tau = tau_ff(reference) + kp (qref - q) + kd (qdref - qd), cut to the torque limits. The arm is
+// M(q) qdd + V(q, qd) + G(q) + friction and effects = tau, from the model's own expressions.
+//
+// An arm without rotor inertia is very stiff: 0.003 kg m^2 against 8 N m of friction. Steps of half a control period
+// are therefore implicit in the control law and in friction's sign: a joint's speed after a step is the one at which
+// all torques balance, or zero where friction can hold it (Moreau's time stepping). It takes no smoothing of the sign
+// and is stable for every gain; the sampled law's delay of half a period is not in it.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "host_sim/identify/methods/effect_point.hpp"
+#include "host_sim/identify/methods/method.hpp"
+
+namespace armcal::calibration {
+
+struct LoopSettings {
+  Eigen::VectorXd feedforward;  // [z] what the controller believes; empty: the model's table (the CAD values)
+  bool encoder = false;         // the controller reads position and its difference in encoder steps
+};
+
+// At the sample times asked for; q_read: what the encoder says there (q itself without encoder).
+struct LoopRun {
+  codegen::Signals s;
+  Eigen::MatrixXd q_read, tau;  // [N x n] rad, N m
+  bool complete = true;         // false: the motion blew up; from there on NaN
+};
+
+class LoopSimulator {
+ public:
+  // InputError: no [control] in the robot file, another structure, or a model with memory.
+  LoopSimulator(const codegen::Model& model, const LoopSettings& settings = {});
+
+  // reference [N x n] at the times t, joined by a quintic spline; starts on it. z: the arm's parameters.
+  LoopRun Run(const Eigen::VectorXd& t, const Eigen::MatrixXd& reference, const Eigen::VectorXd& z);
+
+ private:
+  void Dynamics(const Eigen::VectorXd& q, const Eigen::VectorXd& qd);
+  Eigen::MatrixXd FeedForward(const codegen::Signals& reference) const;
+  void Balance(const Eigen::VectorXd& right, const Eigen::VectorXd& forward, const Eigen::VectorXd& backward);
+  void Step(double h, const Eigen::VectorXd& law, const Eigen::VectorXd& kp, const Eigen::VectorXd& kd);
+
+  const codegen::Model& model_;
+  LoopSettings settings_;
+  EffectPoint effects_;
+  codegen::Graph graph_;
+  codegen::Tape dynamics_;   // M (upper triangle, by column), V, G
+  std::vector<int> source_;  // of each input: joint, n + joint, 2 n + base parameter
+  std::vector<double> input_, scratch_, value_;
+  Eigen::VectorXd kp_, kd_, limit_, resolution_;
+  Eigen::VectorXd z_, q_, qd_, qdd_, bias_, tau_;
+  Eigen::MatrixXd mass_, A_;
+};
+
+// For Problem::closed_loop: one simulation a call, reference by the log's `source`. InputError for a log without one.
+ClosedLoop MakeClosedLoop(const codegen::Model& model, std::map<std::string, Eigen::MatrixXd> reference,
+                          const LoopSettings& settings = {});
+
+}  // namespace armcal::calibration

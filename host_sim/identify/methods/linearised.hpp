@@ -1,0 +1,42 @@
+// methods - what gradient-like methods share: the model about an estimate, its regularised solution, the
+// read-out; knows no single method.
+#pragma once
+
+#include "host_sim/identify/methods/method.hpp"
+
+namespace armcal::calibration {
+
+// Whitened rows of the used samples at z: A = d tau / d z over sigma_j, residual = (tau - K(eta) p) over sigma_j.
+struct Linearised {
+  Eigen::MatrixXd A;         // [rows x z]
+  Eigen::VectorXd residual;  // [rows]
+  std::vector<int> joint;
+};
+Linearised Linearise(const Problem& problem, const Eigen::VectorXd& z);
+
+// Largest change of a coordinate, in its standard deviations, of a method that has settled.
+inline constexpr double kSettled = 1e-3;
+
+// Coordinates that a method may move: rigid columns, columns whose state is "estimated", eta that has a range.
+std::vector<int> FreeCoordinates(const Problem& problem);
+
+// Minimum of |target - A z|^2 + (z - start)' P^-1 (z - start) over the free coordinates from gram = A'A and right =
+// A'target; without a prior directions that no row sees stay at the start. covariance may be null.
+Eigen::VectorXd SolveRegularised(const Problem& problem, const Eigen::MatrixXd& gram, const Eigen::VectorXd& right,
+                                 Eigen::MatrixXd* covariance);
+
+// L with L L' = P over the free coordinates (rows of the others are zero): z = start + L w, w of unit covariance.
+Eigen::MatrixXd PriorFactor(const Problem& problem);
+
+// z within [lower, upper]; the prior's Gaussian may reach further than what eta's functions are made for.
+void ClampEta(const Problem& problem, Eigen::VectorXd& z);
+
+bool Stopped(const Problem& problem);
+
+// CPU time of this thread, s.
+double CpuSeconds();
+
+// Fills bodies (unless there are some), physical, from_prior, seconds since `began`.
+void Finish(const Problem& problem, double began, Solution& solution);
+
+}  // namespace armcal::calibration

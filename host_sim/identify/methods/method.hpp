@@ -1,0 +1,88 @@
+// methods - one interface for every identification method: those of the survey's section 3 and those that beat
+// them; knows no table of the survey and no file.
+//
+// Unknowns z = [p, eta]: p the model's filter coordinates (phi of (12); body parameters, friction, effects), eta its
+// nonlinear parameters (those of f in (13)). With `[parameters] set = "standard"` in the robot file p holds every body
+// parameter, as the survey has it; otherwise base parameters.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "host_sim/identify/calibration/dataset.hpp"
+#include "host_sim/identify/calibration/prior.hpp"
+
+namespace armcal::calibration {
+
+// What a simulation of the closed loop with given parameters moves through: signals at the samples of a log, from the
+// log's own reference. Methods that build instruments call it with THEIR estimate, never with a truth.
+using ClosedLoop = std::function<codegen::Signals(const Dataset& log, const Eigen::VectorXd& z)>;
+
+struct Problem {
+  const codegen::Model* model = nullptr;
+  std::vector<const Dataset*> train;  // rows with used = 1 count; samples in order of time
+  Eigen::VectorXd sigma_Nm;           // [n] standard deviation of a torque sample
+  Eigen::VectorXd start;              // [z] prior mean
+  Eigen::MatrixXd covariance;         // [z x z] prior; 0 x 0: nobody knows anything
+  Eigen::VectorXd lower, upper;       // [z] ranges that a search may use
+  ClosedLoop closed_loop;             // empty: the control law is not known
+  double forgetting = 0.998;          // mu of (22)-(24)
+  std::uint64_t seed = 1;
+  const std::atomic<bool>* stop = nullptr;                            // set: return the best so far
+  std::function<void(double share, double objective)> progress = {};  // may be empty
+};
+
+struct Solution {
+  Eigen::VectorXd z;
+  Eigen::MatrixXd covariance;  // [z x z]; 0 x 0 where the method gives none
+  Eigen::VectorXd bodies;  // [11 n] standard parameters about link origins, read out of z with what the method knows
+  bool physical = false;   // every body of `bodies` can exist
+  bool converged = true;
+  int iterations = 0;
+  double seconds = 0;            // of this call, one thread's CPU time
+  std::size_t memory_bytes = 0;  // of what grows with samples or particles, and the method's own matrices
+  double from_prior = 0;  // share of the posterior information that the prior gave, mean over coordinates; 0: none used
+  Eigen::MatrixXd path;   // [samples x z] estimate after each sample; online methods only
+  std::string remark;     // what a reader must know: "diverged at sample 311", ...
+};
+
+struct Method {
+  const char* name;                           // "pseudo_inverse"
+  const char* title;                          // "pseudo-inverse"
+  const char* equation;                       // of the survey: "(15)"; empty where it has none
+  bool nonlinear;                             // takes models with eta
+  bool online;                                // one sample after the other
+  bool needs_loop;                            // Problem::closed_loop
+  bool needs_prior;                           // Problem::covariance
+  bool needs_ranges;                          // Problem::lower, upper; a search, which takes seconds
+  Solution (*solve)(const Problem& problem);  // throws io::InputError, one line, where the problem lacks what it needs
+};
+
+// All of them, those of the survey first.
+const std::vector<Method>& Methods();
+// InputError naming the known ones.
+const Method& FindMethod(const std::string& name);
+// Runs a method. InputError, one line, where the model is not one it takes or the problem lacks what it needs.
+Solution Solve(const Method& method, const Problem& problem);
+
+// Prior mean, covariance and ranges from the model's table; ranges: +-3 prior standard deviations, cut to the bounds.
+Problem MakeProblem(const codegen::Model& model, std::vector<const Dataset*> train);
+
+// The same problem along other logs, which must outlive it.
+Problem Along(const Problem& problem, const std::vector<Dataset>& logs);
+
+// Rows of all used samples at eta: K [rows x columns], tau [rows], joint and sample of each row. For methods that look
+// at everything at once; online methods take sample by sample.
+struct Rows {
+  Eigen::MatrixXd K;
+  Eigen::VectorXd tau;
+  std::vector<int> joint, log, sample;
+};
+Rows StackRows(const Problem& problem, const Eigen::VectorXd& z);
+// d tau / d eta at z, same rows: [rows x nonlinear].
+Eigen::MatrixXd StackJacobian(const Problem& problem, const Eigen::VectorXd& z, const Rows& rows);
+
+}  // namespace armcal::calibration

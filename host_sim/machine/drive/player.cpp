@@ -1,0 +1,100 @@
+// drive - quintic blend to the first point, then the trajectory's spline at the commanded share of its speed.
+#include "host_sim/machine/drive/player.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace armcal::drive {
+namespace {
+constexpr double kBlendSpeedShare = 0.3, kBlendAccelerationShare = 0.3, kShortestBlend_s = 1.0;
+}
+
+Player::Player(int joints, double tick_s, MotionLimits limits)
+    : joints_(joints), tick_s_(tick_s), limits_(std::move(limits)) {
+  Hold(Eigen::VectorXd::Zero(joints));
+}
+
+bool Player::Load(const trajectory::Trajectory& trajectory) {
+  if (moving()) return false;
+  loaded_ = std::make_shared<const trajectory::TrajectorySpline>(trajectory);
+  return true;
+}
+
+void Player::Hold(const Eigen::VectorXd& q) {
+  set_.q = q;
+  set_.qd = set_.qdd = Eigen::VectorXd::Zero(joints_);
+}
+
+void Player::Stop(StopReason reason, const Eigen::VectorXd& q) {
+  Hold(q);
+  reason_ = reason;
+  state_ = PlayerState::kStopped;
+}
+
+void Player::Obey(PlayerCommand command, const Eigen::VectorXd& q) {
+  switch (command) {
+    case PlayerCommand::kNone:
+      return;
+    case PlayerCommand::kEnable:
+      if (state() != PlayerState::kDisabled) return;
+      Hold(q);
+      reason_ = StopReason::kNone;
+      state_ = PlayerState::kHolding;
+      return;
+    case PlayerCommand::kDisable:
+      state_ = PlayerState::kDisabled;
+      return;
+    case PlayerCommand::kStop:
+      if (moving()) Stop(StopReason::kCommand, q);
+      return;
+    case PlayerCommand::kStart:
+      if (state() == PlayerState::kDisabled || moving()) return;
+      playing_ = loaded_;
+      if (!playing_) return Stop(StopReason::kNoTrajectory, set_.q);
+      share_ = std::clamp(speed_.load(), 0.01, 1.0);
+      blend_from_ = set_.q;
+      blend_to_ = playing_->Position(0);
+      blend_s_ = kShortestBlend_s;
+      for (int j = 0; j < joints_; ++j) {  // a quintic's peaks: 1.875 d/T and 5.77 d/T^2
+        const double d = std::abs(blend_to_[j] - blend_from_[j]);
+        blend_s_ = std::max({blend_s_, 1.875 * d / (kBlendSpeedShare * share_ * limits_.speed_radps[j]),
+                             std::sqrt(5.7736 * d / (kBlendAccelerationShare * limits_.acceleration_radps2[j]))});
+      }
+      time_s_ = 0;
+      reason_ = StopReason::kNone;
+      state_ = PlayerState::kBlending;
+  }
+}
+
+const SetPoint& Player::Step(std::uint32_t tick, const Eigen::VectorXd& q_measured) {
+  Obey(command_.exchange(PlayerCommand::kNone), q_measured);
+  if (!enabled()) Hold(q_measured);
+  if (moving() && (q_measured - set_.q).cwiseAbs().maxCoeff() > kMaxTrackingError_rad)
+    Stop(StopReason::kTrackingError, q_measured);
+  if (state() == PlayerState::kBlending) {
+    time_s_ += tick_s_;
+    const double u = std::min(1.0, time_s_ / blend_s_);
+    const Eigen::VectorXd d = blend_to_ - blend_from_;
+    set_.q = blend_from_ + d * (u * u * u * (10 + u * (6 * u - 15)));
+    set_.qd = d * (30 * u * u * (1 - u) * (1 - u) / blend_s_);
+    set_.qdd = d * (60 * u * (1 - u) * (1 - 2 * u) / (blend_s_ * blend_s_));
+    if (u >= 1) {
+      time_s_ = 0;
+      first_tick_ = tick + 1;
+      state_ = PlayerState::kPlaying;
+    }
+  } else if (state() == PlayerState::kPlaying) {
+    time_s_ += tick_s_ * share_;
+    set_.q = playing_->Position(time_s_);
+    set_.qd = share_ * playing_->Speed(time_s_);
+    set_.qdd = share_ * share_ * playing_->Acceleration(time_s_);
+    last_tick_ = tick;
+    if (time_s_ >= playing_->duration_s()) {
+      Hold(playing_->Position(playing_->duration_s()));
+      state_ = PlayerState::kFinished;
+    }
+  }
+  return set_;
+}
+
+}  // namespace armcal::drive

@@ -1,0 +1,66 @@
+// drive - moves the set-point: hold, blend to the start, play, stop; knows no torque and no register.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "host_sim/data/trajectory/trajectory.hpp"
+#include "host_sim/machine/drive/vendor_registers.hpp"
+
+namespace armcal::drive {
+
+struct SetPoint {
+  Eigen::VectorXd q, qd, qdd;
+};
+
+struct MotionLimits {
+  Eigen::VectorXd speed_radps, acceleration_radps2;
+};
+
+// Load, Command and the getters belong to the background, Step to the tick.
+class Player {
+ public:
+  // A joint further than this from its set-point stops the motion.
+  static constexpr double kMaxTrackingError_rad = 0.2;
+
+  Player(int joints, double tick_s, MotionLimits limits);
+
+  // False while a motion runs.
+  bool Load(const trajectory::Trajectory& trajectory);
+  void SetSpeed(double share) { speed_.store(share); }
+  void Command(PlayerCommand command) { command_.store(command); }
+
+  PlayerState state() const { return state_.load(); }
+  StopReason reason() const { return reason_.load(); }
+  std::uint32_t first_tick() const { return first_tick_.load(); }  // of the played part
+  std::uint32_t last_tick() const { return last_tick_.load(); }
+  bool enabled() const { return state() != PlayerState::kDisabled; }
+  bool moving() const { return state() == PlayerState::kBlending || state() == PlayerState::kPlaying; }
+  bool command_pending() const { return command_.load() != PlayerCommand::kNone; }
+
+  // One tick: takes a command, moves the set-point. Context: tick.
+  const SetPoint& Step(std::uint32_t tick, const Eigen::VectorXd& q_measured);
+
+ private:
+  void Obey(PlayerCommand command, const Eigen::VectorXd& q_measured);
+  void Hold(const Eigen::VectorXd& q);
+  void Stop(StopReason reason, const Eigen::VectorXd& q);
+
+  int joints_;
+  double tick_s_;
+  MotionLimits limits_;
+  std::shared_ptr<const trajectory::TrajectorySpline> loaded_, playing_;
+  std::atomic<double> speed_{1.0};
+  std::atomic<PlayerCommand> command_{PlayerCommand::kNone};
+  std::atomic<PlayerState> state_{PlayerState::kDisabled};
+  std::atomic<StopReason> reason_{StopReason::kNone};
+  std::atomic<std::uint32_t> first_tick_{0}, last_tick_{0};
+  SetPoint set_;
+  Eigen::VectorXd blend_from_, blend_to_;
+  double blend_s_ = 0, time_s_ = 0, share_ = 1;
+};
+
+}  // namespace armcal::drive

@@ -1,0 +1,156 @@
+// plant - one tick of the true arm: commands in, motion, heat, readings out; arm_motion.cpp has the equations.
+#include "host_sim/machine/plant/arm.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "codegen/src/io/input_error.hpp"
+
+namespace armcal::plant {
+namespace {
+
+KDL::Vector TiltedGravity(const RobotFile& robot, const Scenario& scenario) {
+  return KDL::Rotation::RPY(scenario.tilt_roll_rad, scenario.tilt_pitch_rad, 0).Inverse(robot.gravity_mps2);
+}
+
+std::optional<AttachedBody> PayloadBody(const RobotFile& robot, const Scenario& scenario) {
+  if (!scenario.payload) return std::nullopt;
+  return AttachedBody{scenario.payload->body, scenario.flange.value_or(robot.tool_frame)};
+}
+
+// A list of one value stands for all joints.
+Eigen::VectorXd PerJoint(const std::vector<double>& values, const Scenario& scenario, const std::string& key, int n) {
+  if (values.size() == 1) return Eigen::VectorXd::Constant(n, values[0]);
+  if (values.size() != static_cast<std::size_t>(n))
+    throw io::InputError(scenario.path + ": " + key + ": expected " + std::to_string(n) + " numbers, one a joint");
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), n);
+}
+
+}  // namespace
+
+Arm::Arm(const Scenario& scenario, const std::string& robot_path)
+    : scenario_(scenario),
+      robot_(ReadRobotFile(robot_path)),
+      truth_(DrawTruth(robot_, scenario.spread, scenario.truth_seed)),
+      noise_(scenario.noise_seed),
+      bare_(robot_, truth_.body, TiltedGravity(robot_, scenario)),
+      laden_(robot_, truth_.body, TiltedGravity(robot_, scenario), PayloadBody(robot_, scenario)),
+      declared_(robot_, truth_.body, robot_.gravity_mps2),
+      effects_(robot_.joint.size()),
+      tick_s_(1 / robot_.tick_rate_Hz),
+      direction_(robot_.joint.size(), 0),
+      stops_(robot_.joint.size(), 0),
+      cut_(robot_.joint.size(), false) {
+  const int n = joints();
+  if (scenario.robot != robot_.name)
+    throw io::InputError(scenario.path + ": robot: expected \"" + robot_.name + "\", the robot of " + robot_path);
+  for (const PlacedJointEffect& placed : scenario.joint_effects) {
+    if (placed.joint >= n)
+      throw io::InputError(scenario.path + ": effect: joint: expected a joint from 1 to " + std::to_string(n));
+    effects_[static_cast<std::size_t>(placed.joint)].push_back(placed);
+  }
+  Eigen::VectorXd rotor(n);
+  for (int j = 0; j < n; ++j) {
+    const JointData& joint = robot_.joint[static_cast<std::size_t>(j)];
+    rotor[j] = joint.gear_ratio * joint.gear_ratio * truth_.rotor_inertia_kgm2[static_cast<std::size_t>(j)];
+    nominal_constant_.push_back(joint.torque_constant_NmpA);
+  }
+  rotors_ = robot_.coupling.transpose() * rotor.asDiagonal() * robot_.coupling;
+  temperature_ = PerJoint(scenario.thermal.start_degC, scenario, "thermal.start_degC", n);
+  rise_KpW_ = PerJoint(scenario.thermal.rise_KpW, scenario, "thermal.rise_KpW", n);
+  warming_time_s_ = PerJoint(scenario.thermal.time_constant_s, scenario, "thermal.time_constant_s", n);
+  friction_ = load_ = command_ = Eigen::VectorXd::Zero(n);
+  const Eigen::VectorXd start =
+      scenario.start_rad.empty() ? Eigen::VectorXd::Zero(n) : PerJoint(scenario.start_rad, scenario, "start_rad", n);
+  ChoosePayload();
+  Place({start.data(), static_cast<std::size_t>(n)});
+}
+
+void Arm::Place(std::span<const double> q) {
+  const int n = joints();
+  if (q.size() != static_cast<std::size_t>(n)) throw std::invalid_argument("plant::Arm::Place: one number a joint");
+  q_ = Eigen::Map<const Eigen::VectorXd>(q.data(), n);
+  qd_ = qdd_ = current_ = Eigen::VectorXd::Zero(n);
+  std::fill(direction_.begin(), direction_.end(), 0);
+  Settle();
+}
+
+void Arm::SetBrakes(bool closed) {
+  brakes_ = closed;
+  if (closed) {
+    qd_.setZero();
+    std::fill(direction_.begin(), direction_.end(), 0);
+  }
+  Settle();
+}
+
+void Arm::Step(std::span<const double> current_command_A, Sensors& out) {
+  const int n = joints();
+  if (current_command_A.size() != static_cast<std::size_t>(n))
+    throw std::invalid_argument("plant::Arm::Step: one current a joint");
+  for (int j = 0; j < n; ++j) {
+    const JointData& joint = robot_.joint[static_cast<std::size_t>(j)];
+    const double wanted = current_command_A[static_cast<std::size_t>(j)];
+    if (!std::isfinite(wanted)) throw std::invalid_argument("plant::Arm::Step: finite currents");
+    const double limit = joint.torque_limit_Nm / (std::abs(joint.gear_ratio) * joint.torque_constant_NmpA);
+    command_[j] = std::clamp(wanted, -limit, limit);
+    cut_[static_cast<std::size_t>(j)] = command_[j] != wanted;
+  }
+  for (int s = 0; s < scenario_.substeps; ++s) Advance(tick_s_ / scenario_.substeps);
+  Warm();
+  time_s_ = static_cast<double>(++ticks_) * tick_s_;
+  if (ChoosePayload()) Settle();
+  Read(out);
+}
+
+void Arm::Read(Sensors& out) {
+  const std::size_t n = robot_.joint.size();
+  out.counts.resize(n), out.current_lsb.resize(n), out.temperature_degC.resize(n), out.saturated.resize(n);
+  const Eigen::VectorXd motor = robot_.coupling * q_;
+  for (std::size_t j = 0; j < n; ++j) {
+    const JointData& joint = robot_.joint[j];
+    const Eigen::Index i = static_cast<Eigen::Index>(j);
+    // The file gives noise as joint torque by nominal constants; the sensor makes it as current.
+    const double sigma_A = scenario_.torque_noise_scale * joint.torque_noise_Nm /
+                           (std::abs(joint.gear_ratio) * joint.torque_constant_NmpA);
+    out.counts[j] = EncoderCounts(motor[i], joint.gear_ratio, joint.counts_per_turn, joint.zero_counts);
+    out.current_lsb[j] = CurrentLsb(current_[i] + sigma_A * noise_.Normal(), joint.current_A_per_lsb);
+    out.temperature_degC[j] = temperature_[i] + scenario_.temperature_noise_degC * noise_.Normal();
+    out.saturated[j] = cut_[j] || std::abs(static_cast<int>(out.current_lsb[j])) == 32767;
+  }
+}
+
+Eigen::VectorXd Arm::undeclared_torque_Nm() {
+  Eigen::VectorXd torque = links_->Torque(q_, qd_, qdd_) - declared_.Torque(q_, qd_, qdd_);
+  for (int j = 0; j < joints(); ++j)
+    torque[j] += TorquesAt(j, direction_[static_cast<std::size_t>(j)], q_[j], qd_[j], false).undeclared;
+  return torque;
+}
+
+Eigen::VectorXd Arm::JointTorque(const Eigen::VectorXd& current, const std::vector<double>& constant) const {
+  Eigen::VectorXd motor(joints());
+  for (int j = 0; j < joints(); ++j)
+    motor[j] =
+        robot_.joint[static_cast<std::size_t>(j)].gear_ratio * constant[static_cast<std::size_t>(j)] * current[j];
+  return robot_.coupling.transpose() * motor;
+}
+
+void Arm::Warm() {
+  for (int j = 0; j < joints(); ++j) {
+    const std::size_t k = static_cast<std::size_t>(j);
+    const JointTorques t = TorquesAt(j, direction_[k], q_[j], qd_[j], false);
+    const double power_W = (direction_[k] * t.dry + t.drag) * qd_[j];
+    const double target = scenario_.thermal.ambient_degC + rise_KpW_[j] * power_W;
+    temperature_[j] += (target - temperature_[j]) * tick_s_ / warming_time_s_[j];
+  }
+}
+
+bool Arm::ChoosePayload() {
+  const bool on = scenario_.payload && time_s_ >= scenario_.payload->from_s && time_s_ < scenario_.payload->until_s;
+  Dynamics* before = std::exchange(links_, on ? &laden_ : &bare_);
+  return links_ != before;
+}
+
+}  // namespace armcal::plant

@@ -1,0 +1,110 @@
+// plant - the arm as it really is: true bodies, real stiction, motors and sensors; knows no model, filter or drive.
+//
+// Motion:  C^T tau_motor = M(q) qdd + h(q, qd) + friction + undeclared torque, M with rotors (gyroscopic part
+// neglected). Friction is Coulomb + viscous with true stiction: a resting joint is a constraint until the torque needed
+// to hold it exceeds its breakaway level, and a moving joint whose speed passes zero stops first. Motor current follows
+// its command by a first-order lag (exact between ticks); commands are held over a tick and cut to the current limit,
+// torque limit / (gear ratio x nominal torque constant).
+// Timing: Step holds a command over one tick; at the tick's END encoder, current and temperature are read at the same
+// instant. The current is not averaged over the tick, so reading and motion (q, qd, qdd) belong together exactly;
+// whoever averages counts and current over the same ticks keeps that.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "host_sim/machine/plant/dynamics.hpp"
+#include "host_sim/machine/plant/random.hpp"
+#include "host_sim/machine/plant/scenario.hpp"
+#include "host_sim/machine/plant/sensors.hpp"
+
+namespace armcal::plant {
+
+// Not thread-safe. Shapes [n]; joint side, rad (m), N m (N) unless a name says otherwise.
+class Arm {
+ public:
+  // Starts at rest in the scenario's start pose, without current, brakes open. Throws io::InputError when the scenario
+  // is for another robot or does not fit it.
+  Arm(const Scenario& scenario, const std::string& robot_path);
+
+  // Puts the arm to rest in another pose, without current.
+  void Place(std::span<const double> q);
+  // Closed brakes hold every joint whatever the torque (moving joints stop at once). Current still flows.
+  void SetBrakes(bool closed);
+  // One tick with current_command_A [n] (motor side, amperes) held; then reads the sensors. Throws
+  // std::invalid_argument for another size or a number that is not finite.
+  void Step(std::span<const double> current_command_A, Sensors& out);
+  // The sensors now (with fresh noise); Step calls it.
+  void Read(Sensors& out);
+
+  int joints() const { return robot_.joints(); }
+  double tick_s() const { return tick_s_; }
+  double time_s() const { return time_s_; }
+  const RobotFile& robot() const { return robot_; }
+  const Truth& truth() const { return truth_; }
+
+  // The truth at this instant.
+  const Eigen::VectorXd& q() const { return q_; }
+  const Eigen::VectorXd& qd() const { return qd_; }
+  const Eigen::VectorXd& qdd() const { return qdd_; }
+  const Eigen::VectorXd& temperature_degC() const { return temperature_; }
+  bool at_rest(int joint) const { return direction_[static_cast<std::size_t>(joint)] == 0; }
+  // Torque that the motors really give, in joint coordinates.
+  Eigen::VectorXd torque_Nm() const { return JointTorque(current_, truth_.torque_constant_NmpA); }
+  // What the current sensor of this instant would read without noise and steps, as joint torque by NOMINAL constants.
+  Eigen::VectorXd measured_torque_truth_Nm() const { return JointTorque(current_, nominal_constant_); }
+  // Torque that Coulomb and viscous friction and joint effects take; at rest: what friction holds plus position
+  // torques.
+  const Eigen::VectorXd& friction_torque_Nm() const { return friction_; }
+  // Torque of everything undeclared, payload and base tilt included; friction-like effects count while moving only.
+  Eigen::VectorXd undeclared_torque_Nm();
+
+ private:
+  // The torque of one joint at one instant, split by what it does.
+  struct JointTorques {
+    double dry = 0;         // level of dry friction against the direction of motion, not below 0
+    double drag = 0;        // viscous friction and drag
+    double position = 0;    // torque by position
+    double undeclared = 0;  // the share of effects, signed
+  };
+  JointTorques TorquesAt(int joint, int direction, double q, double qd, bool breaking_loose) const;
+  void FormDynamics(const Eigen::VectorXd& q, const Eigen::VectorXd& qd);
+  void Accelerate(const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& current,
+                  Eigen::VectorXd& qdd);
+  void Settle();
+  void Advance(double duration_s);
+  void Warm();
+  bool ChoosePayload();  // true when the load at the flange changed
+  Eigen::VectorXd JointTorque(const Eigen::VectorXd& current, const std::vector<double>& constant) const;
+  Eigen::VectorXd CurrentAfter(double duration_s) const;
+
+  Scenario scenario_;
+  RobotFile robot_;
+  Truth truth_;
+  Random noise_;
+  Dynamics bare_, laden_, declared_;  // laden: with the payload; declared: without payload and tilt
+  Dynamics* links_ = &bare_;
+  std::vector<std::vector<PlacedJointEffect>> effects_;  // by joint
+  std::vector<double> nominal_constant_;
+  Eigen::MatrixXd rotors_;  // C^T diag(N^2 J) C
+  Eigen::VectorXd rise_KpW_, warming_time_s_;
+  double tick_s_ = 0.001, time_s_ = 0;
+  long long ticks_ = 0;
+  bool brakes_ = false;
+
+  Eigen::VectorXd q_, qd_, qdd_, current_, command_, temperature_, friction_, load_;
+  std::vector<int> direction_;  // of a moving joint, -1 or +1; 0: the joint rests
+  std::vector<int> stops_;      // of this integration step; a joint that stopped twice rests until its end
+  std::vector<bool> cut_;       // command was cut in this tick
+
+  // Work space of the equations of motion.
+  Eigen::MatrixXd link_mass_, mass_, constrained_;
+  Eigen::VectorXd bias_, drive_, right_, middle_q_, middle_qd_, middle_qdd_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+};
+
+}  // namespace armcal::plant

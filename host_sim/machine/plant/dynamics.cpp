@@ -1,0 +1,60 @@
+// plant - KDL chains from DH rows and bodies about their centres.
+#include "host_sim/machine/plant/dynamics.hpp"
+
+namespace armcal::plant {
+namespace {
+
+// Each segment ends in its own link frame (its joint turns about, or slides along, that frame's z axis), so bodies are
+// handed to KDL in the frame in which the robot file gives them.
+KDL::Chain MakeChain(const RobotFile& robot, const std::vector<Body>& bodies,
+                     const std::optional<AttachedBody>& payload) {
+  KDL::Chain chain;
+  KDL::Frame before = robot.base_frame;
+  for (std::size_t k = 0; k < robot.joint.size(); ++k) {
+    const JointData& joint = robot.joint[k];
+    const KDL::Frame at_zero =
+        before * KDL::Frame::DH_Craig1989(joint.a_m, joint.alpha_rad, joint.d_m, joint.theta_rad);
+    KDL::RigidBodyInertia inertia = ToKdl(bodies[k]);
+    if (payload && k + 1 == robot.joint.size()) inertia = inertia + payload->frame * ToKdl(payload->body);
+    const auto kind = joint.prismatic ? KDL::Joint::TransAxis : KDL::Joint::RotAxis;
+    chain.addSegment(
+        KDL::Segment(joint.name, KDL::Joint(joint.name, at_zero.p, at_zero.M.UnitZ(), kind), at_zero, inertia));
+    before = KDL::Frame::Identity();
+  }
+  return chain;
+}
+
+}  // namespace
+
+Dynamics::Dynamics(const RobotFile& robot, const std::vector<Body>& bodies, const KDL::Vector& gravity_mps2,
+                   const std::optional<AttachedBody>& payload)
+    : chain_(MakeChain(robot, bodies, payload)),
+      mass_solver_(chain_, gravity_mps2),
+      torque_solver_(chain_, gravity_mps2),
+      no_wrench_(chain_.getNrOfSegments(), KDL::Wrench::Zero()),
+      q_(chain_.getNrOfJoints()),
+      qd_(chain_.getNrOfJoints()),
+      qdd_(chain_.getNrOfJoints()),
+      torque_(chain_.getNrOfJoints()),
+      mass_(chain_.getNrOfJoints()) {}
+
+void Dynamics::MassAndBias(const Eigen::VectorXd& q, const Eigen::VectorXd& qd, Eigen::MatrixXd& mass,
+                           Eigen::VectorXd& bias) {
+  q_.data = q;
+  qd_.data = qd;
+  qdd_.data.setZero();
+  mass_solver_.JntToMass(q_, mass_);
+  torque_solver_.CartToJnt(q_, qd_, qdd_, no_wrench_, torque_);
+  mass = mass_.data;
+  bias = torque_.data;
+}
+
+Eigen::VectorXd Dynamics::Torque(const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd) {
+  q_.data = q;
+  qd_.data = qd;
+  qdd_.data = qdd;
+  torque_solver_.CartToJnt(q_, qd_, qdd_, no_wrench_, torque_);
+  return torque_.data;
+}
+
+}  // namespace armcal::plant

@@ -1,0 +1,71 @@
+// plant - what a scenario file says: which arm, how its truth is drawn, what nobody declared; computes no motion.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_sim/machine/plant/dynamics.hpp"
+#include "host_sim/machine/plant/joint_effects.hpp"
+#include "host_sim/machine/plant/truth.hpp"
+
+namespace armcal::plant {
+
+// One undeclared effect, for a report: kind as in the scenario, joint "3", "flange" or "base".
+struct Undeclared {
+  std::string kind;
+  std::string joint;
+};
+
+struct PlacedJointEffect {
+  std::string kind;
+  int joint = 0;  // 0-based
+  std::shared_ptr<const JointEffect> effect;
+  double from_s = 0;  // it is not there before
+};
+
+// A body clamped to the flange from one time to another.
+struct PayloadStep {
+  Body body;  // in flange axes
+  double from_s = 0;
+  double until_s = 0;  // infinity: it stays
+};
+
+// Joint temperature by friction power P: T' = (ambient + rise P - T) / time constant. One entry a joint, or one for
+// all.
+struct Thermal {
+  double ambient_degC = 25;
+  std::vector<double> start_degC{25};
+  std::vector<double> rise_KpW{0.02};
+  std::vector<double> time_constant_s{1200};
+};
+
+struct Scenario {
+  std::string path, title, robot;
+  std::uint64_t truth_seed = 1, noise_seed = 1;
+  Spread spread;
+  Thermal thermal;
+  double stick_ratio = 1;  // breakaway level / Coulomb level
+  double current_time_constant_s = 0.001;
+  int substeps = 4;                      // integration steps a tick
+  double torque_noise_scale = 1;         // x the robot file's torque noise
+  double temperature_noise_degC = 0.05;  // standard deviation of a reading
+  std::vector<double> start_rad;         // empty: zero pose
+  std::optional<KDL::Frame> flange;      // instead of the robot file's tool frame
+  std::vector<PlacedJointEffect> joint_effects;
+  std::optional<PayloadStep> payload;
+  double tilt_roll_rad = 0, tilt_pitch_rad = 0;  // of the true base against the declared one
+
+  bool tilted() const { return tilt_roll_rad != 0 || tilt_pitch_rad != 0; }
+  // Kind and joint of everything that the robot file does not know of: joint effects in the file's order, then flange
+  // and base.
+  std::vector<Undeclared> undeclared() const;
+};
+
+// Throws io::InputError (file, key, what was expected); unknown keys are refused. Whether joint numbers and list
+// lengths fit the robot is judged by Arm, which knows it.
+Scenario ReadScenario(const std::string& path);
+
+}  // namespace armcal::plant

@@ -1,0 +1,163 @@
+// survey - the loop over draws.
+#include "host_sim/study/survey/draws.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "host_sim/identify/search/parallel.hpp"
+#include "host_sim/study/survey/platform.hpp"
+
+namespace armcal::survey {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kSurveyStart = 1;  // qs in rad/s where the survey's own filters start, which it does not print
+// Standard deviations of DrawStribeck's draws, relative to what is believed before.
+constexpr double kLogSpeed = 0.4, kBreakaway = 0.46;
+constexpr std::uint64_t kStride = 1000003;  // between the seeds of one run and the next
+
+std::uint64_t SeedOf(std::uint64_t seed, int draw, int purpose) {
+  return seed * kStride + static_cast<std::uint64_t>(draw) * 16 + static_cast<std::uint64_t>(purpose);
+}
+
+// The survey's recursions know no CAD; what they start from is their own.
+bool KnowsNothing(const std::string& method) { return method == "extended_kalman" || method == "forgetting"; }
+
+calibration::Problem ProblemFor(const std::string& method, const codegen::Model& prior, const calibration::Dataset& log,
+                                const DrawSettings& draws, const VectorXd& sigma) {
+  calibration::Problem p = WithPrior(prior, {&log}, RelativeDeviation(draws.prior));
+  p.sigma_Nm = sigma;
+  p.seed = draws.seed;
+  if (draws.random_truth)  // as wide as the draw: Fs / Fc in 1.1 .. 1.5 and qs in 0.05 .. 0.2 rad/s
+    for (int i = 0; i < p.start.size(); ++i) {
+      const bool eta = i >= prior.columns();
+      if (!eta && (prior.is_rigid(i) || prior.table()[prior.table_index(i)].effect != "stribeck")) continue;
+      p.covariance(i, i) = std::pow((eta ? kLogSpeed : kBreakaway) * p.start[i], 2);
+      p.lower[i] = 0.3 * p.start[i], p.upper[i] = 3 * p.start[i];
+    }
+  if (KnowsNothing(method))
+    for (int k = 0; k < prior.nonlinear(); ++k) {
+      const int i = prior.columns() + k;
+      p.start[i] = kSurveyStart;
+      p.lower[i] = 1e-3, p.upper[i] = 1e3;
+    }
+  return p;
+}
+
+double Growth(double without, double with) { return (with - without) / without; }
+
+// Of one method on one draw; [0] without noise, [1] with.
+struct Solved {
+  std::optional<Score> score[2];
+  calibration::Solution solution[2];
+  int failed = 0;
+  std::string why;
+};
+
+Solved SolveBoth(const Settings& settings, const DrawSettings& draws, const Truth& truth, const codegen::Model& prior,
+                 const calibration::Dataset& clean, const calibration::Dataset& noisy,
+                 const calibration::Method& method) {
+  Solved out;
+  const VectorXd bodies = calibration::BodyMean(prior);
+  for (int with_noise = 0; with_noise < 2; ++with_noise) {
+    const calibration::Dataset& log = with_noise ? noisy : clean;
+    const VectorXd sigma = truth.sigma_Nm * (with_noise ? 1 : draws.clean_sigma);
+    calibration::Problem problem = ProblemFor(method.name, prior, log, draws, sigma);
+    problem.stop = settings.stop;
+    Attempt attempt = Try(method, problem);
+    if (!attempt.solution) {
+      out.why = attempt.why;
+      return out;
+    }
+    if (!attempt.solution->z.allFinite()) {
+      ++out.failed;
+      out.why = attempt.solution->remark;
+      continue;
+    }
+    out.score[with_noise] = Judge(truth, settings.levels, log.tau, *attempt.solution, bodies);
+    attempt.solution->path.resize(0, 0);
+    out.solution[with_noise] = *std::move(attempt.solution);
+  }
+  return out;
+}
+
+void Append(Solved solved, Outcome& out) {
+  out.failed += solved.failed;
+  if (out.why.empty()) out.why = solved.why;
+  for (int with_noise = 0; with_noise < 2; ++with_noise) {
+    if (!solved.score[with_noise]) continue;
+    (with_noise ? out.noisy : out.clean).push_back(*solved.score[with_noise]);
+    calibration::Solution& first = with_noise ? out.first_noisy : out.first;
+    if (first.z.size() == 0) first = std::move(solved.solution[with_noise]);
+  }
+  if (!solved.score[0] || !solved.score[1]) return;
+  out.delta.push_back(Growth(solved.score[0]->J_e, solved.score[1]->J_e));
+  out.delta_true.push_back(Growth(solved.score[0]->J_true, solved.score[1]->J_true));
+}
+
+}  // namespace
+
+bool Settings::Wants(const std::string& table) const {
+  return tables.empty() || std::find(tables.begin(), tables.end(), table) != tables.end();
+}
+
+std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck) {
+  const excitation::Series& train = law == Law::kStribeck ? motions.nonlinear.series : motions.linear.series;
+  return std::make_unique<Truth>(
+      codegen::Model(Variant(settings.robot, law, Bodies::kStandard, stribeck), settings.records), Sampled(train),
+      Sampled(motions.other));
+}
+
+void ForEachDraw(const Settings& settings, const std::string& what, int count, const std::function<void(int)>& work) {
+  int done = 0;
+  std::mutex line;
+  search::InParallel(count, 0, [&](int d) {
+    if (settings.Stopped()) return;
+    work(d);
+    const std::lock_guard lock(line);
+    settings.progress(what, static_cast<double>(++done) / count);
+  });
+}
+
+std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, const DrawSettings& draws,
+                              const std::vector<std::string>& methods) {
+  const int joints = settings.robot.joints();
+  const std::unique_ptr<Truth> set = MakeTruth(settings, motions, draws.law, SetStribeck(joints));
+  std::vector<std::vector<Solved>> solved(static_cast<std::size_t>(draws.draws));
+  ForEachDraw(settings, LawName(draws.law) + ", " + PriorName(draws.prior), draws.draws, [&](int d) {
+    // What CAD says about friction's Stribeck part is centred on the set values, or, for drawn truths, on their range.
+    Stribeck believed = SetStribeck(joints);
+    std::unique_ptr<Truth> drawn;
+    if (draws.random_truth) {
+      drawn = MakeTruth(settings, motions, draws.law, DrawStribeck(joints, SeedOf(draws.seed, d, 3)));
+      believed = BelievedStribeck(joints);
+    }
+    const Truth& truth = drawn ? *drawn : *set;
+    const codegen::Robot cad = Variant(settings.robot, draws.law, Bodies::kStandard, believed);
+    const codegen::Model prior(DrawPrior(cad, draws.prior, SeedOf(draws.seed, d, 1)), settings.records);
+    const calibration::Dataset clean = Measured(truth.train, truth.tau);
+    const calibration::Dataset noisy =
+        Measured(truth.train, truth.tau + Noise(truth.train.samples(), truth.sigma_Nm, SeedOf(draws.seed, d, 2)));
+    for (const std::string& name : methods) {
+      const calibration::Method& method = calibration::FindMethod(name);
+      Solved one;
+      if (!method.needs_ranges || d < draws.slow_draws)
+        one = SolveBoth(settings, draws, truth, prior, clean, noisy, method);
+      if (d > 0) one.solution[0] = one.solution[1] = {};  // only the first is shown
+      solved[static_cast<std::size_t>(d)].push_back(std::move(one));
+    }
+  });
+  std::vector<Outcome> out;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    const calibration::Method& method = calibration::FindMethod(methods[m]);
+    out.push_back({method.name, method.title, method.equation, {}, {}, {}, {}, {}, {}, 0, ""});
+    for (std::vector<Solved>& of_draw : solved)
+      if (m < of_draw.size()) Append(std::move(of_draw[m]), out.back());
+  }
+  return out;
+}
+
+}  // namespace armcal::survey

@@ -1,0 +1,73 @@
+// survey - methods over draws: fresh prior, fresh noise, fresh truth where asked, with and without noise; knows no
+// table.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "host_sim/study/survey/data_files.hpp"
+#include "host_sim/study/survey/draw.hpp"
+#include "host_sim/study/survey/trajectories.hpp"
+#include "host_sim/study/survey/trial.hpp"
+
+namespace armcal::survey {
+
+struct Settings {
+  codegen::Robot robot;        // its CAD and friction are the set parameters phi_s
+  codegen::Catalogue records;  // as read; Records() is applied by the survey
+  Levels levels;
+  Printed printed;
+  std::string home;      // the folder of codegen/ and host_sim/: channel maps and robots of measured logs
+  std::string measured;  // folder of measured logs; empty: Table 12 on real machines is left out
+  int draws = 200;       // of prior, noise and, where drawn, truth
+  int slow_draws = 5;    // of the methods of (25)
+  std::uint64_t seed = 1;
+  bool cad_feedforward = false;     // the loop's controller knows CAD values instead of the set parameters
+  double search_s = 55;             // of each trajectory search at most: given time, results follow from the seed
+  std::vector<std::string> tables;  // "5" .. "12", "figures"; empty: all
+  const std::atomic<bool>* stop = nullptr;
+  std::function<void(const std::string& what, double share)> progress = [](const std::string&, double) {};
+
+  bool Wants(const std::string& table) const;
+  bool Stopped() const { return stop && *stop; }
+};
+
+// The trajectories that all tables share.
+struct Motions {
+  ExcitedBy linear, nonlinear;
+  std::vector<ExcitedBy> others;  // for the table of trajectories alone
+  excitation::Series other;       // nothing is fitted to it
+};
+
+struct DrawSettings {
+  Law law = Law::kCoulombViscous;
+  PriorError prior;
+  bool random_truth = false;  // qs and Fs / Fc of (4) drawn, too
+  int draws = 20, slow_draws = 5;
+  std::uint64_t seed = 1;
+  double clean_sigma = 1;  // of Table 7's sigma, told to a method for noise-free data
+};
+
+// One method over the draws; entry d of clean and noisy belongs to the same prior.
+struct Outcome {
+  std::string name, title, equation;
+  std::vector<Score> clean, noisy;
+  std::vector<double> delta, delta_true;     // Delta J_e; against noise-free torque of the other motion
+  calibration::Solution first, first_noisy;  // of draw 1, for Tables 5 and 6
+  int failed = 0;                            // solves that gave no finite parameters
+  std::string why;                           // the first failure, or why the method refused
+};
+
+// The Truth of the first draw (all draws, unless random_truth).
+std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck);
+
+// work(0) .. work(count - 1) on all cores, unless stopped, with a line of progress.
+void ForEachDraw(const Settings& settings, const std::string& what, int count, const std::function<void(int)>& work);
+
+// On all cores. The methods of (25) take seconds each and get `slow_draws`.
+std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, const DrawSettings& draws,
+                              const std::vector<std::string>& methods);
+
+}  // namespace armcal::survey

@@ -1,0 +1,89 @@
+// tool - armcal bench: starts the bench program that was compiled for a robot, shows and keeps its ratios; measures
+// nothing itself, so that code compiled with other flags never meets the code that is timed.
+#include <fmt/core.h>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/tool/process.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+namespace {
+
+struct BenchOptions {
+  std::string robot = "er20_like", program, json;
+  bool quick = false;
+};
+
+// Gravity in frame 0, then alpha, a, d, theta and "is prismatic" of every joint.
+std::vector<std::string> Shape(const codegen::Robot& robot) {
+  std::vector<std::string> words;
+  const auto add = [&words](double v) { words.push_back(fmt::format("{:.17g}", v)); };
+  for (int k = 0; k < 3; ++k) {
+    double g = 0;
+    for (int i = 0; i < 3; ++i) g += robot.base_rotation[3 * i + k] * robot.gravity_mps2[i];
+    add(g);
+  }
+  for (const codegen::Joint& joint : robot.joint) {
+    const codegen::JointKinematics& k = joint.kinematics;
+    for (const double v : {k.alpha_rad, k.a_m, k.d_m, k.theta_rad}) add(v);
+    add(k.type == codegen::JointType::kPrismatic ? 1 : 0);
+  }
+  return words;
+}
+
+void Print(const nlohmann::ordered_json& result) {
+  fmt::print("{}: {} columns, {} {}, CPU time of one thread\n\n", result["robot"].get<std::string>(),
+             result["columns"].get<int>(), result["compiler"].get<std::string>(), result["flags"].get<std::string>());
+  for (const auto& t : result["times"])
+    fmt::print("{:>10.1f} ns  {:>9.1f} .. {:<9.1f} {}\n", t["median_ns"].get<double>(), t["min_ns"].get<double>(),
+               t["p90_ns"].get<double>(), t["name"].get<std::string>());
+  fmt::print("\n{:<32}{:>8}{:>8}{:>9}\n", "ratio of medians", "value", "goal", "stretch");
+  for (const auto& r : result["ratios"]) {
+    const bool met = r["met"].get<bool>(), stretched = r["stretch_met"].get<bool>();
+    fmt::print("{:<32}{:>8.4f}{:>8.4f}{:>9.4f}  {}\n", r["name"].get<std::string>(), r["value"].get<double>(),
+               r["goal"].get<double>(), r["stretch"].get<double>(),
+               stretched ? "stretch met"
+               : met     ? "goal met"
+                         : "NOT MET");
+  }
+}
+
+int RunBench(const BenchOptions& o) {
+  namespace fs = std::filesystem;
+  const codegen::Robot robot = codegen::ReadRobot(RobotPath(o.robot));
+  const fs::path program = o.program.empty()
+                               ? fs::read_symlink("/proc/self/exe").parent_path() / ("armcal-bench-" + robot.name)
+                               : fs::path(o.program);
+  if (!fs::is_regular_file(program))
+    throw io::InputError(program.string() + ": no bench program has been built for robot " + robot.name);
+  std::vector<std::string> words{program.string()};
+  if (o.quick) words.push_back("--quick");
+  const auto shape = Shape(robot);
+  words.insert(words.end(), shape.begin(), shape.end());
+  Background bench(words);
+  std::string rest;
+  const int code = bench.Wait(&rest);
+  const auto result = nlohmann::ordered_json::parse(bench.first_line() + rest, nullptr, false);
+  if (code != 0 || result.is_discarded())
+    throw io::InputError(program.string() + ": ended with code " + std::to_string(code) +
+                         "; its model is not that of " + robot.name);
+  Print(result);
+  WriteJson(o.json, result);
+  return kOk;
+}
+
+}  // namespace
+
+void AddBench(CLI::App& app, Action& action) {
+  auto* verb = app.add_subcommand("bench",
+                                  "time the generated model and batch least squares against KDL, the C library and "
+                                  "Eigen\nexample: armcal bench --json build/bench.json");
+  auto o = std::make_shared<BenchOptions>();
+  verb->add_option("--robot", o->robot, "robot file or name")->capture_default_str();
+  verb->add_option("--program", o->program, "bench program (default: the one built for the robot)");
+  verb->add_flag("--quick", o->quick, "few blocks and a short log: to see that it runs");
+  verb->add_option("--json", o->json, "write the ratios and times here");
+  verb->callback([o, &action] { action = [o] { return RunBench(*o); }; });
+}
+
+}  // namespace armcal::tool

@@ -1,0 +1,79 @@
+// tool - connects and checks that drive and model speak of the same table.
+#include "host_sim/tool/connect.hpp"
+
+#include <fmt/core.h>
+#include <charconv>
+#include <set>
+#include <vector>
+
+#include "codegen/src/io/input_error.hpp"
+
+namespace armcal::tool {
+namespace {
+
+// A number from `least` to `most`, and nothing else.
+bool TakeNumber(const std::string& text, int least, int most, int& number) {
+  const char* const end = text.c_str() + text.size();
+  const auto [stopped, error] = std::from_chars(text.c_str(), end, number);
+  return error == std::errc() && stopped == end && number >= least && number <= most;
+}
+
+std::vector<std::string> Parts(const std::string& address) {
+  std::vector<std::string> parts(1);
+  for (const char c : address)
+    if (c == ':') parts.emplace_back();
+    else parts.back() += c;
+  return parts;
+}
+
+bool TakeSerial(const std::vector<std::string>& parts, client::SerialLine& line, int& unit) {
+  static const std::set<int> bauds = {9600, 19200, 38400, 57600, 115200, 230400};
+  line.device = parts[0];
+  if (parts.size() > 1 && !(TakeNumber(parts[1], 1, 230400, line.baud) && bauds.count(line.baud) > 0)) return false;
+  if (parts.size() > 2) {
+    if (parts[2].size() != 1 || std::string("NEO").find(parts[2]) == std::string::npos) return false;
+    line.parity = parts[2][0];
+  }
+  return parts.size() < 4 || (parts.size() == 4 && TakeNumber(parts[3], 1, 247, unit));
+}
+
+}  // namespace
+
+bool IsSerialLine(const std::string& address) { return address.rfind('/', 0) == 0; }
+
+std::pair<std::string, int> HostAndPort(const std::string& address) {
+  const auto colon = address.rfind(':');
+  int port = 0;
+  if (colon == std::string::npos || !TakeNumber(address.substr(colon + 1), 1, 65535, port))
+    throw io::InputError("--connect " + address +
+                         ": expected HOST:PORT, for instance 127.0.0.1:1502, or a serial line, for instance "
+                         "/dev/ttyUSB0:115200");
+  return {address.substr(0, colon), port};
+}
+
+client::DriveClient ConnectTo(const std::string& address) {
+  if (IsSerialLine(address)) {
+    client::SerialLine line;
+    int unit = 1;
+    if (!TakeSerial(Parts(address), line, unit))
+      throw io::InputError("--connect " + address +
+                           ": expected DEVICE[:BAUD[:PARITY[:UNIT]]], for instance /dev/ttyUSB0:115200:E:1; 9600 to "
+                           "230400 baud, parity N, E or O, unit 1 to 247");
+    return client::DriveClient(line, unit);
+  }
+  const auto [host, port] = HostAndPort(address);
+  return client::DriveClient(host, port);
+}
+
+calibration::TableFile LayoutOf(client::DriveClient& drive, const codegen::Model& model) {
+  calibration::TableFile layout = calibration::DefaultTable(model);
+  const client::Identity id = drive.ReadIdentity();
+  if (id.schema != layout.schema)
+    throw client::RefusedError(
+        fmt::format("{}: runs schema {:08X}, robot {} has {:08X}: generate and build the drive for this robot file",
+                    drive.name(), id.schema, model.robot().name, layout.schema),
+        0, core::Status::kWrongSchema);
+  return layout;
+}
+
+}  // namespace armcal::tool

@@ -1,0 +1,24 @@
+// tool - a drive's address and the table layout of the drive that answers there; knows no verb.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "host_sim/client/drive_client.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
+
+namespace armcal::tool {
+
+// What --connect takes: "HOST:PORT", or a serial line "DEVICE[:BAUD[:PARITY[:UNIT]]]" whose device is a path from the
+// root; 115200, E and 1 if left out. Throws io::InputError (form), client::LinkError.
+client::DriveClient ConnectTo(const std::string& address);
+// Its two forms; the second throws io::InputError (form).
+bool IsSerialLine(const std::string& address);
+std::pair<std::string, int> HostAndPort(const std::string& address);
+inline constexpr char kConnectHelp[] = "drive: HOST:PORT, or a serial line as /dev/ttyUSB0[:115200[:E[:1]]]";
+
+// The layout that the drive's schema names: the default table of `model`. Throws client::RefusedError if the drive runs
+// another one.
+calibration::TableFile LayoutOf(client::DriveClient& drive, const codegen::Model& model);
+
+}  // namespace armcal::tool

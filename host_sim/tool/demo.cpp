@@ -1,0 +1,226 @@
+// tool - armcal demo: every stage of the closed loop on the simulated drive, each by the verb that a user would call.
+#include <fmt/core.h>
+
+#include <chrono>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/files.hpp"
+#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
+#include "host_sim/machine/plant/scenario.hpp"
+#include "host_sim/tool/demo_report.hpp"
+#include "host_sim/tool/logs.hpp"
+#include "host_sim/tool/process.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+struct DemoOptions {
+  std::string scenario = "stribeck", out = "build/demo", build = "build/host";
+  int excite_s = 60;
+};
+
+ordered_json ReadJson(const std::string& path) { return ordered_json::parse(files::ReadWholeFile(path)); }
+
+// Whether a confirmed term can be part of a committed model at all.
+bool Flashable(const diagnosis::Finding& finding) {
+  for (const diagnosis::Term& t : finding.terms)
+    if (t.confirmed && t.record->on_target) return true;
+  return false;
+}
+
+class Demo {
+ public:
+  explicit Demo(const DemoOptions& o) : o_(o), tool_(fs::read_symlink("/proc/self/exe").string()) {
+    scenario_ = fs::is_regular_file(o.scenario) ? fs::path(o.scenario)
+                                                : Home() / "host_sim" / "scenarios" / (o.scenario + ".toml");
+    if (!fs::is_regular_file(scenario_))
+      throw io::InputError("scenario " + o.scenario + ": expected a file, or a name in host_sim/scenarios");
+    fs::create_directories(o.out);
+    for (const char* old : {"drive.nor", "truth_1.bin", "truth_2.bin", "result.json", "report.html"})
+      fs::remove(fs::path(o.out) / old);
+  }
+
+  int Run() {
+    const auto begin = std::chrono::steady_clock::now();
+    calibration::WriteTable(File("table_cad.toml"), calibration::DefaultTable(LoadModel(robot_)));
+    Stage("excite: trajectories within the limits");
+    // A fixed number of searches: the run follows from its seeds, not from how busy the machine is.
+    const std::string searches = "40", most_s = std::to_string(o_.excite_s);
+    Verb({"excite", "--robot", robot_, "--purpose", "train", "--seed", "1", "--starts", searches, "--seconds", most_s,
+          "--out", File("train.csv")});
+    Verb({"excite", "--robot", robot_, "--purpose", "test", "--seed", "2", "--starts", searches, "--seconds", most_s,
+          "--out", File("test.csv")});
+    Stage("start the simulated drive; flash the CAD table over Modbus");
+    StartDrive("", "truth_1.bin");
+    Flash("table_cad.toml", robot_, "flash_cad.json");
+    Stage("run and record the training motion; the host's estimator listens to the live trace");
+    ListenAndRecord();  // the first motion after the table was adopted: host and drive start from the same state
+    Stage("run the held-out motion with the CAD table");
+    Record("test.csv", "test_cad", robot_);
+    Stage("identify the declared model, flash it, run the held-out motion");
+    Verb({"identify", "--robot", robot_, "--train", File("train_log.csv.gz"), "--table-out", File("table_before.toml"),
+          "--json", File("identify_before.json")},
+         "identify_before.txt");
+    Flash("table_before.toml", robot_, "flash_before.json");
+    Record("test.csv", "test_before", robot_);
+    Stage("diagnose: what does the model lack?");
+    const auto run = RunDiagnosis({robot_,
+                                   "",
+                                   File("test_before.csv.gz"),
+                                   File("verdict.json"),
+                                   "",
+                                   File("new_model.toml"),
+                                   {File("train_log.csv.gz")}});
+    ordered_json result = run->json;
+    std::string path = "nothing was found, so the identified table stays";
+    std::string final_robot = robot_, final_flash = "flash_before.json";
+    bool confirmed = false;
+    for (const auto& t : result["terms"]) confirmed = confirmed || t["confirmed"].get<bool>();
+    std::string after_truth = "truth_1.bin";
+    if (confirmed) {
+      final_robot = File("new_model.toml");
+      Stage("fit the model with the effect");
+      Verb({"identify", "--robot", final_robot, "--train", File("train_log.csv.gz"), "--table-out",
+            File("table_after.toml"), "--json", File("identify_after.json")},
+           "identify_after.txt");
+      if (result["model"]["by_table"].get<bool>()) {
+        path = Flashable(run->diagnosis->finding())
+                   ? "the effect was compiled in and on standby; a table switched it on"
+                   : "no model can hold what was found; the table stays without it";
+      } else {
+        Stage("generate the new model, build the drive with it, restart it");
+        BuildDrive(final_robot);
+        drive_.reset();
+        StartDrive((fs::path(o_.build) / "armcal-drive-demo").string(), "truth_2.bin", final_robot);
+        after_truth = "truth_2.bin";
+        path =
+            "the model was generated anew, the drive built with it, restarted and flashed; values carried over by name";
+      }
+      Stage("flash the table, verify it, run the held-out motion again");
+      Flash("table_after.toml", final_robot, "flash_after.json");
+      Verb({"verify", "--connect", address_, "--robot", final_robot, "--table", File("table_after.toml")});
+      final_flash = "flash_after.json";
+    } else {
+      Stage("run the held-out motion again");
+    }
+    Record("test.csv", "test_after", final_robot);
+    drive_.reset();
+
+    // The verdict is written; now the truth may be read.
+    const plant::Scenario scenario = plant::ReadScenario(scenario_.string());
+    result["title"] = scenario.title;
+    result["undeclared"] = ordered_json::array();
+    for (const auto& u : scenario.undeclared()) {
+      ordered_json joint = u.joint;
+      if (!u.joint.empty() && u.joint.find_first_not_of("0123456789") == std::string::npos) joint = std::stoi(u.joint);
+      result["undeclared"].push_back({{"kind", u.kind}, {"joint", joint}});
+    }
+    const ordered_json cad = ReadJson(File("test_cad.json")), before = ReadJson(File("test_before.json")),
+                       after = ReadJson(File("test_after.json"));
+    result["plant_floor"] =
+        verdict::ToList(PlantFloor(File("truth_1.bin"), run->test, before["first_tick"], before["decimation"]));
+    const LogReader read(*run->model, "");
+    result["plant_floor_after_run"] = verdict::ToList(
+        PlantFloor(File(after_truth), read.One(File("test_after.csv.gz")), after["first_tick"], after["decimation"]));
+    result["drive_cad"] = cad["drive_residual_rms_Nm"], result["drive_before"] = before["drive_residual_rms_Nm"],
+    result["drive_after"] = after["drive_residual_rms_Nm"];
+    result["tracking_cad_rad"] = cad["tracking_rms_rad"], result["tracking_before_rad"] = before["tracking_rms_rad"],
+    result["tracking_after_rad"] = after["tracking_rms_rad"];
+    const ordered_json flashed = ReadJson(File(final_flash)), estimate = ReadJson(File("estimate.json"));
+    result["table_crc"] = flashed["table_crc"], result["readback_ok"] = flashed["readback_ok"];
+    result["estimate_same_bits"] = estimate["same_bits"];
+    result["path"] = path;
+    result["stages"] = stages_;
+    result["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    WriteJson(File("result.json"), result);
+    WriteDemoPage(File("report.html"), result, run->view);
+    fmt::print("{}\nresult: {}\nreport: {}\n", DemoText(result), File("result.json"), File("report.html"));
+    return kOk;
+  }
+
+ private:
+  std::string File(const std::string& name) const { return (fs::path(o_.out) / name).string(); }
+  void Stage(const std::string& text) {
+    stages_.push_back(text);
+    fmt::print("\n== {}. {}\n", stages_.size(), text);
+    std::fflush(stdout);
+  }
+  void Verb(std::vector<std::string> words, const std::string& log = "") {
+    std::string line = "armcal";
+    for (const std::string& w : words) line += " " + w;
+    fmt::print("$ {}\n", line);
+    std::fflush(stdout);
+    words.insert(words.begin(), tool_);
+    const int code = RunProgram(words, log.empty() ? "" : File(log));
+    if (code != 0)
+      throw io::InputError(line + ": ended with code " + std::to_string(code) +
+                           (log.empty() ? "" : ", see " + File(log)));
+  }
+  void StartDrive(const std::string& program, const std::string& truth, const std::string& robot = "") {
+    std::vector<std::string> words{
+        tool_,    "simulate", "--scenario", scenario_.string(), "--robot",     robot.empty() ? robot_ : robot,
+        "--port", "0",        "--storage",  File("drive.nor"),  "--truth-log", File(truth)};
+    if (!program.empty()) words.insert(words.end(), {"--drive", program});
+    drive_ = std::make_unique<Background>(words);
+    fmt::print("{}\n", drive_->first_line());
+    address_ = drive_->first_line().substr(drive_->first_line().rfind(' ') + 1);
+  }
+  void Flash(const std::string& table, const std::string& robot, const std::string& json) {
+    Verb({"flash", "--connect", address_, "--robot", robot, "--table", File(table), "--json", File(json)});
+  }
+  void Record(const std::string& trajectory, const std::string& name, const std::string& robot) {
+    Verb({"record", "--connect", address_, "--robot", robot, "--trajectory", File(trajectory), "--out",
+          File(name + ".csv.gz"), "--samples", File(name + "_samples.csv.gz"), "--json", File(name + ".json")});
+  }
+  void ListenAndRecord() {
+    Background estimate({tool_, "estimate", "--connect", address_, "--robot", robot_, "--json", File("estimate.json"),
+                         "--records", File("estimate.bin")});
+    Verb({"record", "--connect", address_, "--robot", robot_, "--trajectory", File("train.csv"), "--out",
+          File("train_log.csv.gz"), "--json", File("train.json")});
+    std::string output;
+    const int code = estimate.Wait(&output);
+    files::WriteWholeFile(File("estimate.txt"), output);
+    const auto last = output.rfind('\n', output.size() - 2);
+    fmt::print("{}", output.substr(last == std::string::npos ? 0 : last + 1));
+    if (code != 0)
+      throw io::InputError("armcal estimate ended with code " + std::to_string(code) + ", see " + File("estimate.txt"));
+  }
+  void BuildDrive(const std::string& robot) {
+    Verb({"generate", "--robot", robot, "--out", File("generated")});
+    const std::string folder = fs::absolute(File("generated")).string();
+    const std::vector<std::vector<std::string>> commands{
+        {"cmake", "-S", Home().string(), "-B", o_.build, "-DARMCAL_MODEL=" + folder, "-DARMCAL_MODEL_NAME=demo"},
+        {"cmake", "--build", o_.build, "--target", "armcal-drive-demo"}};
+    for (const auto& c : commands)
+      if (RunProgram(c, File("build.txt")) != 0)
+        throw io::InputError("building the drive failed, see " + File("build.txt"));
+  }
+
+  DemoOptions o_;
+  std::string tool_, robot_ = "er20_like", address_;
+  fs::path scenario_;
+  std::unique_ptr<Background> drive_;
+  std::vector<std::string> stages_;
+};
+
+}  // namespace
+
+void AddDemo(CLI::App& app, Action& action) {
+  auto* verb = app.add_subcommand("demo",
+                                  "close the loop on the simulated drive: measure, find what is missing, add it, flash "
+                                  "it, measure again\nexample: armcal demo --scenario ripple");
+  auto o = std::make_shared<DemoOptions>();
+  verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->capture_default_str();
+  verb->add_option("--out", o->out, "folder for everything that is made")->capture_default_str();
+  verb->add_option("--build", o->build, "build folder in which a drive with a new model is built")
+      ->capture_default_str();
+  verb->add_option("--excite-seconds", o->excite_s, "at most, for each search of a trajectory")->capture_default_str();
+  verb->callback([o, &action] { action = [o] { return Demo(*o).Run(); }; });
+}
+
+}  // namespace armcal::tool

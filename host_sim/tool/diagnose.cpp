@@ -1,0 +1,148 @@
+// tool - armcal diagnose: logs -> what the model lacks, decided on train, judged on test.
+#include <fmt/core.h>
+#include <algorithm>
+#include <chrono>
+
+#include "codegen/src/generator/emit.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/files.hpp"
+#include "host_sim/data/report/table.hpp"
+#include "host_sim/diagnose/diagnosis/model_file.hpp"
+#include "host_sim/diagnose/verdict/diagnosis_words.hpp"
+#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/tool/diagnose_batch.hpp"
+#include "host_sim/tool/logs.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+
+namespace {
+
+void Print(const DiagnosisRun& run, const DiagnoseOptions& o) {
+  const nlohmann::ordered_json& json = run.json;
+  fmt::print("{}", verdict::DiagnosisText(run.view));
+  report::Table table{
+      {"joint", "before", "after", "before, moving", "after, moving", "noise floor", "smallest effect seen"}, {}};
+  for (int j = 0; j < run.model->joints(); ++j) {
+    std::vector<std::string> row{std::to_string(j + 1)};
+    for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor", "smallest_detectable"})
+      row.push_back(fmt::format("{:.4g}", json[key][j].get<double>()));
+    table.rows.push_back(row);
+  }
+  fmt::print("held out: {}, RMS of measured minus predicted torque\n{}", o.test, report::Text(table));
+  if (!o.model_out.empty() && !run.view.finding->terms.empty()) {
+    const bool held = std::any_of(json["terms"].begin(), json["terms"].end(),
+                                  [](const auto& t) { return t["in_model"].template get<bool>(); });
+    fmt::print("new model: {} ({})\n", o.model_out,
+               !held                                   ? "with what was found as comments: no model can hold it"
+               : json["model"]["by_table"].get<bool>() ? "a table switches it on"
+                                                       : "generate it and build the drive anew");
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
+  auto run = std::make_unique<DiagnosisRun>();
+  run->catalogue = LoadCatalogue();
+  run->model = std::make_unique<codegen::Model>(codegen::ReadRobot(RobotPath(o.robot)), run->catalogue);
+  const codegen::Model& model = *run->model;
+  const LogReader read(model, o.channels, o.cutoff_Hz);
+  run->train = read.All(o.train);
+  const std::vector<calibration::Dataset> narrow = read.Narrow(o.train);
+  const auto start = std::chrono::steady_clock::now();
+  run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, calibration::Pointers(run->train),
+                                                          calibration::Pointers(narrow));
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const diagnosis::Finding& finding = run->diagnosis->finding();
+
+  Eigen::VectorXd z(model.columns() + model.nonlinear());
+  z << finding.x.head(model.columns()), Eigen::VectorXd::Map(finding.declared.eta.data(), model.nonlinear());
+  const calibration::Exogeneity exogeneity =
+      calibration::CheckExogeneity(model, run->diagnosis->WithoutTerms(), z, calibration::Instruments::kCommanded);
+
+  // The model is written, and its hash taken, before the held-out log is opened.
+  std::string provenance = "Train:", model_hash;
+  for (const std::string& p : o.train)
+    provenance +=
+        " " + std::filesystem::path(p).filename().string() + " (sha256 " + files::FileHash(p).substr(0, 16) + ")";
+  const std::string before_test = diagnosis::ModelFile(model, finding, provenance);
+  if (!o.model_out.empty()) {
+    files::WriteWholeFile(o.model_out, before_test);
+    model_hash = files::FileHash(o.model_out);
+  }
+  run->test = read.One(o.test);
+  run->held_out = run->diagnosis->Judge(run->test);
+  const std::string after_test = diagnosis::ModelFile(model, finding, provenance);
+  if (!o.model_out.empty() && after_test != before_test)
+    files::WriteWholeFile(o.model_out, after_test);  // what was not confirmed is taken out
+
+  run->view = {&model,  &finding,   &run->test, &run->held_out, run->diagnosis->TermTorque(run->test),
+               seconds, exogeneity, {}};
+  for (const diagnosis::Term& t : finding.terms)
+    run->view.separation.push_back(verdict::Separations(t, finding, model, run->catalogue, o.robot, o.json));
+  nlohmann::ordered_json& json = run->json;
+  json = verdict::DiagnosisJson(run->view);
+  json["provenance"] = provenance;
+  for (const calibration::Dataset& log : run->train) json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
+  if (!o.model_out.empty()) {
+    // The same schema: a table can switch the terms on. Another one: the model must be generated and the drive built.
+    const codegen::Model next(codegen::ReadRobot(o.model_out), run->catalogue);
+    json["model"] = {{"file", o.model_out},
+                     {"sha256_before_test", model_hash},
+                     {"schema", codegen::Schema(next)},
+                     {"by_table", codegen::Schema(next) == codegen::Schema(model)}};
+  }
+  Print(*run, o);
+  WriteJson(o.json, json);
+  return run;
+}
+
+namespace {
+
+int RunOneDiagnosis(const DiagnoseOptions& o) {
+  if (o.robot.empty() || o.train.empty() || o.test.empty())
+    throw io::InputError("expected --robot, --train and --test, or --batch, or --splits, or --summary");
+  const auto run = RunDiagnosis(o);
+  if (!o.report.empty()) {
+    report::Page page("What the model of " + run->model->robot().name + " lacks",
+                      "Declared model fitted to the training logs, terms chosen there, error on a held-out log.");
+    verdict::AddDiagnosis(page, run->view);
+    page.Section("Provenance");
+    page.Facts({{"robot", run->model->robot().title},
+                {"training", run->json["provenance"]},
+                {"held out", o.test},
+                {"search", fmt::format("{:.1f} s", run->view.seconds)}});
+    page.Write(o.report);
+    fmt::print("report: {}\n", o.report);
+  }
+  return kOk;
+}
+
+}  // namespace
+
+void AddDiagnose(CLI::App& app, Action& action) {
+  auto* verb = app.add_subcommand(
+      "diagnose",
+      "find what the model lacks: residual, cause, new model, error before and after\nexample: armcal diagnose --robot "
+      "er20_like --train train.csv.gz --test test.csv.gz --json out.json --report out.html --model-out new.toml\n"
+      "example, many logs: armcal diagnose --batch logs --robot er20_like --out verdicts --json all.json --report "
+      "all.html\nexample, which terms hold whatever run is held out: armcal diagnose --robot kuka_lwr4 --splits "
+      "run1.csv,run2.csv run3.csv --out splits");
+  auto o = std::make_shared<DiagnoseOptions>();
+  verb->add_option("--robot", o->robot, "robot file or name");
+  verb->add_option("--train", o->train, "log(s) on which everything is decided");
+  verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
+  verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  AddCutoff(*verb, o->cutoff_Hz);
+  verb->add_option("--json", o->json, "write the verdict here");
+  verb->add_option("--report", o->report, "write a self-contained page here");
+  verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");
+  auto batch = std::make_shared<BatchOptions>();
+  AddBatchOptions(*verb, *batch);
+  verb->callback([o, batch, &action] {
+    action = [o, batch] { return batch->asked() ? RunBatch(*o, *batch) : RunOneDiagnosis(*o); };
+  });
+}
+
+}  // namespace armcal::tool

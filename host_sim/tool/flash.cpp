@@ -1,0 +1,129 @@
+// tool - armcal flash: a table file into the drive, by name; armcal verify: is this table in force.
+#include <fmt/core.h>
+#include <algorithm>
+#include <cmath>
+
+#include "armcal/core/crc.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/table_flash.hpp"
+#include "host_sim/data/report/progress.hpp"
+#include "host_sim/tool/connect.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+namespace {
+
+struct FlashOptions {
+  std::string connect, robot, table, json;
+  bool force = false, dry_run = false;
+};
+
+// The words that the file means for this drive. Parameters that the data hardly determined keep the drive's value
+// unless forced.
+std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptions& o, calibration::TableFile& sent,
+                                    std::vector<std::string>& missing) {
+  const codegen::Model model = LoadModel(o.robot);
+  const calibration::TableFile layout = LayoutOf(drive, model), file = calibration::ReadTable(o.table);
+  if (file.joint.size() != layout.joint.size())
+    throw io::InputError(
+        fmt::format("{}: {} joints, the drive has {}", o.table, file.joint.size(), layout.joint.size()));
+  const calibration::TableFile active = calibration::DecodeTable(client::ReadActiveTable(drive), layout);
+  sent = active;
+  missing = calibration::CarryOver(file, sent);
+  std::copy(std::begin(file.forgetting), std::end(file.forgetting), sent.forgetting);
+  sent.bumpless = file.bumpless;
+  sent.blend_ms = file.blend_ms;
+  for (std::size_t k = 0; k < sent.row.size(); ++k) {
+    calibration::TableRow& row = sent.row[k];
+    if (!row.from_prior || static_cast<int>(k) < model.body_parameters()) continue;  // bodies are one physical set
+    row.mean = o.force ? row.free_mean : active.row[k].mean;
+  }
+  return calibration::EncodeTable(sent);
+}
+
+int Flash(const FlashOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  calibration::TableFile sent;
+  std::vector<std::string> missing;
+  const auto words = WordsFor(drive, o, sent, missing);
+  for (const std::string& name : missing) fmt::print("not in {}, kept as in the drive: {}\n", o.table, name);
+  int kept = 0;
+  for (const auto& row : sent.row) kept += row.from_prior;
+  if (kept)
+    fmt::print("{} of {} parameters rest on the prior{}\n", kept, sent.row.size(),
+               o.force ? " (forced)" : "; friction and effects among them keep the drive's value");
+  if (o.dry_run) {
+    fmt::print("dry run: {} registers would be sent, nothing was\n", words.size());
+    return kOk;
+  }
+  client::FlashReport report;
+  {
+    report::Progress progress("flash");
+    report = client::FlashTable(drive, words, [&](double share) { progress.Set(share); });
+  }
+  fmt::print("{}: {} registers stored, adopted and read back: CRC {:08X}, generation {}, store sequence {}\n",
+             drive.name(), words.size(), report.crc, report.generation, report.store_sequence);
+  WriteJson(o.json, {{"table_crc", fmt::format("{:08X}", report.crc)},
+                     {"readback_ok", true},
+                     {"generation", report.generation},
+                     {"store_sequence", report.store_sequence},
+                     {"registers", words.size()},
+                     {"from_prior", kept}});
+  return kOk;
+}
+
+int Verify(const FlashOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  calibration::TableFile wanted;
+  std::vector<std::string> missing;
+  const auto words = WordsFor(drive, o, wanted, missing);
+  const auto active = client::ReadActiveTable(drive);
+  const calibration::TableFile is = calibration::DecodeTable(active, wanted);
+  int differ = 0;
+  for (std::size_t k = 0; k < is.row.size(); ++k)
+    if (static_cast<float>(is.row[k].mean) != static_cast<float>(wanted.row[k].mean) ||
+        is.row[k].state != wanted.row[k].state) {
+      ++differ;
+      fmt::print("{}: drive {:.9g} {}, file {:.9g} {}\n", is.row[k].name, is.row[k].mean, is.row[k].state,
+                 wanted.row[k].mean, wanted.row[k].state);
+    }
+  const bool same = active == words;
+  fmt::print("{}: {}\n", drive.name(),
+             same ? "the table in force is this file's"
+                  : fmt::format("differs in {} parameters{}", differ, differ ? "" : " (joint settings or flags)"));
+  WriteJson(o.json, {{"same", same}, {"differ", differ}});
+  return same ? kOk : kMismatch;
+}
+
+CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std::shared_ptr<FlashOptions>& o) {
+  auto* verb = app.add_subcommand(name, help);
+  verb->add_option("--connect", o->connect, kConnectHelp)->required();
+  verb->add_option("--robot", o->robot, "robot file or name: the model the drive was built for")->required();
+  verb->add_option("--table", o->table, "table file (TOML) of armcal identify")->required();
+  verb->add_option("--json", o->json, "write the result here");
+  verb->add_flag("--force", o->force, "send also what the data hardly determine");
+  return verb;
+}
+
+}  // namespace
+
+void AddFlash(CLI::App& app, Action& action) {
+  auto o = std::make_shared<FlashOptions>();
+  auto* verb = AddCommon(app, "flash",
+                         "store a parameter table in the drive, adopt it and read it back\nexample: armcal flash "
+                         "--connect 127.0.0.1:1502 --robot er20_like --table build/table.toml",
+                         o);
+  verb->add_flag("--dry-run", o->dry_run, "check and say what would be sent");
+  verb->callback([o, &action] { action = [o] { return Flash(*o); }; });
+}
+
+void AddVerify(CLI::App& app, Action& action) {
+  auto o = std::make_shared<FlashOptions>();
+  auto* verb = AddCommon(app, "verify",
+                         "compare the table in force with a file\nexample: armcal verify --connect 127.0.0.1:1502 "
+                         "--robot er20_like --table build/table.toml",
+                         o);
+  verb->callback([o, &action] { action = [o] { return Verify(*o); }; });
+}
+
+}  // namespace armcal::tool

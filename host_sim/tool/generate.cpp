@@ -1,0 +1,20 @@
+// tool - armcal generate: the work of armcal-generate as a verb.
+#include "codegen/src/generate/generate.hpp"
+
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+
+void AddGenerate(CLI::App& app, Action& action) {
+  auto* verb = app.add_subcommand("generate", codegen::kGenerateHelp);
+  auto o = std::make_shared<codegen::GenerateOptions>();
+  codegen::AddGenerateOptions(*verb, *o);
+  verb->callback([o, &action] {
+    action = [o] {
+      codegen::Generate(*o);
+      return kOk;
+    };
+  });
+}
+
+}  // namespace armcal::tool

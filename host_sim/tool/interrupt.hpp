@@ -1,0 +1,25 @@
+// tool - Ctrl-C ends the work and not the program, while a guard lives.
+#pragma once
+
+#include <atomic>
+#include <csignal>
+
+namespace armcal::tool {
+
+class InterruptGuard {
+ public:
+  InterruptGuard() : before_(std::signal(SIGINT, [](int) { interrupted_ = true; })) {}
+  ~InterruptGuard() { std::signal(SIGINT, before_); }
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+  // Set by the first Ctrl-C; it stays set.
+  static const std::atomic<bool>& interrupted() { return interrupted_; }
+
+ private:
+  static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may set it
+  inline static std::atomic<bool> interrupted_{false};
+  void (*before_)(int);
+};
+
+}  // namespace armcal::tool

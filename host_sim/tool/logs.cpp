@@ -1,0 +1,56 @@
+// tool - reads logs by name or channel map and checks them against the model.
+#include "host_sim/tool/logs.hpp"
+
+#include <fmt/core.h>
+
+#include <charconv>
+#include <cmath>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/logs/channels.hpp"
+#include "host_sim/data/logs/log.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
+
+namespace armcal::tool {
+
+logs::Log LogReader::Raw(const std::string& path) const {
+  return channels_.empty() ? logs::ReadLog(path) : logs::ReadLog(path, logs::ReadChannelMap(channels_));
+}
+
+calibration::Dataset LogReader::One(const std::string& path) const { return Checked(Raw(path)); }
+
+calibration::Dataset LogReader::Checked(const logs::Log& log) const {
+  if (log.joints == model_.joints())  // Prepare names what is wrong otherwise
+    for (const std::string& note : calibration::CheckSignals(model_.robot(), log)) fmt::print(stderr, "{}\n", note);
+  calibration::Dataset data = calibration::Prepare(model_, log, {cutoff_Hz_});
+  calibration::CheckAgainstModel(model_, data);
+  return data;
+}
+
+std::vector<calibration::Dataset> LogReader::Narrow(const std::vector<std::string>& paths) const {
+  constexpr double kNarrow = 0.62;  // of the cut-off: half the noise of an acceleration
+  std::vector<calibration::Dataset> out;
+  for (const std::string& p : paths) out.push_back(calibration::Prepare(model_, Raw(p), {cutoff_Hz_, kNarrow}));
+  return out;
+}
+
+std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>& paths) const {
+  std::vector<calibration::Dataset> out;
+  for (const std::string& p : paths) out.push_back(One(p));
+  return out;
+}
+
+void AddCutoff(CLI::App& verb, double& cutoff_Hz) {
+  const auto read = [&cutoff_Hz](const std::string& text) {
+    const char* end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, cutoff_Hz);
+    if (error != std::errc() || rest != end || !std::isfinite(cutoff_Hz) || cutoff_Hz <= 0)
+      throw io::InputError("--cutoff " + text + ": expected a frequency above 0 Hz");
+  };
+  verb.add_option_function<std::string>(
+          "--cutoff", read,
+          "derive speed and acceleration below this frequency (Hz); default: chosen from the noise of the log")
+      ->type_name("HZ");
+}
+
+}  // namespace armcal::tool

@@ -1,0 +1,36 @@
+// tool - logs made ready for a model, as the options of a verb ask for them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host_sim/identify/calibration/dataset.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+
+class LogReader {
+ public:
+  // channels: path of a channel map, empty for our own column names. cutoff_Hz: of the derived speeds; 0: chosen for
+  // each log.
+  LogReader(const codegen::Model& model, std::string channels, double cutoff_Hz = 0)
+      : model_(model), channels_(std::move(channels)), cutoff_Hz_(cutoff_Hz) {}
+  logs::Log Raw(const std::string& path) const;
+  // Throws io::InputError where a log cannot be one of this arm; what is worth a line goes to stderr.
+  calibration::Dataset One(const std::string& path) const;
+  std::vector<calibration::Dataset> All(const std::vector<std::string>& paths) const;
+  // The same logs with speed and acceleration of a lower bandwidth.
+  std::vector<calibration::Dataset> Narrow(const std::vector<std::string>& paths) const;
+
+ private:
+  calibration::Dataset Checked(const logs::Log& log) const;
+
+  const codegen::Model& model_;
+  std::string channels_;
+  double cutoff_Hz_;
+};
+
+// Adds --cutoff: what is no frequency is refused in one line.
+void AddCutoff(CLI::App& verb, double& cutoff_Hz);
+
+}  // namespace armcal::tool

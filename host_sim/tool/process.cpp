@@ -1,0 +1,88 @@
+// tool - fork, exec, pipe, wait.
+#include "host_sim/tool/process.hpp"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <csignal>
+#include <cstdlib>
+
+#include "codegen/src/io/input_error.hpp"
+
+namespace armcal::tool {
+namespace {
+
+[[noreturn]] void Become(const std::vector<std::string>& words) {
+  std::vector<char*> arguments;
+  for (const std::string& w : words) arguments.push_back(const_cast<char*>(w.c_str()));
+  arguments.push_back(nullptr);
+  execvp(arguments[0], arguments.data());
+  _exit(127);
+}
+
+int CodeOf(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
+
+}  // namespace
+
+int RunProgram(const std::vector<std::string>& words, const std::string& log) {
+  const pid_t child = fork();
+  if (child == 0) {
+    if (!log.empty()) {
+      const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+      dup2(file, 1);
+      dup2(file, 2);
+    }
+    Become(words);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return CodeOf(status);
+}
+
+Background::Background(const std::vector<std::string>& words) {
+  int ends[2];
+  if (pipe(ends) != 0) throw io::InputError("pipe: none to be had");
+  child_ = fork();
+  if (child_ == 0) {
+    dup2(ends[1], 1);
+    close(ends[0]);
+    close(ends[1]);
+    Become(words);
+  }
+  close(ends[1]);
+  pipe_ = ends[0];
+  char c = 0;
+  while (read(pipe_, &c, 1) == 1 && c != '\n') first_line_ += c;
+  if (c != '\n') {
+    const int code = Wait();
+    throw io::InputError(words[0] + ": ended at once with code " + std::to_string(code) +
+                         (first_line_.empty() ? "" : ": " + first_line_));
+  }
+}
+
+Background::~Background() { Stop(); }
+
+std::string Background::ReadAll() {
+  std::string text;
+  char buffer[4096];
+  for (ssize_t got; (got = read(pipe_, buffer, sizeof buffer)) > 0;) text.append(buffer, static_cast<std::size_t>(got));
+  return text;
+}
+
+int Background::Wait(std::string* output) {
+  const std::string text = ReadAll();
+  if (output) *output = text;
+  int status = 0;
+  waitpid(child_, &status, 0);
+  close(pipe_);
+  child_ = -1;
+  return CodeOf(status);
+}
+
+void Background::Stop() {
+  if (child_ < 0) return;
+  kill(child_, SIGTERM);
+  Wait();
+}
+
+}  // namespace armcal::tool

@@ -1,0 +1,72 @@
+// io tests - whole files and hashes.
+#include "host_sim/data/files/files.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/files/temporary_folder.hpp"
+
+namespace armcal::files {
+namespace {
+
+using test::ErrorOf;
+using test::TemporaryFolder;
+
+TEST(Files, Sha256_MatchesPublishedVectors) {  // FIPS 180-4 examples
+  EXPECT_EQ(Sha256(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(Sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(Sha256("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
+            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+  EXPECT_EQ(Sha256(std::string(1000000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+TEST(Files, AtomicWrite_PlainAndGzip_ReadBackTheSame) {
+  const TemporaryFolder folder;
+  std::string text;
+  for (long k = 0; k < 300000; ++k) text += std::to_string(k * 7919 % 1000003) + ",";
+  for (const char* name : {"a.txt", "b.gz", "new/folder/c.csv.gz"}) {
+    WriteWholeFile(folder / name, text);
+    EXPECT_EQ(ReadWholeFile(folder / name), text) << name;
+  }
+  EXPECT_LT(std::filesystem::file_size(folder / "b.gz"), text.size() / 2);
+}
+
+TEST(Files, AtomicWrite_GzipTwice_GivesTheSameBytes) {
+  const TemporaryFolder folder;
+  WriteWholeFile(folder / "a.gz", "same text");
+  WriteWholeFile(folder / "b.gz", "same text");
+  EXPECT_EQ(FileHash(folder / "a.gz"), FileHash(folder / "b.gz"));
+}
+
+TEST(Files, AtomicWrite_WhereItCannot_LeavesNoPartAndKeepsTheOld) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "target/inside");  // a folder that is not empty cannot be replaced
+  EXPECT_EQ(ErrorOf([&] { WriteWholeFile(folder / "target", "text"); }),
+            (folder / "target").string() + ": cannot be written");
+  EXPECT_TRUE(std::filesystem::is_directory(folder / "target/inside"));
+  int entries = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder / ".")) ++entries;
+  EXPECT_EQ(entries, 1);
+}
+
+TEST(Files, ReadWholeFile_GzipCutShort_IsRefused) {
+  const TemporaryFolder folder;
+  std::string text;
+  for (long k = 0; k < 100000; ++k) text += std::to_string(k * k % 7919) + "\n";
+  WriteWholeFile(folder / "whole.gz", text);
+  std::ifstream in(folder / "whole.gz", std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(in), {});
+  for (const std::size_t size : {bytes.size() / 2, bytes.size() - 4}) {
+    const auto cut = folder.Write("cut.gz", bytes.substr(0, size));
+    EXPECT_EQ(ErrorOf([&] { ReadWholeFile(cut); }), cut.string() + ": gzip data is damaged or cut short");
+  }
+}
+
+TEST(Files, ReadWholeFile_MissingOrFolder_SaysSo) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(ErrorOf([&] { ReadWholeFile(folder / "none"); }), (folder / "none").string() + ": no such file");
+  std::filesystem::create_directories(folder / "sub");
+  EXPECT_EQ(ErrorOf([&] { FileHash(folder / "sub"); }), (folder / "sub").string() + ": is a folder, expected a file");
+}
+
+}  // namespace
+}  // namespace armcal::files

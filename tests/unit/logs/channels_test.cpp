@@ -1,0 +1,88 @@
+// io tests - channel maps: foreign names, units and zero points.
+#include "host_sim/data/logs/channels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "host_sim/data/logs/log.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
+
+namespace armcal::logs {
+namespace {
+
+using files::test::ErrorOf;
+using files::test::TemporaryFolder;
+
+const std::string kMap = R"(
+joints = 2
+[time]
+column = "ms"
+unit = "ms"
+[q]
+column = "pos{}"
+unit = ["deg", "mm"]
+scale = [1, 2]
+offset = [90, 0]
+[tau]
+column = ["motor", "force"]
+unit = ["N*m", "kN"]
+scale = [-100, 1]
+[temp]
+column = "T{}"
+unit = "K"
+optional = true
+)";
+
+TEST(Channels, ForeignLog_ArrivesInOurUnits) {
+  const TemporaryFolder folder;
+  std::string text = "ms,pos1,pos2,motor,force,note\n";
+  for (int k = 0; k < 5; ++k) text += std::to_string(4 * k) + ",-180,250,0.5,0.25,x\n";
+  const Log log = ReadLog(folder.Write("log.csv", text), ReadChannelMap(folder.Write("map.toml", kMap)), 2);
+  ASSERT_EQ(log.joints, 2);
+  EXPECT_DOUBLE_EQ(log.t[1], 0.004);
+  EXPECT_DOUBLE_EQ(log.q(0, 0), -std::numbers::pi / 2);
+  EXPECT_DOUBLE_EQ(log.q(0, 1), 0.5);
+  EXPECT_DOUBLE_EQ(log.tau(0, 0), -50);
+  EXPECT_DOUBLE_EQ(log.tau(0, 1), 250);
+  EXPECT_EQ(log.temp.size(), 0);
+}
+
+TEST(Channels, OptionalQuantityInTheLog_IsRead) {
+  const TemporaryFolder folder;
+  std::string text = "ms,pos1,pos2,motor,force,T1,T2\n";
+  for (int k = 0; k < 5; ++k) text += std::to_string(4 * k) + ",0,0,0,0,293.15,300\n";
+  const Log log = ReadLog(folder.Write("log.csv", text), ReadChannelMap(folder.Write("map.toml", kMap)), 2);
+  ASSERT_EQ(log.temp.cols(), 2);
+  EXPECT_NEAR(log.temp(0, 0), 20.0, 1e-9);
+}
+
+TEST(Channels, MissingForeignColumn_IsNamedAsInTheLog) {
+  const TemporaryFolder folder;
+  const auto path = folder.Write("log.csv", "ms,pos1,motor,force\n0,1,2,3\n4,1,2,3\n");
+  const ChannelMap map = ReadChannelMap(folder.Write("map.toml", kMap));
+  EXPECT_EQ(ErrorOf([&] { ReadLog(path, map, 2); }), path.string() + ":1: expected a column 'pos2'");
+}
+
+TEST(Channels, BadMap_NamesKeyAndExpected) {
+  const TemporaryFolder folder;
+  const auto error = [&folder](const std::string& from, const std::string& to) {
+    std::string text = kMap;
+    text.replace(text.find(from), from.size(), to);
+    const auto path = folder.Write("map.toml", text);
+    const std::string message = ErrorOf([&] { ReadChannelMap(path); });
+    return message.starts_with(path.string()) ? message.substr(path.string().size()) : message;
+  };
+  EXPECT_EQ(error("joints = 2", "joints = 0"), ": joints: expected a number of joints, 1 to 64");
+  EXPECT_EQ(error("[time]", "[clock]"), ": clock: unknown key, expected joints, title, time or a quantity");
+  EXPECT_EQ(error("unit = \"ms\"", "unit = \"min\""), ": time.unit: 'min' is no unit of time, expected s, ms, us");
+  EXPECT_EQ(error("\"mm\"]", "\"mm\", \"m\"]"), ": q.unit: expected one text or a list of 2");
+  EXPECT_EQ(error("[1, 2]", "[1, \"two\"]"), ": q.scale: expected a list of numbers");
+  EXPECT_EQ(error("\"pos{}\"", "\"pos\""), ": q.column: 'pos' is used for two joints");
+  EXPECT_EQ(error("offset", "ofset"), ": q.ofset: unknown key, expected column, unit, scale, offset or optional");
+  EXPECT_EQ(error("[tau]", "[qref]").substr(0, 5), ": tau");
+  EXPECT_EQ(error("joints = 2", "joints = = 2").substr(0, 3), ":2:");
+}
+
+}  // namespace
+}  // namespace armcal::logs

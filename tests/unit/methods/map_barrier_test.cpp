@@ -1,0 +1,78 @@
+// calibration tests - MAP with barrier: bodies exist in every draw, whatever the coordinates, with nonlinear laws too.
+#include <gtest/gtest.h>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/methods/linearised.hpp"
+#include "tests/unit/methods/better_arm.hpp"
+#include "tests/unit/methods/classic_arm.hpp"
+
+namespace armcal::calibration {
+namespace {
+
+using Eigen::VectorXd;
+using tests::SyntheticArm;
+
+TEST(MapBarrier, OfRandomArms_GivesBodiesThatExistEveryTime) {
+  constexpr int kDraws = 8;
+  int bayes = 0;
+  for (int draw = 1; draw <= kDraws; ++draw) {
+    SyntheticArm arm(tests::PlainRobot("er20_like", draw % 2 ? tests::Columns::kBase : tests::Columns::kStandard),
+                     draw);
+    const Dataset d = arm.Run(8, 100 + draw);
+    const Problem p = tests::ProblemOf(arm, {&d});
+    const Solution s = MapBarrier(p);
+    EXPECT_TRUE(s.converged) << draw << s.remark;
+    EXPECT_TRUE(s.physical) << draw;
+    printf("map_barrier: %d steps, %.4f s\n", s.iterations, s.seconds);
+    EXPECT_TRUE(tests::CanExist(s.bodies)) << draw;
+    EXPECT_LT(tests::TorqueError(arm, d, s.z), 0.25) << draw;  // sqrt(48 / 6000) is 0.09
+    const Linearised at = Linearise(p, p.start);
+    const VectorXd z =
+        SolveRegularised(p, at.A.transpose() * at.A, at.A.transpose() * (at.residual + at.A * p.start), nullptr);
+    bayes += tests::CanExist(ReadOutBodies(arm.model(), z.segment(arm.model().front(), arm.model().rigid())));
+  }
+  EXPECT_LT(bayes, kDraws);  // planted fault: without the barrier some cannot
+}
+
+TEST(MapBarrier, InStandardAndInBaseCoordinates_IsTheSameArm) {
+  SyntheticArm base(tests::PlainRobot("er20_like", tests::Columns::kBase), 3);
+  SyntheticArm standard(tests::PlainRobot("er20_like", tests::Columns::kStandard), 3);
+  ASSERT_GT(standard.model().rigid(), base.model().rigid());
+  const Dataset d = base.Run(8, 9);
+  const Solution a = MapBarrier(tests::ProblemOf(base, {&d})), b = MapBarrier(tests::ProblemOf(standard, {&d}));
+  // One problem in two coordinates. The base set's regrouping is a rounded map, 14 digits; the minimum is flat where
+  // only the prior holds a body.
+  for (int k = 0; k < 66; ++k)
+    EXPECT_NEAR(a.bodies[k], b.bodies[k], 2e-3 * std::abs(base.model().table()[k].sd) + 1e-3 * std::abs(a.bodies[k]))
+        << k;
+}
+
+TEST(MapBarrier, WithAStribeckLaw_FindsItAndTheBodies) {
+  SyntheticArm arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), 2);
+  const Dataset d = arm.Run(20, 3, tests::Stribeck(arm));
+  Problem p = tests::ProblemOf(arm, {&d});
+  tests::HoldDelta(p);
+  const Solution s = MapBarrier(p);
+  EXPECT_TRUE(s.physical);
+  EXPECT_TRUE(tests::CanExist(s.bodies));
+  std::vector<double> eta(s.z.data() + arm.model().columns(), s.z.data() + s.z.size());
+  VectorXd x = VectorXd::Zero(arm.model().columns() + 2);
+  x.head(arm.model().columns()) = s.z.head(arm.model().columns());
+  const Eigen::MatrixXd residual = Predict(arm.model(), d, x, eta) - d.tau;
+  for (int j = 0; j < 2; ++j) {
+    const VectorXd used = residual.col(j).cwiseProduct(d.used.col(j).cast<double>());
+    EXPECT_NEAR(used.norm() / std::sqrt(d.used.col(j).sum()) / arm.noise_Nm(j), 1, 0.06) << j;  // 4 sd of 2500 samples
+  }
+}
+
+TEST(MapBarrier, APriorThatCannotExist_IsRefused) {
+  SyntheticArm arm(tests::PlainRobot("two_link", tests::Columns::kBase), 1);
+  const Dataset d = arm.Run(4, 1);
+  codegen::Robot robot = arm.model().robot();
+  robot.joint[1].link.inertia_kgm2 = {0.1, 0, 0, 0.1, 0, 0.5};
+  const codegen::Model model(robot, tests::Records());
+  EXPECT_THROW(MapBarrier(MakeProblem(model, {&d})), io::InputError);
+}
+
+}  // namespace
+}  // namespace armcal::calibration

@@ -1,0 +1,157 @@
+// calibration tests - Stribeck truths by the log-EKF, variable projection and the fixed basis; truth written by hand.
+#include <gtest/gtest.h>
+
+#include "codegen/src/io/input_error.hpp"
+#include "tests/unit/methods/better_arm.hpp"
+#include "tests/unit/methods/classic_arm.hpp"
+
+namespace armcal::calibration {
+namespace {
+
+using Eigen::VectorXd;
+using tests::SyntheticArm;
+
+// One random law a joint: Fs - Fc = 10 .. 50 % of Fc, q_s = 0.05 .. 0.2 rad/s.
+struct Law {
+  double extra[2], speed[2];
+  explicit Law(std::uint64_t seed) {
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> u(0, 1);
+    for (int j = 0; j < 2; ++j) extra[j] = 0.1 + 0.4 * u(random), speed[j] = 0.05 * std::pow(4, u(random));
+  }
+};
+
+// Mean relative error of Fc, Fv, Fs, q_s over the joints: the study's e_f.
+double FrictionError(const SyntheticArm& arm, const Law& law, const VectorXd& z) {
+  const codegen::Model& model = arm.model();
+  const auto at = [&](const std::string& name) {
+    for (int c = 0; c < model.columns(); ++c)
+      if (model.column_name(c) == name) return z[c];
+    throw std::logic_error("no " + name);
+  };
+  double sum = 0;
+  for (int j = 0; j < 2; ++j) {
+    const std::string n = std::to_string(j + 1);
+    const double Fc = arm.Friction("Fc", j), Fv = arm.Friction("Fv", j), Fs = Fc * (1 + law.extra[j]);
+    double amplitude = 0, speed = 0;
+    for (int c = 0; c < model.columns(); ++c)
+      if (!model.is_rigid(c) && model.table()[model.table_index(c)].effect == "stribeck" && model.column_joint(c) == j)
+        amplitude = z[c];
+    for (int k = 0; k < model.nonlinear(); ++k)
+      if (model.unknowns()[k].key == "vs" && model.table()[model.parameters() - model.nonlinear() + k].joint == j)
+        speed = z[model.columns() + k];
+    sum += std::abs(at("Fc" + n) / Fc - 1) + std::abs(at("Fv" + n) / Fv - 1) +
+           std::abs((at("Fc" + n) + amplitude) / Fs - 1) + std::abs(speed / law.speed[j] - 1);
+  }
+  return sum / 8;
+}
+
+struct Draw {
+  SyntheticArm arm;
+  Law law;
+  Dataset data;
+  Problem problem;
+  explicit Draw(std::uint64_t seed)
+      : arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), seed), law(seed) {
+    data = arm.Run(
+        20, 100 + seed,
+        [this](const tests::State& s) {
+          const double x = s.qd / law.speed[s.joint];
+          return law.extra[s.joint] * arm.Friction("Fc", s.joint) * std::copysign(std::exp(-x * x), s.qd);
+        },
+        0.25);
+    problem = tests::ProblemOf(arm, {&data});
+    tests::HoldDelta(problem);
+  }
+};
+
+using Solve = Solution (*)(const Problem&);
+
+// The study reaches 0.045 mean; two joints at 20 s of slow motion have less to go by than the bound asks.
+void Judge(Solve solve, const char* name, int first = 1) {
+  double sum = 0, worst = 0, prior = 0, seconds = 0;
+  constexpr int kDraws = 10;
+  for (int seed = first; seed < first + kDraws; ++seed) {
+    const Draw draw(seed);
+    const Solution s = solve(draw.problem);
+    ASSERT_TRUE(s.z.allFinite()) << name << seed;
+    const double e = FrictionError(draw.arm, draw.law, s.z);
+    seconds += s.seconds / kDraws;
+    sum += e / kDraws, worst = std::max(worst, e),
+                       prior += FrictionError(draw.arm, draw.law, draw.problem.start) / kDraws;
+  }
+  printf("%s: e_f mean %.4f worst %.4f, of the prior %.3f, %.3f s\n", name, sum, worst, prior, seconds);
+  EXPECT_LT(sum, 0.1) << name;
+  EXPECT_LT(worst, 0.3) << name;
+  EXPECT_GT(prior, 2 * sum) << name;
+}
+
+// A filter that linearises each sample once needs a prior about as wide as the truths are: Fs - Fc a quarter of Fc give
+// or take half of that, q_s within a factor of 1.5. Left as wide as its range, it settles elsewhere in some draws. The
+// two others start from nothing.
+Solution InformedLogEkf(const Problem& problem) {
+  Problem p = problem;
+  const codegen::Model& model = *p.model;
+  for (int c = 0; c < model.columns(); ++c) {
+    if (model.is_rigid(c) || model.table()[model.table_index(c)].effect != "stribeck") continue;
+    const double extra = 0.25 * model.robot().joint[model.column_joint(c)].nominal.at("Fc");
+    p.start[c] = extra, p.covariance(c, c) = 0.25 * extra * extra;
+  }
+  for (int k = 0; k < model.nonlinear(); ++k) {
+    const int c = model.columns() + k;
+    if (model.unknowns()[k].key == "vs") p.covariance(c, c) = std::pow(0.4 * p.start[c], 2);
+  }
+  return LogEkf(p);
+}
+
+TEST(LogEkf, FindsStribeckTruths) { Judge(InformedLogEkf, "log_ekf", 11); }
+TEST(LogEkf, WithoutAnIdeaOfTheAmplitude_SaysThatItMayBeWrong) {
+  EXPECT_NE(LogEkf(Draw(1).problem).remark.find("no prior mean"), std::string::npos);
+}
+TEST(VariableProjection, FindsStribeckTruths) { Judge(VariableProjection, "variable_projection"); }
+TEST(StribeckBasis, FindsStribeckTruths) { Judge(StribeckBasis, "stribeck_basis"); }
+
+TEST(VariableProjection, FromAFarStart_ReachesTheSameMinimum) {
+  const Draw draw(3);
+  Problem far = draw.problem;
+  const Solution near = VariableProjection(draw.problem);
+  far.covariance.bottomRightCorner(4, 4) *= 1e6;  // no opinion on eta: the start must not matter
+  Problem other = far;
+  for (int c = draw.arm.model().columns(); c < far.start.size(); ++c)
+    if (far.lower[c] < far.upper[c]) other.start[c] = 0.9 * far.upper[c];
+  const Solution a = VariableProjection(far), b = VariableProjection(other);
+  // The objective is flat to 1e-6 about its minimum; deviations of eta are some per cent.
+  for (int c = 0; c < far.start.size(); ++c)
+    EXPECT_NEAR(a.z[c], b.z[c], 0.05 * std::sqrt(std::max(1e-12, near.covariance(c, c))) + 1e-3 * std::abs(a.z[c]))
+        << c;
+}
+
+TEST(LogEkf, OnALinearModel_IsTheBayesUpdate) {
+  SyntheticArm arm(tests::PlainRobot("two_link", tests::Columns::kBase), 2);
+  const Dataset d = arm.Run(4, 3);
+  const Problem p = tests::ProblemOf(arm, {&d});
+  const tests::Stacked s = tests::StackByHand(arm.model(), d);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(p.start.size(), p.start.size());
+  VectorXd g = VectorXd::Zero(p.start.size());
+  for (Eigen::Index r = 0; r < s.tau.size(); ++r) {
+    const double w = 1 / std::pow(p.sigma_Nm[s.joint[r]], 2);
+    H += w * s.K.row(r).transpose() * s.K.row(r);
+    g += w * s.K.row(r).transpose() * (s.tau[r] - s.K.row(r).dot(p.start));
+  }
+  const Eigen::MatrixXd& P = p.covariance;
+  const VectorXd z = p.start + P * (Eigen::MatrixXd::Identity(H.rows(), H.cols()) + H * P).partialPivLu().solve(g);
+  const Solution k = LogEkf(p);
+  for (int c = 0; c < z.size(); ++c)
+    EXPECT_NEAR(k.z[c], z[c], 1e-6 * std::sqrt(P(c, c))) << c;  // round-off of 1000 updates
+  EXPECT_EQ(k.path.rows(), d.samples());
+}
+
+TEST(StribeckMethods, OnAModelWithoutTheLaw_SaySo) {
+  SyntheticArm arm(tests::PlainRobot("two_link", tests::Columns::kBase), 2);
+  const Dataset d = arm.Run(4, 3);
+  EXPECT_THROW(StribeckBasis(MakeProblem(arm.model(), {&d})), io::InputError);
+  EXPECT_THROW(VariableProjection(MakeProblem(arm.model(), {&d})), io::InputError);
+}
+
+}  // namespace
+}  // namespace armcal::calibration

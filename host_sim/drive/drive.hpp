@@ -94,7 +94,7 @@ class Drive {
     identity.capabilities = link::reg::kHasSampleTrace;
     return identity;
   }
-  static port::Storage Opened(port_linux::FileStorage& storage, const std::string& path) {
+  static hardware::Storage Opened(port_linux::FileStorage& storage, const std::string& path) {
     if (!core::IsOk(storage.Open(path))) throw io::InputError(path + ": expected a file that can be written");
     return storage.storage();
   }

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "armcal/port/storage.hpp"
+#include "armcal/hardware/storage.hpp"
 
 namespace armcal::port_linux {
 
@@ -21,7 +21,7 @@ class FileStorage {
   core::Status Open(const std::string& path);
 
   // Valid while this object lives. Context: background.
-  port::Storage storage();
+  hardware::Storage storage();
 
  private:
   static core::Status Read(void* self, std::uint32_t address, std::uint8_t* bytes, std::uint32_t count);

@@ -19,6 +19,6 @@ std::uint32_t Milliseconds(void*) {
 
 }  // namespace
 
-port::Clock SteadyClock(std::atomic<std::uint32_t>& ticks) { return {&ticks, &Ticks, &Milliseconds}; }
+hardware::Clock SteadyClock(std::atomic<std::uint32_t>& ticks) { return {&ticks, &Ticks, &Milliseconds}; }
 
 }  // namespace armcal::port_linux

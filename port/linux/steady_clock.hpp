@@ -4,11 +4,11 @@
 #include <atomic>
 #include <cstdint>
 
-#include "armcal/port/clock.hpp"
+#include "armcal/hardware/clock.hpp"
 
 namespace armcal::port_linux {
 
 // Milliseconds of the machine; ticks as counted by the application in `ticks`, which outlives the clock.
-port::Clock SteadyClock(std::atomic<std::uint32_t>& ticks);
+hardware::Clock SteadyClock(std::atomic<std::uint32_t>& ticks);
 
 }  // namespace armcal::port_linux

@@ -24,7 +24,7 @@ bool WouldWait() { return errno == EAGAIN || errno == EWOULDBLOCK || errno == EI
 
 }  // namespace
 
-TcpServer::TcpServer(const ByteService& service, const port::Clock& clock, const TcpLimits& limits)
+TcpServer::TcpServer(const ByteService& service, const hardware::Clock& clock, const TcpLimits& limits)
     : service_(service), clock_(clock), limits_(limits) {}
 
 TcpServer::~TcpServer() {

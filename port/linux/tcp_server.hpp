@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "armcal/core/status.hpp"
-#include "armcal/port/clock.hpp"
+#include "armcal/hardware/clock.hpp"
 
 namespace armcal::port_linux {
 
@@ -33,7 +33,7 @@ class TcpServer {
  public:
   static constexpr int kSlots = 4;
 
-  TcpServer(const ByteService& service, const port::Clock& clock, const TcpLimits& limits = {});
+  TcpServer(const ByteService& service, const hardware::Clock& clock, const TcpLimits& limits = {});
   ~TcpServer();
   TcpServer(const TcpServer&) = delete;
   TcpServer& operator=(const TcpServer&) = delete;
@@ -69,7 +69,7 @@ class TcpServer {
   void CloseLate(Slot& slot);
 
   ByteService service_;
-  port::Clock clock_;
+  hardware::Clock clock_;
   TcpLimits limits_;
   int listener_ = -1;
   std::uint16_t port_ = 0;

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "armcal/core/status.hpp"
-#include "armcal/port/serial.hpp"
+#include "armcal/hardware/serial.hpp"
 
 namespace armcal::port_linux {
 
@@ -22,7 +22,7 @@ class TtySerial {
   core::Status Open(const std::string& path, int baud = 115200, Parity parity = Parity::kEven);
 
   // Valid while this object lives.
-  port::Serial serial();
+  hardware::Serial serial();
 
  private:
   static std::size_t Read(void* self, std::uint8_t* bytes, std::size_t capacity);

@@ -37,6 +37,6 @@ core::Status Erase(void*, std::uint32_t sector) {
 
 }  // namespace
 
-Storage PsramStorage() { return {nullptr, kSectors, kSector_bytes, kUnit_bytes, 0xFF, Read, Program, Erase}; }
+hardware::Storage PsramStorage() { return {nullptr, kSectors, kSector_bytes, kUnit_bytes, 0xFF, Read, Program, Erase}; }
 
 }  // namespace armcal::port::mps2

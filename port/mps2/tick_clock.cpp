@@ -36,7 +36,7 @@ std::uint32_t CountTick() {
   return tick;
 }
 
-Clock TickClock() {
+hardware::Clock TickClock() {
   return {nullptr, [](void*) { return tick_count.load(std::memory_order_relaxed); },
           [](void*) { return ms_count.load(std::memory_order_relaxed); }};
 }

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "armcal/port/clock.hpp"
+#include "armcal/hardware/clock.hpp"
 
 namespace armcal::port::mps2 {
 
@@ -14,6 +14,6 @@ void StartTick(std::uint32_t tick_rate_Hz);
 std::uint32_t CountTick();
 
 // Ticks, and milliseconds made of them.
-Clock TickClock();
+hardware::Clock TickClock();
 
 }  // namespace armcal::port::mps2

@@ -42,7 +42,7 @@ void StartUart1(std::uint32_t baud) {
   *reinterpret_cast<volatile std::uint32_t*>(kInterruptEnable) = 1u << kUart1ReceiveIrq;
 }
 
-Serial Uart1() { return {nullptr, Read, Write}; }
+hardware::Serial Uart1() { return {nullptr, Read, Write}; }
 
 void OnUart1() {
   Uart().interrupt = 2u;  // before the bytes: one that comes while they are taken has to ask again, or nobody takes it

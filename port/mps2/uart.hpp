@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "armcal/port/serial.hpp"
+#include "armcal/hardware/serial.hpp"
 
 namespace armcal::port::mps2 {
 
@@ -12,7 +12,7 @@ void StartUart1(std::uint32_t baud);
 
 // Received bytes come out of the ring that the interrupt fills (256; a byte that finds it full is lost, and the frame
 // with it). Written bytes go out as long as the transmitter takes them.
-Serial Uart1();
+hardware::Serial Uart1();
 
 // What SerialInterrupt has to do: received bytes into the ring.
 void OnUart1();

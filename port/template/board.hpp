@@ -12,9 +12,9 @@ namespace target = armcal::port::target;
 
 inline constexpr std::uint32_t kSilence_ms = 2;  // that ends a frame; at 115200 baud 3.5 characters are 0.3 ms
 
-inline armcal::port::Storage Storage() { return target::TargetStorage(); }
-inline armcal::port::Clock Clock() { return target::TargetClock(); }
-inline armcal::port::Serial Serial() { return target::TargetSerial(); }
+inline armcal::hardware::Storage Storage() { return target::TargetStorage(); }
+inline armcal::hardware::Clock Clock() { return target::TargetClock(); }
+inline armcal::hardware::Serial Serial() { return target::TargetSerial(); }
 
 // Answers which axes are under control, a bit each.
 template <int n>

@@ -3,13 +3,13 @@
 
 #include <cstdint>
 
-#include "armcal/port/clock.hpp"
+#include "armcal/hardware/clock.hpp"
 
 namespace armcal::port::target {
 
 inline constexpr std::uint32_t kTickRate_Hz = 1000;  // the rate of your control tick
 
-Clock TargetClock();
+hardware::Clock TargetClock();
 
 // Your control tick calls this once, first of all. Returns the tick's number, which goes into RawSample::tick.
 std::uint32_t CountTick();

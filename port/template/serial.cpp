@@ -25,7 +25,7 @@ std::size_t Write(void*, const std::uint8_t* bytes, std::size_t count) {
 
 }  // namespace
 
-Serial TargetSerial() { return {nullptr, Read, Write}; }
+hardware::Serial TargetSerial() { return {nullptr, Read, Write}; }
 
 void OnReceived(std::uint8_t byte) {
   (void)received.Push(byte);  // refused when full; the ring counts it and the frame's checksum fails

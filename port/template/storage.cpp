@@ -39,6 +39,8 @@ core::Status Erase(void*, std::uint32_t sector) {
 
 }  // namespace
 
-Storage TargetStorage() { return {nullptr, kSectors, kSector_bytes, kUnit_bytes, kErased, Read, Program, Erase}; }
+hardware::Storage TargetStorage() {
+  return {nullptr, kSectors, kSector_bytes, kUnit_bytes, kErased, Read, Program, Erase};
+}
 
 }  // namespace armcal::port::target

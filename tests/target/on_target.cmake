@@ -25,7 +25,7 @@ endforeach()
 
 # With a board's own start-up instead of the runner's.
 add_executable(cortex_m_bench cortex_m_main.cpp ${PROJECT_SOURCE_DIR}/port/mps2/startup.cpp ${PROJECT_SOURCE_DIR}/port/mps2/fault.cpp)
-target_link_libraries(cortex_m_bench PRIVATE armcal_bench armcal_port)
+target_link_libraries(cortex_m_bench PRIVATE armcal_bench armcal_hardware)
 target_include_directories(cortex_m_bench PRIVATE ${PROJECT_SOURCE_DIR})
 target_link_options(cortex_m_bench PRIVATE -L${PROJECT_SOURCE_DIR}/port/mps2 -T ${ARMCAL_BOARD}.ld)
 

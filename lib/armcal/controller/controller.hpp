@@ -10,12 +10,12 @@
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/estimator/image.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
+#include "armcal/hardware/clock.hpp"
+#include "armcal/hardware/storage.hpp"
 #include "armcal/link/device.hpp"
 #include "armcal/link/learning_registers.hpp"
 #include "armcal/link/residual_registers.hpp"
 #include "armcal/link/trace_registers.hpp"
-#include "armcal/port/clock.hpp"
-#include "armcal/port/storage.hpp"
 #include "armcal/table/table_store.hpp"
 
 namespace armcal::controller {
@@ -33,7 +33,7 @@ class Controller {
 
   // What the model says of itself is filled in; what of `identity` remains is the integrator's: versions, texts,
   // capabilities beyond those of this class.
-  Controller(const port::Storage& storage, const port::Clock& clock, const link::Identity& identity = {})
+  Controller(const hardware::Storage& storage, const hardware::Clock& clock, const link::Identity& identity = {})
       : clock_(clock),
         store_(storage, Model::kSchema, kWords),
         transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords),
@@ -254,7 +254,7 @@ class Controller {
     in_force_.store(1 - in_force_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }
 
-  port::Clock clock_;
+  hardware::Clock clock_;
   std::uint16_t staged_[kWords] = {}, active_[kWords] = {};
   table::TableStore store_;
   link::TableTransaction transaction_;

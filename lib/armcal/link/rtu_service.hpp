@@ -4,16 +4,16 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "armcal/hardware/clock.hpp"
+#include "armcal/hardware/serial.hpp"
 #include "armcal/link/pdu_engine.hpp"
 #include "armcal/link/rtu_framer.hpp"
-#include "armcal/port/clock.hpp"
-#include "armcal/port/serial.hpp"
 
 namespace armcal::link {
 
 class RtuService {
  public:
-  RtuService(PduEngine& engine, const port::Serial& serial, const port::Clock& clock, std::uint8_t address,
+  RtuService(PduEngine& engine, const hardware::Serial& serial, const hardware::Clock& clock, std::uint8_t address,
              std::uint32_t silence_ms)
       : engine_(engine), serial_(serial), clock_(clock), framer_(address, silence_ms) {}
 
@@ -38,8 +38,8 @@ class RtuService {
 
  private:
   PduEngine& engine_;
-  port::Serial serial_;
-  port::Clock clock_;
+  hardware::Serial serial_;
+  hardware::Clock clock_;
   RtuFramer framer_;
   std::uint8_t bytes_[64] = {};
   std::size_t there_ = 0, taken_ = 0;

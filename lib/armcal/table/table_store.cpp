@@ -7,7 +7,7 @@ namespace armcal::table {
 
 using core::Status;
 
-TableStore::TableStore(const port::Storage& storage, std::uint32_t schema, std::uint32_t words)
+TableStore::TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words)
     : storage_(storage), schema_(schema), words_(words) {}
 
 bool TableStore::Fits() const {

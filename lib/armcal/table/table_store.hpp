@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "armcal/core/status.hpp"
-#include "armcal/port/storage.hpp"
+#include "armcal/hardware/storage.hpp"
 #include "armcal/table/record.hpp"
 
 namespace armcal::table {
@@ -24,7 +24,7 @@ class TableStore {
   static constexpr int kSlots = 2;
 
   // The words of a table of this schema are always `words` long.
-  TableStore(const port::Storage& storage, std::uint32_t schema, std::uint32_t words);
+  TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words);
 
   // Reads both slots and copies the good one of highest sequence to `out` [words]. At power-up only: reads everything
   // at once. kOk; without a good record: kWrongSchema (another one is kept), kCorrupt, kBlank; kWrongSize: a record
@@ -67,7 +67,7 @@ class TableStore {
   core::Status EraseTarget();
   core::Status Abandon();
 
-  port::Storage storage_;
+  hardware::Storage storage_;
   std::uint32_t schema_;
   std::uint32_t words_;
   SlotState state_[kSlots] = {SlotState::kBlank, SlotState::kBlank};

@@ -69,7 +69,7 @@ class RtuLine : public testing::Test {
   Terminal drive_side_;
   port_linux::TtySerial serial_;
   std::atomic<std::uint32_t> ticks_{0};
-  const port::Clock clock_ = port_linux::SteadyClock(ticks_);
+  const hardware::Clock clock_ = port_linux::SteadyClock(ticks_);
   link::RtuService service_{drive_.device.engine(), serial_.serial(), clock_, 9, 20};
   std::atomic<bool> stop_{false};
   std::thread line_;

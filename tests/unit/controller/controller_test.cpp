@@ -93,8 +93,8 @@ struct Bench {
   static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
   test::NorFlash flash{{2, 16384, 8, 0xFF}};
   std::uint32_t now = 0, sequence = 0;
-  port::Clock clock{&now, [](void* t) { return *static_cast<std::uint32_t*>(t); },
-                    [](void* t) { return *static_cast<std::uint32_t*>(t); }};
+  hardware::Clock clock{&now, [](void* t) { return *static_cast<std::uint32_t*>(t); },
+                        [](void* t) { return *static_cast<std::uint32_t*>(t); }};
   Axes axes;
   controller::Controller<Model, Filters...> controller{flash.storage(), clock};
   Status booted = Status::kOk, torque = Status::kOk;

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "armcal/port/storage.hpp"
+#include "armcal/hardware/storage.hpp"
 
 namespace armcal::test {
 
@@ -26,7 +26,7 @@ class NorFlash {
   explicit NorFlash(const Geometry& g)
       : geometry_(g), cells_(g.sectors * g.sector_bytes, g.erased), written_(cells_.size() / g.unit, false) {}
 
-  port::Storage storage() {
+  hardware::Storage storage() {
     return {this, geometry_.sectors, geometry_.sector_bytes, geometry_.unit, geometry_.erased, &Read, &Program, &Erase};
   }
 

@@ -1,10 +1,10 @@
-// port - what serial line a target supplies; knows no frame and no driver.
+// hardware - what serial line a target supplies; knows no frame and no driver.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
-namespace armcal::port {
+namespace armcal::hardware {
 
 // A byte stream in both directions. Neither function waits. Context: background; the serial interrupt only fills and
 // empties the rings behind them.
@@ -19,4 +19,4 @@ struct Serial {
   std::size_t Write(const std::uint8_t* bytes, std::size_t count) const { return write(context, bytes, count); }
 };
 
-}  // namespace armcal::port
+}  // namespace armcal::hardware

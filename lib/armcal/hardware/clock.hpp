@@ -1,9 +1,9 @@
-// port - what time a target supplies; integers only, because a float clock loses its ticks after hours.
+// hardware - what time a target supplies; integers only, because a float clock loses its ticks after hours.
 #pragma once
 
 #include <cstdint>
 
-namespace armcal::port {
+namespace armcal::hardware {
 
 // Both counters wrap; only differences are used. Context: any.
 struct Clock {
@@ -15,4 +15,4 @@ struct Clock {
   std::uint32_t Ms() const { return ms(context); }
 };
 
-}  // namespace armcal::port
+}  // namespace armcal::hardware

@@ -1,11 +1,11 @@
-// port - what non-volatile memory a target supplies; knows no record and no driver.
+// hardware - what non-volatile memory a target supplies; knows no record and no driver.
 #pragma once
 
 #include <cstdint>
 
 #include "armcal/core/status.hpp"
 
-namespace armcal::port {
+namespace armcal::hardware {
 
 // Erasable memory of equal sectors. Every function is bounded, returns when the operation is complete, and answers kOk
 // or kStorageFault (a driver may report its ECC errors so). Context: background.
@@ -31,4 +31,4 @@ struct Storage {
   core::Status Erase(std::uint32_t sector) const { return erase(context, sector); }
 };
 
-}  // namespace armcal::port
+}  // namespace armcal::hardware

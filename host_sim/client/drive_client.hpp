@@ -1,4 +1,4 @@
-// client - registers of a drive over Modbus TCP or RTU, and what its identity and status say; knows no table, no model.
+// client - reads and writes the registers of a drive over Modbus TCP or RTU.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "armcal/core/status.hpp"
+#include "armcal/link/register_words.hpp"
 #include "host_sim/client/errors.hpp"
 
 struct _modbus;  // libmodbus' connection
@@ -25,7 +26,7 @@ struct Identity {
 
 // One consistent reading of the status block (SPEC.md).
 struct DriveStatus {
-  std::uint16_t transaction_state;
+  link::TransactionState transaction_state;
   core::Status transaction_status, table_status;
   std::uint16_t feedforward_state;
   std::uint32_t generation, tick, active_crc, command_sequence, store_sequence;
@@ -64,9 +65,29 @@ class DriveClient {
   void Write(int first, std::span<const std::uint16_t> words);
   void WriteSingle(int address, std::uint16_t word);  // function 6
 
-  std::uint32_t ReadInputU32(int first);
-  std::vector<float> ReadInputFloats(int first, int count);
-  void WriteU32(int first, std::uint32_t value);
+  // By declaration (registers.hpp): a block or a register, of trace 0 or 1 where it exists twice.
+  template <const auto& kBlock>
+  link::Words<kBlock> Read(int trace = 0) {
+    return link::Words<kBlock>(Read(link::SpanOf(kBlock).Of(trace)).data());
+  }
+  template <const link::Register& kRegister>
+  link::ValueOf<kRegister> ReadValue(int trace = 0) {
+    return Read<kRegister>(trace).template Get<kRegister>();
+  }
+  template <const auto& kBlock>
+  void Write(const link::Words<kBlock>& words, int trace = 0) {
+    Write(link::SpanOf(kBlock).Of(trace).first, {words.data(), words.size()});
+  }
+  // One register takes function 6, a 32-bit value function 16.
+  template <const link::Register& kRegister>
+  void WriteValue(link::ValueOf<kRegister> value, int trace = 0) {
+    link::Words<kRegister> words;
+    words.template Set<kRegister>(value);
+    if (words.size() == 1) return WriteSingle(link::SpanOf(kRegister).Of(trace).first, *words.data());
+    Write(words, trace);
+  }
+  std::vector<std::uint16_t> Read(const link::Span& span);
+  std::vector<float> ReadFloats(const link::Register& list, int count);
 
   // Throws LinkError if it is not an armcal drive, of another major map version, or its word order is not ours.
   Identity ReadIdentity();
@@ -81,7 +102,7 @@ class DriveClient {
   void Connect();
   void Request(const std::string& what, const std::function<int(_modbus*)>& call);
   [[noreturn]] void Refused(const std::string& what, int exception);
-  std::vector<std::uint16_t> Read(bool input, int first, int count);
+  std::vector<std::uint16_t> ReadWords(bool input, int first, int count);
 
   std::string name_;
   int unit_;

@@ -1,4 +1,4 @@
-// client - names: the register map and the status numbers as text for people and tools; knows no connection.
+// client - the register map and the status numbers as text, for people and for tools.
 #pragma once
 
 #include <string>

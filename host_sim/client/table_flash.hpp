@@ -1,4 +1,4 @@
-// client - brings a parameter table into a drive and proves it is there; knows no meaning of its words.
+// client - brings a parameter table into a drive and proves that it is there.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// client - arms a drive's trace and takes its pages; knows records and ticks, not channels.
+// client - starts a recording on a drive and takes its pages.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace armcal::client {
 
-enum class TraceMode : std::uint16_t { kOff = 0, kOneShot = 1, kStreaming = 2 };
-enum class TraceState : std::uint16_t { kOff = 0, kWaiting = 1, kRecording = 2, kDone = 3 };
+using link::TraceMode;
+using link::TraceState;
 enum class Gaps { kAllow, kRefuse };
 
 struct TraceRequest {
@@ -28,23 +28,23 @@ struct TraceRecords {
   std::vector<std::uint32_t> ticks;
   std::vector<std::uint16_t> generations;  // low word of the table generation, per record
   std::vector<std::uint16_t> words;
-  std::uint32_t lost = 0;  // refused by the drive since the arm
+  std::uint32_t lost = 0;  // refused by the drive since the recording started
   TraceState state = TraceState::kOff;
 
   std::size_t count() const { return ticks.size(); }
 };
 
 // Trace 0: raw samples, 1: processed samples. Drops what the drive had recorded before.
-void ArmTrace(DriveClient& drive, int trace, const TraceRequest& request);
+void StartTrace(DriveClient& drive, int trace, const TraceRequest& request);
 
-// Reads the pages of one arm in order.
+// Reads the pages of one recording in order.
 class TraceReader {
  public:
   TraceReader(DriveClient& drive, int trace, Gaps gaps = Gaps::kAllow);
 
   // Takes one page, appends it to `records` and releases it on the drive; returns the number of records, 0 if there is
-  // none now. Also refreshes `records.lost` and `.state`. Throws LinkError if the trace was armed anew meanwhile, and,
-  // with Gaps::kRefuse, if ticks are missing between two records.
+  // none now. Also refreshes `records.lost` and `.state`. Throws LinkError if another client has started the trace
+  // anew meanwhile, and, with Gaps::kRefuse, if ticks are missing between two records.
   std::size_t TakePage(TraceRecords& records);
 
   // Takes pages until the recording is done and empty; for one-shot traces and streams with a limit.
@@ -55,7 +55,7 @@ class TraceReader {
   int trace_;
   Gaps gaps_;
   std::uint32_t next_ = 0;
-  std::uint16_t arm_ = 0;
+  std::uint16_t recording_ = 0;  // its number
 };
 
 }  // namespace armcal::client

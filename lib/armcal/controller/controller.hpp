@@ -13,9 +13,8 @@
 #include "armcal/hardware/clock.hpp"
 #include "armcal/hardware/storage.hpp"
 #include "armcal/link/device.hpp"
-#include "armcal/link/learning_registers.hpp"
-#include "armcal/link/residual_registers.hpp"
-#include "armcal/link/trace_registers.hpp"
+#include "armcal/link/table_transaction.hpp"
+#include "armcal/link/trace.hpp"
 #include "armcal/table/table_store.hpp"
 
 namespace armcal::controller {
@@ -37,7 +36,7 @@ class Controller {
       : clock_(clock),
         store_(storage, Model::kSchema, kWords),
         transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords),
-        device_(Describe(identity), live_, transaction_) {
+        device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals}) {
     model::Encode(estimator::DefaultTable<Model>(), active_);
     filter<0>().SetResiduals(&residuals_);
   }
@@ -62,10 +61,10 @@ class Controller {
   void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
 
   // From now on a client can record what Push and FeedForward were given; `ring` outlives this. Once, before the first
-  // tick. Answers as link::ServeTrace. Context: background.
+  // tick. Answers as link::Trace::Serve. Context: background.
   template <std::uint32_t kRingWords>
   core::Status Record(RawTrace<Model, kRingWords>& ring) {
-    const core::Status served = link::ServeTrace(device_.map(), 0, ring);
+    const core::Status served = ring.Serve(device_.map(), 0);
     if (!core::IsOk(served)) return served;
     device_.Declare(link::reg::kHasRawTrace);
     trace_ = &ring;
@@ -140,21 +139,23 @@ class Controller {
     return identity;
   }
 
+  // The lists that a client may read at any time.
   template <std::size_t... k>
   core::Status Serve(std::index_sequence<k...>) {
-    core::Status map = core::Status::kOk;
-    const auto serve = [&](std::uint16_t first, const float* values, std::uint16_t count) {
-      if (core::IsOk(map)) map = device_.AddFloats(first, values, count);
+    namespace reg = link::reg;
+    core::Status served = core::Status::kOk;
+    const auto serve = [&](const link::Span& list, const float* values) {
+      if (core::IsOk(served)) served = device_.Serve(list, values);
     };
-    constexpr std::uint16_t kEstimate[] = {link::reg::kEstimateA, link::reg::kEstimateB},
-                            kDeviation[] = {link::reg::kDeviationA, link::reg::kDeviationB};
-    (serve(kEstimate[k], estimates_[k].value, Model::kColumns), ...);
-    (serve(kDeviation[k], estimates_[k].sd, Model::kColumns), ...);
-    serve(link::reg::kResidualRms, estimates_[0].residual_rms_Nm, n);
-    serve(link::reg::kConsistency, estimates_[kFilters - 1].nis, n);
-    if (core::IsOk(map)) map = residual_pages_.Serve(device_.map());
-    if (core::IsOk(map)) map = learning_.Serve();
-    return map;
+    constexpr link::Span kEstimate[] = {SpanOf(reg::kEstimateA, Model::kColumns),
+                                        SpanOf(reg::kEstimateB, Model::kColumns)},
+                         kDeviation[] = {SpanOf(reg::kDeviationA, Model::kColumns),
+                                         SpanOf(reg::kDeviationB, Model::kColumns)};
+    (serve(kEstimate[k], estimates_[k].value), ...);
+    (serve(kDeviation[k], estimates_[k].sd), ...);
+    serve(SpanOf(reg::kResidualRms, n), estimates_[0].residual_rms_Nm);
+    serve(SpanOf(reg::kConsistency, n), estimates_[kFilters - 1].nis);
+    return served;
   }
 
   template <std::size_t... k>
@@ -188,14 +189,14 @@ class Controller {
     record_.Add(raw, told_q_, told_Nm_);
     if (!turn.last) return;
     std::uint16_t words[estimator::RawRecordWords<n>(estimator::kRawAll)];
-    record_.Write(trace_->armed().channels, words);
+    record_.Write(trace_->recording().channels, words);
     (void)trace_->Push(words, feed_forward_.generation());
   }
 
-  // Callbacks of the link. Context: background.
+  // What a client may ask for, by way of link::Device. Context: background.
   static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
     static_assert(monitor::ResidualBins::kValues == link::reg::kResidualBinValues &&
-                  monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValueCount);
+                  monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValues);
     const auto& c = *static_cast<const Controller*>(self);
     page.generation = c.generation_;
     page.elapsed_s = c.residuals_.elapsed_s();
@@ -215,21 +216,24 @@ class Controller {
     return status;
   }
 
-  static core::Status Check(void* self, const std::uint16_t* words, std::uint32_t) {
+  // A table on its way into force, by way of link::TableTransaction: decoded, judged and built once, by Check. What was
+  // built waits in the spare, which nobody reads, until it is adopted or another table is checked.
+  static core::Status Check(void* self, const std::uint16_t* words) {
     auto& c = *static_cast<Controller*>(self);
-    const core::Status decoded = model::Decode(words, Model::kSchema, c.table_);
-    return core::IsOk(decoded) ? c.BuildSpare() : decoded;
+    c.spare_is_checked_ = false;
+    core::Status status = model::Decode(words, Model::kSchema, c.table_);
+    if (core::IsOk(status)) status = c.BuildSpare();
+    c.spare_is_checked_ = core::IsOk(status);
+    return status;
   }
-  static core::Status Permit(void* self, const std::uint16_t* words, std::uint32_t) {
+  static core::Status Permit(void* self) {
     auto& c = *static_cast<Controller*>(self);
-    const core::Status decoded = model::Decode(words, Model::kSchema, c.table_);
-    if (!core::IsOk(decoded)) return decoded;
-    return c.enabled() && (c.table_.flags & model::kFlagBumpless) == 0 ? core::Status::kAxisEnabled : core::Status::kOk;
+    if (!c.spare_is_checked_) return core::Status::kWrongOrder;
+    return c.enabled() && !c.Spare().committed.bumpless ? core::Status::kAxisEnabled : core::Status::kOk;
   }
-  static core::Status Adopt(void* self, const std::uint16_t* words, std::uint32_t count) {
+  static core::Status Adopt(void* self) {
     auto& c = *static_cast<Controller*>(self);
-    const core::Status built = Check(self, words, count);
-    if (!core::IsOk(built)) return built;
+    if (!c.spare_is_checked_) return core::Status::kWrongOrder;
     const core::Status offered = c.feed_forward_.Offer(c.Spare().committed, c.enabled());
     if (core::IsOk(offered)) c.PutInForce();
     return offered;
@@ -247,6 +251,7 @@ class Controller {
     return suits ? core::Status::kOk : core::Status::kOutOfRange;
   }
   void PutInForce() {
+    spare_is_checked_ = false;  // from now on the spare is the table before
     const std::uint32_t now = clock_.Ticks();
     adopted_tick_.store(now, std::memory_order_relaxed);
     ForEach([&](auto& estimator) { estimator.Adopt(Spare(), now); });
@@ -268,11 +273,10 @@ class Controller {
   std::tuple<estimator::Estimator<Model, Filters>...> estimators_;
   estimator::Estimates<Model> estimates_[kFilters];
   monitor::ResidualStatistics<n> residuals_;
-  link::ResidualPages residual_pages_{TakeResiduals, this, n};
-  link::LearningRegisters learning_{{this, Hold, Reset}, device_, n};
-  estimator::Table<Model> table_;
+  estimator::Table<Model> table_;  // the last one that was decoded
   estimator::ImageWork<Model> work_;
   estimator::Image<Model> images_[2];
+  bool spare_is_checked_ = false;  // the spare is what the last Check was given
   std::uint32_t generation_ = 0;
   std::atomic<int> in_force_{0};
   std::atomic<std::uint32_t> adopted_tick_{0}, enabled_axes_{0}, feedforward_state_{0}, clamp_count_{0};

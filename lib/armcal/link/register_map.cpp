@@ -1,7 +1,5 @@
-// link - lookup and the checks that need no meaning: gaps, half values, not-a-number; knows no function code.
+// link - finds the block of a request, and checks what needs no meaning: gaps, halves of values, not-a-number.
 #include "armcal/link/register_map.hpp"
-
-#include "armcal/core/words.hpp"
 
 namespace armcal::link {
 

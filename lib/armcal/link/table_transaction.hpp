@@ -1,4 +1,4 @@
-// link - flashing a table: staged, checked, stored, adopted; knows the order of steps, not what the words mean.
+// link - flashing a table: the order in which its words are staged, checked, stored and adopted.
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,18 @@
 
 namespace armcal::link {
 
-// What the application answers about a table of words. Context: background; none may wait.
+// What the application does with a table, in the order in which the transaction asks for it. Context: background; none
+// may wait.
 struct TableApplication {
   void* context;
-  // Decodes and judges without effect: kOk or the reason of refusal.
-  core::Status (*check)(void* context, const std::uint16_t* words, std::uint32_t count);
-  // Would adopt() be accepted now (kAxisEnabled)? Without effect; asked before anything is stored.
-  core::Status (*permit)(void* context, const std::uint16_t* words, std::uint32_t count);
-  // Puts the table in force. kBusy: still at it, call again with the same words. Anything else but kOk: no effect.
-  core::Status (*adopt)(void* context, const std::uint16_t* words, std::uint32_t count);
+  // Decodes `words`, judges them and builds what will be put in force: kOk or the reason of refusal. Nothing is in
+  // force yet. What was built stays ready until the next check.
+  core::Status (*check)(void* context, const std::uint16_t* words);
+  // Would adopt() accept now what the last check built (kAxisEnabled)? Without effect; asked before anything is stored.
+  core::Status (*permit)(void* context);
+  // Puts in force what the last check built. kBusy: still at it, call again. Anything else but kOk: no effect. The
+  // transaction calls it only while the words that were checked are the staged ones.
+  core::Status (*adopt)(void* context);
 };
 
 // The command block as written by the client in one request.
@@ -27,17 +30,6 @@ struct TableCommand {
   std::uint32_t schema = 0;
   std::uint16_t words = 0;
   std::uint32_t crc = 0;
-};
-
-// The numbers are readable as a register (SPEC.md).
-enum class TransactionState : std::uint16_t {
-  kIdle = 0,
-  kOpen = 1,        // nothing staged yet
-  kLoading = 2,     // something staged
-  kChecked = 3,     // checksum and content accepted
-  kCommitting = 4,  // being stored, then adopted
-  kActive = 5,      // the staged table is stored and in force
-  kFailed = 6,      // the table before it is stored and in force
 };
 
 // open -> staged words in any order -> check -> save -> poll the state. The table in force changes last: stored, read
@@ -57,7 +49,7 @@ class TableTransaction {
   core::Status Boot();
 
   // kWrongOrder: not in this state, sequence 0 or used with other content; kOutOfRange: no such command; kWrongSchema,
-  // kWrongSize: not the table of this image or not the one opened; kBadCrc; kBusy: committing; or the application's.
+  // kWrongSize: not the table of this firmware; kBadCrc; kBusy: committing; or the application's.
   core::Status Command(const TableCommand& command);
 
   // kWrongOrder: nothing open. kBusy: committing. The range is inside the table.

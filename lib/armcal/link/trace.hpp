@@ -1,4 +1,4 @@
-// link - a ring of fixed-size records that the reader takes in pages; knows words and ticks, not what is recorded.
+// link - a trace: a ring of records of equal length, which a client starts and reads in pages.
 #pragma once
 
 #include <atomic>
@@ -6,14 +6,13 @@
 
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/status.hpp"
+#include "armcal/link/register_map.hpp"
 
 namespace armcal::link {
 
-enum class TraceMode : std::uint16_t { kOff = 0, kOneShot = 1, kStreaming = 2 };
-enum class TraceState : std::uint16_t { kOff = 0, kWaiting = 1, kRecording = 2, kDone = 3 };
-
-struct TraceArm {
-  std::uint16_t number = 0;  // the client's; the same arm written twice starts one recording
+// What a client asks for when it starts a recording.
+struct Recording {
+  std::uint16_t number = 0;  // the client's; the same request written twice starts one recording
   TraceMode mode = TraceMode::kOff;
   std::uint16_t decimation = 1;  // samples averaged into one record
   std::uint32_t start_tick = 0;  // one in the past (up to 2^31 ticks) starts at once
@@ -52,8 +51,8 @@ class Trace {
 
   // Reader ------------------------------------------------------------------------------------------------------------
   // Drops what is there and starts anew. kOutOfRange: mode, decimation 0, channels not served or a record too long.
-  core::Status Arm(TraceArm arm);
-  const TraceArm& requested() const { return requested_; }
+  core::Status Start(Recording recording);
+  const Recording& requested() const { return requested_; }
 
   // Releases all records before `next`. kOutOfRange: beyond the page. One already released: kOk, nothing happens.
   core::Status Acknowledge(std::uint32_t next);
@@ -64,17 +63,22 @@ class Trace {
   // Words of the present page. kBadAddress: beyond it.
   core::Status ReadPage(std::uint32_t offset, std::uint16_t count, std::uint16_t* words) const;
 
+  // Serves this as trace `number`: 0 (raw samples) or 1 (processed samples). kOutOfRange: no such number; kBadAddress:
+  // that number is served already; kFull.
+  core::Status Serve(RegisterMap& map, int number);
+
   std::uint32_t record_ticks() const { return tick_step_ * requested_.decimation; }
   std::uint32_t waiting() const;  // records behind the present page
   std::uint32_t lost() const;
   TraceState state() const;
 
   // Producer ----------------------------------------------------------------------------------------------------------
-  // Offer every sample; takes over a new arm. A missing tick starts the averaging window anew.
+  // Offer every sample. Takes over what a client has started meanwhile. A missing tick starts the averaging window
+  // anew.
   TraceTurn Offer(std::uint32_t tick);
-  // After `last`: `record` [armed().record_words]. kFull: refused, counted (one-shot: the recording ends instead).
+  // After `last`: `record` [recording().record_words]. kFull: refused, counted (one-shot: the recording ends instead).
   core::Status Push(const std::uint16_t* record, std::uint32_t generation);
-  const TraceArm& armed() const { return armed_; }
+  const Recording& recording() const { return recording_; }
   // Records that still fit: a simulation may wait for room, a real tick never does.
   std::uint32_t room() const {
     return slots_ - (head_.load(std::memory_order_relaxed) - tail_.load(std::memory_order_acquire));
@@ -84,9 +88,15 @@ class Trace {
   static constexpr std::uint32_t kStampWords = 3;  // tick and generation before each record
 
   struct Request {
-    TraceArm arm;
+    Recording recording;
     std::uint32_t serial;
   };
+
+  void FillPageHeader(Words<reg::kTracePageBlock>& w);
+  void FillStart(Words<reg::kTraceStartBlock>& w);
+  core::Status TakeStart(const Words<reg::kTraceStartBlock>& w);
+  void FillAcknowledge(Words<reg::kTraceAcknowledge>& w);
+  core::Status TakeAcknowledge(const Words<reg::kTraceAcknowledge>& w);
 
   void Begin();
   bool Ready() const { return started_.load(std::memory_order_acquire) == serial_; }
@@ -101,24 +111,24 @@ class Trace {
   void* context_;
 
   // Reader's.
-  TraceArm requested_;
+  Recording requested_;
   std::uint32_t serial_ = 0;
   TracePage page_;
   std::uint32_t tail_slot_ = 0;
 
-  // Shared. head_ and tail_ count records since the arm and wrap.
+  // Shared. head_ and tail_ count the records of this recording and wrap.
   core::Mailbox<Request> mailbox_;
-  std::atomic<std::uint32_t> started_{0};  // serial of the arm that the producer works on
+  std::atomic<std::uint32_t> started_{0};  // serial of the request that the producer works on
   std::atomic<std::uint32_t> head_{0};
   std::atomic<std::uint32_t> tail_{0};
   std::atomic<std::uint32_t> lost_{0};
   std::atomic<std::uint32_t> state_{0};
 
   // Producer's.
-  TraceArm armed_;
+  Recording recording_;
   std::uint32_t slots_ = 0;
   std::uint32_t head_slot_ = 0;
-  std::uint32_t taken_ = 0;  // records accepted since the arm, stops at the limit
+  std::uint32_t taken_ = 0;  // records accepted of this recording, stops at the limit
   std::uint16_t phase_ = 0;
   std::uint32_t window_tick_ = 0;
   std::uint32_t expected_tick_ = 0;

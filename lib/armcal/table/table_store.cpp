@@ -1,11 +1,38 @@
-// table - the two-slot store: inspection at power-up and the stepped save; knows no meaning of the words.
+// table - how the store looks at its two slots at power-up, and how it saves a table step by step.
 #include "armcal/table/table_store.hpp"
 
+#include <cstring>
+
 #include "armcal/core/crc.hpp"
+#include "armcal/core/words.hpp"
 
 namespace armcal::table {
 
 using core::Status;
+
+namespace {
+
+struct Header {
+  std::uint16_t format;
+  std::uint32_t schema;
+  std::uint32_t words;
+  std::uint32_t sequence;
+};
+
+void PutHeader(std::uint8_t* b, const Header& h) {
+  core::PutBytes32(b, kRecordMagic);
+  core::PutBytes16(b + 4, h.format);
+  core::PutBytes16(b + 6, 0);
+  core::PutBytes32(b + 8, h.schema);
+  core::PutBytes32(b + 12, h.words);
+  core::PutBytes32(b + 16, h.sequence);
+}
+
+Header GetHeader(const std::uint8_t* b) {
+  return {core::GetBytes16(b + 4), core::GetBytes32(b + 8), core::GetBytes32(b + 12), core::GetBytes32(b + 16)};
+}
+
+}  // namespace
 
 TableStore::TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words)
     : storage_(storage), schema_(schema), words_(words) {}

@@ -1,7 +1,7 @@
 // application - the example firmware, as the README shows it; knows no pin and no filter's inside.
 #include "armcal/controller/controller.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
-#include "armcal/link/rtu_service.hpp"
+#include "armcal/link/rtu.hpp"
 #include "board.hpp"           // yours: storage, clock, serial line and axes
 #include "selected_model.hpp"  // generated: the model that this program links
 

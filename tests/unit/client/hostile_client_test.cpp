@@ -145,14 +145,14 @@ TEST(TcpServer, ClientThatReadsLate_GetsEveryReply) {
   RawClient late(server.port());
   auto good = server.Connect();
   const Bytes portion = Flood(kPortion);
-  std::uint32_t before = good.ReadInputU32(link::reg::kStatus + 22), sent = 0;
+  std::uint32_t before = good.ReadValue<link::reg::kRequestCount>(), sent = 0;
   for (bool stuck = false; !stuck && sent < 200 * 1000;) {
     late.Send(portion);
     sent += kPortion;
     stuck = true;
     for (std::uint32_t asked = 1; asked <= 20 && stuck; ++asked)
-      stuck = good.ReadInputU32(link::reg::kStatus + 22) - before - asked < kPortion;
-    before = good.ReadInputU32(link::reg::kStatus + 22);
+      stuck = good.ReadValue<link::reg::kRequestCount>() - before - asked < kPortion;
+    before = good.ReadValue<link::reg::kRequestCount>();
   }
   const std::size_t reply_bytes = std::size_t{sent} * (9 + 250);
   EXPECT_EQ(late.Receive(reply_bytes).size(), reply_bytes);

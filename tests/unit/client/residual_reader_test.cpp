@@ -47,7 +47,7 @@ TEST(ResidualReader, WhenAnotherClientSelectsMeanwhile_ReadsAgainAndNeverMixes) 
     seen = requests;
     --others;
     const std::uint16_t joint = 1;
-    EXPECT_EQ(drive.device.map().Write(reg::kResidualSelect, 1, &joint), core::Status::kOk);
+    EXPECT_EQ(drive.device.map().Write(reg::kResidualSelect.address, 1, &joint), core::Status::kOk);
   });
   client::DriveClient drive = server.Connect();
   const client::JointResiduals r = client::ReadResiduals(drive, 4);

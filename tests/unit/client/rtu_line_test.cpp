@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "armcal/link/rtu_service.hpp"
+#include "armcal/link/rtu.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "port/linux/steady_clock.hpp"
 #include "port/linux/tty_serial.hpp"
@@ -87,8 +87,8 @@ TEST_F(RtuLine, Libmodbus_ReadsWritesAndIsRefused) {
   EXPECT_EQ(words[0], 0x1234);
   EXPECT_EQ(words[1], 0x5678);
   const std::uint16_t out[2] = {0xAAAA, 0x5555};
-  EXPECT_EQ(modbus_write_registers(modbus, link::reg::kScratch, 2, out), 2);
-  EXPECT_EQ(modbus_read_registers(modbus, link::reg::kScratch, 2, words), 2);
+  EXPECT_EQ(modbus_write_registers(modbus, link::reg::kScratch.address, 2, out), 2);
+  EXPECT_EQ(modbus_read_registers(modbus, link::reg::kScratch.address, 2, words), 2);
   EXPECT_EQ(words[0], 0xAAAA);
   EXPECT_EQ(modbus_read_input_registers(modbus, 0x30, 1, words), -1);
   EXPECT_EQ(errno, EMBXILADD);

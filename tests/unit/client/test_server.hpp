@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "armcal/link/tcp_service.hpp"
+#include "armcal/link/tcp.hpp"
 #include "host_sim/client/drive_client.hpp"
 #include "port/linux/tcp_server.hpp"
 #include "tests/unit/link/test_device.hpp"

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "armcal/core/crc.hpp"
-#include "armcal/link/rtu_framer.hpp"
-#include "armcal/link/tcp_framer.hpp"
+#include "armcal/link/rtu.hpp"
+#include "armcal/link/tcp.hpp"
 
 namespace {
 

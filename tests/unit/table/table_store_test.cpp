@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "armcal/core/words.hpp"
 #include "tests/unit/table/nor_flash.hpp"
 #include "tests/unit/table/tables.hpp"
 

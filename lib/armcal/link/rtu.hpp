@@ -1,9 +1,11 @@
-// link - Modbus RTU frames out of a byte stream; knows no line and no register.
+// link - Modbus RTU: frames out of a byte stream, and the service that answers them on a serial line.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
+#include "armcal/hardware/clock.hpp"
+#include "armcal/hardware/serial.hpp"
 #include "armcal/link/pdu_engine.hpp"
 
 namespace armcal::link {
@@ -44,6 +46,26 @@ class RtuFramer {
   bool complete_ = false;
   bool overrun_ = false;  // more bytes than any frame: wait for silence
   std::uint32_t last_byte_ms_ = 0;
+};
+
+class RtuService {
+ public:
+  RtuService(PduEngine& engine, const hardware::Serial& serial, const hardware::Clock& clock, std::uint8_t address,
+             std::uint32_t silence_ms)
+      : engine_(engine), serial_(serial), clock_(clock), framer_(address, silence_ms) {}
+
+  // One portion of bytes and at most one request. Never waits. Context: background.
+  void Poll();
+
+ private:
+  PduEngine& engine_;
+  hardware::Serial serial_;
+  hardware::Clock clock_;
+  RtuFramer framer_;
+  std::uint8_t bytes_[64] = {};
+  std::size_t there_ = 0, taken_ = 0;
+  std::uint8_t reply_[kMaxRtuFrame] = {};
+  std::size_t reply_bytes_ = 0, sent_ = 0;
 };
 
 }  // namespace armcal::link

@@ -1,5 +1,6 @@
-// link - where an RTU frame ends: by length and checksum, or by silence; knows no line and no register.
-#include "armcal/link/rtu_framer.hpp"
+// link - from the bytes of a serial line to a request, and back: an RTU frame ends by length and checksum, or by
+// silence.
+#include "armcal/link/rtu.hpp"
 
 #include "armcal/core/crc.hpp"
 
@@ -103,6 +104,24 @@ std::size_t RtuFramer::FinishReply(std::uint8_t* frame, std::size_t pdu_bytes) c
   frame[pdu_bytes + 1] = static_cast<std::uint8_t>(crc & 0xFFu);
   frame[pdu_bytes + 2] = static_cast<std::uint8_t>(crc >> 8);
   return pdu_bytes + 3;
+}
+
+void RtuService::Poll() {
+  if (sent_ < reply_bytes_) {
+    sent_ += serial_.Write(reply_ + sent_, reply_bytes_ - sent_);
+    return;
+  }
+  if (taken_ == there_) {
+    taken_ = 0;
+    there_ = serial_.Read(bytes_, sizeof bytes_);
+  }
+  std::size_t used = 0;
+  const RtuFramer::Result result = framer_.OnBytes(bytes_ + taken_, there_ - taken_, clock_.Ms(), used);
+  taken_ += used;
+  if (result == RtuFramer::Result::kNothing) return;
+  const std::size_t pdu = engine_.Handle(framer_.pdu(), framer_.pdu_bytes(), reply_ + 1);
+  sent_ = 0;
+  reply_bytes_ = result == RtuFramer::Result::kBroadcast || pdu == 0 ? 0 : framer_.FinishReply(reply_, pdu);
 }
 
 }  // namespace armcal::link

@@ -1,5 +1,4 @@
-// client - libmodbus with time-outs, retries and reasons. Its float helpers are not used, because their word order
-// varies.
+// client - libmodbus with time-outs, retries and reasons.
 #include "host_sim/client/drive_client.hpp"
 
 #include <fmt/core.h>
@@ -17,7 +16,7 @@ namespace reg = link::reg;
 
 namespace {
 
-constexpr int kChunk = 120;  // even, so that no request splits a 32-bit value, and below the protocol's 123
+constexpr int kChunk = 120;  // below the protocol's 123, and even, so that no request splits a 32-bit value
 constexpr int kAttempts = 3;
 constexpr std::uint32_t kResponse_s = 2;
 
@@ -59,7 +58,7 @@ void DriveClient::Connect() {
   modbus_set_response_timeout(fresh.get(), kResponse_s, 0);
   if (modbus_connect(fresh.get()) != 0)
     throw LinkError(fmt::format("{}: cannot connect: {}", name_, modbus_strerror(errno)));
-  modbus_flush(fresh.get());  // a line keeps what came late for the request before
+  modbus_flush(fresh.get());  // a serial line may still hold the late answer to an earlier request
   connection_ = std::move(fresh);
 }
 
@@ -75,7 +74,7 @@ void DriveClient::Request(const std::string& what, const std::function<int(_modb
   throw LinkError(fmt::format("{}: {}: {} (tried {} times)", name_, what, failure, kAttempts));
 }
 
-// Asks the drive for its own reason; without an answer to that the exception alone has to do.
+// Asks the drive for its own reason. If it does not answer, there is only the exception.
 void DriveClient::Refused(const std::string& what, int exception) {
   link::Words<reg::kErrorBlock> w;
   const bool told =

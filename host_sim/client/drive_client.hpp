@@ -47,9 +47,9 @@ struct SerialLine {
   char parity = 'E';  // N, E or O
 };
 
-// Every call throws LinkError after three attempts without a sensible answer (two seconds each; the connection is made
-// anew between them, so that a late answer is never taken for the next one) and RefusedError, with the drive's own
-// reason, when it answers with an exception. Repeating is safe because every armcal write is idempotent.
+// Every call throws LinkError after three attempts without a sensible answer, two seconds each. Between them it
+// connects anew, so that a late answer is never taken for the next one. It throws RefusedError, with the drive's own
+// reason, if the drive answers with an exception. An attempt may be repeated because every armcal write may come twice.
 class DriveClient {
  public:
   DriveClient(const std::string& host, int port, int unit = 1);
@@ -58,14 +58,14 @@ class DriveClient {
   DriveClient(DriveClient&&) noexcept;
   DriveClient& operator=(DriveClient&&) noexcept;
 
-  // Any number of registers; split into requests of at most 120.
+  // Any number of registers. They are split into requests of at most 120.
   std::vector<std::uint16_t> ReadInput(int first, int count);
   std::vector<std::uint16_t> ReadHolding(int first, int count);
-  // The same for writing; a block that must be written whole is at most 120 registers.
+  // The same for writing. A block that must be written whole has at most 120 registers.
   void Write(int first, std::span<const std::uint16_t> words);
   void WriteSingle(int address, std::uint16_t word);  // function 6
 
-  // By declaration (registers.hpp): a block or a register, of trace 0 or 1 where it exists twice.
+  // A block or a register by its declaration (registers.hpp). `trace`: 0 or 1, for registers that exist twice.
   template <const auto& kBlock>
   link::Words<kBlock> Read(int trace = 0) {
     return link::Words<kBlock>(Read(link::SpanOf(kBlock).Of(trace)).data());
@@ -78,7 +78,7 @@ class DriveClient {
   void Write(const link::Words<kBlock>& words, int trace = 0) {
     Write(link::SpanOf(kBlock).Of(trace).first, {words.data(), words.size()});
   }
-  // One register takes function 6, a 32-bit value function 16.
+  // A value of one register is written with function 6, a 32-bit value with function 16.
   template <const link::Register& kRegister>
   void WriteValue(link::ValueOf<kRegister> value, int trace = 0) {
     link::Words<kRegister> words;

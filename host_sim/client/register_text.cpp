@@ -21,7 +21,7 @@ struct StatusText {
   const char* meaning;
 };
 
-// A switch without default: the compiler names the enumerator that is missing here.
+// There is no default case, so that the compiler names an enumerator that is missing here.
 StatusText TextOf(Status status) {
   switch (status) {
     case Status::kOk:

@@ -1,4 +1,4 @@
-// client - selects, reads, and makes sure that it was one snapshot.
+// client - selects a joint, reads its statistics, and makes sure that all of them are of one snapshot.
 #include "host_sim/client/residual_reader.hpp"
 
 #include <fmt/core.h>

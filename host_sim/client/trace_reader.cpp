@@ -65,7 +65,7 @@ std::size_t TraceReader::TakePage(TraceRecords& records) {
 TraceRecords TraceReader::TakeAll() {
   TraceRecords records;
   while (true) {
-    // The state is read together with the emptiness of the page, so nothing can arrive after "done and empty".
+    // State and page come from one reading, so nothing can arrive after "done" with an empty page.
     const std::size_t taken = TakePage(records);
     if (taken == 0 && (records.state == TraceState::kDone || records.state == TraceState::kOff)) return records;
     if (taken == 0) std::this_thread::sleep_for(kTracePoll);

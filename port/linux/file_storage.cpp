@@ -1,4 +1,4 @@
-// port_linux - NOR flash played by a file; knows no record.
+// port_linux - a file that plays NOR flash.
 #include "port/linux/file_storage.hpp"
 
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-// port_linux - the machine's monotonic time as the port's clock; knows no application.
+// port_linux - the monotonic time of the machine as lib's clock.
 #include "port/linux/steady_clock.hpp"
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// port_linux - termios settings and non-blocking reads; knows no frame.
+// port_linux - sets a terminal up with termios and reads it without waiting.
 #include "port/linux/tty_serial.hpp"
 
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-// mps2 - NOR flash played by PSRAM; knows no record.
+// mps2 - PSRAM that plays NOR flash.
 #include "port/mps2/psram_storage.hpp"
 
 extern "C" volatile std::uint8_t nor_begin[];  // linker script

@@ -1,4 +1,4 @@
-// template - counts ticks; knows no application.
+// template - counts ticks and milliseconds.
 #include "port/template/clock.hpp"
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// template - ticks and milliseconds for a new target; knows no application.
+// template - the clock of a new target: ticks and milliseconds.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,8 @@ inline constexpr std::uint32_t kTickRate_Hz = 1000;  // the rate of your control
 
 hardware::Clock TargetClock();
 
-// Your control tick calls this once, first of all. Returns the tick's number, which goes into RawSample::tick.
+// Your control tick calls this once, before anything else. Returns the number of the tick, which goes into
+// RawSample::tick.
 std::uint32_t CountTick();
 
 }  // namespace armcal::port::target

@@ -1,4 +1,4 @@
-// template - a serial line for a new target: two rings between interrupt and background; knows no frame.
+// template - a serial line for a new target: two rings between its interrupts and the background.
 #pragma once
 
 #include <cstdint>

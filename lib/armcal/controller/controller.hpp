@@ -1,4 +1,4 @@
-// controller - introduces estimators, feed-forward, table and link to each other; knows no board and no bus.
+// controller - connects estimators, feed-forward, table and link to one motion controller.
 #pragma once
 
 #include <atomic>
@@ -139,7 +139,7 @@ class Controller {
     return identity;
   }
 
-  // The lists that a client may read at any time.
+  // The lists of floats that a client may read.
   template <std::size_t... k>
   core::Status Serve(std::index_sequence<k...>) {
     namespace reg = link::reg;
@@ -193,7 +193,7 @@ class Controller {
     (void)trace_->Push(words, feed_forward_.generation());
   }
 
-  // What a client may ask for, by way of link::Device. Context: background.
+  // What link::Device asks for when a client does. Context: background.
   static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
     static_assert(monitor::ResidualBins::kValues == link::reg::kResidualBinValues &&
                   monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValues);
@@ -207,7 +207,7 @@ class Controller {
     static_cast<Controller*>(self)->ForEach([&](auto& estimator) { estimator.Hold(hold); });
     return core::Status::kOk;
   }
-  // Each filter that can; kOutOfRange: none can.
+  // Resets each filter that can. kOutOfRange: none can.
   static core::Status Reset(void* self, int block) {
     core::Status status = core::Status::kOutOfRange;
     static_cast<Controller*>(self)->ForEach([&](auto& estimator) {
@@ -216,8 +216,8 @@ class Controller {
     return status;
   }
 
-  // A table on its way into force, by way of link::TableTransaction: decoded, judged and built once, by Check. What was
-  // built waits in the spare, which nobody reads, until it is adopted or another table is checked.
+  // What link::TableTransaction asks for when a table is flashed. Check decodes and builds the table, once. What it has
+  // built waits in the spare until it is adopted or until another table is checked. Context: background.
   static core::Status Check(void* self, const std::uint16_t* words) {
     auto& c = *static_cast<Controller*>(self);
     c.spare_is_checked_ = false;
@@ -240,9 +240,9 @@ class Controller {
   }
 
   bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
-  // The image that nobody reads: estimators hold the other one, feed-forward a copy.
+  // The one of the two that nobody reads. The estimators read the other one, and the feed-forward has a copy.
   estimator::Image<Model>& Spare() { return images_[1 - in_force_.load(std::memory_order_relaxed)]; }
-  // kOutOfRange, too: a filter's form cannot hold what the table asks for.
+  // Answers as BuildImage; kOutOfRange also if a filter's form cannot hold what the table asks for.
   core::Status BuildSpare() {
     const core::Status built = estimator::BuildImage(table_, generation_ + 1, work_, Spare());
     if (!core::IsOk(built)) return built;

@@ -8,7 +8,7 @@ using core::Status;
 Device::Device(const Identity& identity, const LiveStatus& live, TableTransaction& transaction,
                const ClientRequests& requests)
     : identity_(identity), live_(live), transaction_(transaction), requests_(requests), engine_(map_, identity.texts) {
-  static_cast<void>(ServeOwn());  // an empty map has room for all of it; a test reads every register
+  static_cast<void>(ServeOwn());  // cannot be refused: the map is still empty, and a test reads every register
 }
 
 Status Device::ServeOwn() {
@@ -162,7 +162,7 @@ Status Device::TakeHold(const Words<reg::kLearningHold>& w) {
   return done;
 }
 
-void Device::FillReset(Words<reg::kLearningReset>&) {}  // a command: nothing stays in it
+void Device::FillReset(Words<reg::kLearningReset>&) {}  // it is a command and reads 0
 
 Status Device::TakeReset(const Words<reg::kLearningReset>& w) {
   const std::uint16_t block = w.Get<reg::kLearningReset>();

@@ -1,4 +1,4 @@
-// link - a drive as its client sees it: every block of the register map but the traces, and the lock of a session.
+// link - serves the registers of a drive, all but the traces, and keeps the lock of a session.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct LiveStatus {
   std::uint32_t rows_gated[2] = {};
 };
 
-// One joint's residual statistics at one instant; the values as SPEC.md lists them.
+// The residual statistics of one joint at one instant. SPEC.md lists the values.
 struct ResidualPage {
   std::uint32_t generation = 0;
   std::uint32_t elapsed_s = 0;
@@ -43,45 +43,47 @@ struct ResidualPage {
   float values[reg::kResidualValues] = {};
 };
 
-// What the application does when a client asks for it. Context: background; none may wait.
+// What the application does when a client asks for it. None of these may wait. Context: background.
 struct ClientRequests {
   void* context;
-  // Learning is put on hold (true) or goes on.
+  // Puts learning on hold (true) or lets it go on (false).
   core::Status (*hold)(void* context, bool hold);
-  // Forgets a block: a joint from 0, or the number of joints for what acts on several of them. Refused: without effect.
+  // Forgets what was learnt of a block: a joint from 0, or the number of joints for what acts on several of them. If it
+  // is refused, nothing changes.
   core::Status (*reset)(void* context, int block);
-  // Fills all of `page`; joint from 0.
+  // Fills all of `page`. joint: from 0.
   void (*take_residuals)(void* context, int joint, ResidualPage& page);
 };
 
 // Context of every call: background.
 class Device {
  public:
-  static constexpr std::uint32_t kUnlock_ms = 60000;  // the lock falls shut so long after the last write that needs it
+  static constexpr std::uint32_t kUnlock_ms =
+      60000;  // the lock closes this long after the last write that needs it open
 
   // `live` and `transaction` outlive the device.
   Device(const Identity& identity, const LiveStatus& live, TableTransaction& transaction,
          const ClientRequests& requests);
   Device(const Device&) = delete;
 
-  // Serves a list of float32: as many of its elements as `list` has. `values` are read at each request.
-  // kFull: no room for another list; else what RegisterMap::Add answers.
+  // Serves a list of float32. Each request reads `values` anew. kFull: no room for another list; else what
+  // RegisterMap::Add answers.
   core::Status Serve(const Span& list, const float* values);
 
-  // What else the device can do (reg::kHasRawTrace ...). Before the first request.
+  // Adds to what the device says it can do (reg::kHasRawTrace ...). Call it before the first request.
   void Declare(std::uint32_t capabilities) { identity_.capabilities |= capabilities; }
 
-  // Time goes on for the transaction and the lock. Call it in every turn of the background loop.
+  // Tells the transaction and the lock what time it is. Call it in every turn of the background loop.
   void Step(std::uint32_t now_ms);
 
-  RegisterMap& map() { return map_; }  // for further blocks: traces, the vendor range
+  RegisterMap& map() { return map_; }  // for further blocks: traces, and the integrator's own
   PduEngine& engine() { return engine_; }
   bool unlocked() const { return unlocked_; }
 
  private:
   static constexpr int kMaxLists = 8;
 
-  // Memory that a client may write and read, and nothing else happens.
+  // Memory that a client may write and read. Nothing else happens.
   template <int kWords>
   struct Scratch {
     core::Status Read(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
@@ -128,8 +130,8 @@ class Device {
   std::uint32_t now_ms_ = 0;
   std::uint32_t touched_ms_ = 0;
   std::uint16_t held_ = 0;
-  // A page is larger than one request. So selecting a joint copies its statistics, and the copy stays until the next
-  // selection. Two clients that select in turn see that by the snapshot's number.
+  // A page is larger than one request. So the selection of a joint copies its statistics, and the copy stays until the
+  // next selection. Two clients that select in turn notice it, because the number of the snapshot changes.
   ResidualPage residuals_;
   FloatList residual_values_{residuals_.values};
   std::uint16_t residual_joint_ = 0, snapshot_ = 0;

@@ -12,7 +12,7 @@
 
 namespace armcal::link {
 
-// What may be written to a block beyond what its own write function checks.
+// What the map checks before it calls a block's write function.
 enum class WriteRule : std::uint8_t {
   kWords,   // any registers
   kPairs,   // 32-bit values: never half of one
@@ -20,14 +20,14 @@ enum class WriteRule : std::uint8_t {
   kWhole,   // only the whole block in one request
 };
 
-// A run of registers. `offset` counts from `first`; offset + count never exceeds the block.
+// A run of registers and who answers for them. `offset` counts from `first`; offset + count never exceeds the block.
 struct Block {
   RegisterKind kind;
   std::uint16_t first;
   std::uint16_t count;
   void* context;
   core::Status (*read)(void* context, std::uint16_t offset, std::uint16_t count, std::uint16_t* words);
-  // nullptr: read-only. Applies all of it or, answering anything else but kOk, nothing.
+  // nullptr: read-only. It applies all words and answers kOk, or it applies none of them.
   core::Status (*write)(void* context, std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
   WriteRule rule;
 };
@@ -41,7 +41,7 @@ struct LastError {
   std::uint32_t request = 0;
 };
 
-// The exception code of a Status: the one place where the two meet. 0 for ok and limited.
+// The Modbus exception for a Status; 0 if the status is ok or limited.
 std::uint8_t ExceptionOf(core::Status status);
 
 // Context: background.
@@ -51,7 +51,7 @@ class RegisterMap {
 
   // kFull; kOutOfRange: empty or beyond 0xFFFF; kBadAddress: overlaps another block of its kind.
   core::Status Add(const Block& block);
-  // One after the other; stops at the first that is refused.
+  // Adds them one after the other and stops at the first that is refused.
   template <std::size_t kCount>
   core::Status Add(const Block (&blocks)[kCount]) {
     for (const Block& block : blocks)
@@ -59,7 +59,8 @@ class RegisterMap {
     return core::Status::kOk;
   }
 
-  // A read may run over adjacent blocks. kBadAddress: a register in the range is not there; else what a block answers.
+  // A read may run over adjacent blocks. kBadAddress: a register in the range does not exist. Else what a block
+  // answers.
   core::Status Read(RegisterKind kind, std::uint16_t first, std::uint16_t count, std::uint16_t* words) const;
 
   // One request writes one block. kBadAddress: the range leaves the block; kReadOnly; kWrongSize: half a 32-bit value
@@ -83,8 +84,8 @@ class RegisterMap {
 };
 
 // How registers are served -------------------------------------------------------------------------------------------
-// Whoever has values has a function Serve(RegisterMap&) that adds its blocks, each made by one of these two functions.
-// Both take member functions of the owner, which outlives the map.
+// The owner of values adds blocks to the map. One of these two functions makes each block out of member functions of
+// the owner. The owner outlives the map.
 
 constexpr WriteRule RuleOf(const Span& span) {
   if (span.access == Access::kWriteBlock) return WriteRule::kWhole;
@@ -93,7 +94,7 @@ constexpr WriteRule RuleOf(const Span& span) {
                                            : WriteRule::kWords;
 }
 
-// What a read answers from words that lie there.
+// Answers a read with a part of words that lie ready.
 inline core::Status CopyWords(const std::uint16_t* from, std::uint16_t offset, std::uint16_t count,
                               std::uint16_t* words) {
   std::memcpy(words, from + offset, 2u * count);
@@ -121,8 +122,8 @@ core::Status WritePart(void* owner, std::uint16_t offset, std::uint16_t count, c
 }
 }  // namespace internal
 
-// A small block. Each read has it filled: void kFill(Words<kBlock>&). A write takes all of it:
-// Status kTake(const Words<kBlock>&). `trace`: 0 or 1, for registers that exist twice.
+// A small block. Each read calls void kFill(Words<kBlock>&), which fills all of it. A write calls
+// Status kTake(const Words<kBlock>&), which gets all of it. `trace`: 0 or 1, for registers that exist twice.
 template <const auto& kBlock, auto kFill, auto kTake = nullptr, class Owner>
 Block FilledBlock(Owner* owner, int trace = 0) {
   constexpr Span kSpan = SpanOf(kBlock);
@@ -137,7 +138,7 @@ Block FilledBlock(Owner* owner, int trace = 0) {
   return block;
 }
 
-// A block that is read and written in any parts: Status kRead(offset, count, words), Status kWrite(the same).
+// A large block. Its owner answers each part that is asked for: Status kRead(offset, count, words), and kWrite alike.
 template <auto kRead, auto kWrite = nullptr, class Owner>
 Block DirectBlock(const Span& span, Owner* owner) {
   Block block = {span.kind, span.first, span.count, owner, internal::ReadPart<kRead, Owner>, nullptr, RuleOf(span)};
@@ -145,7 +146,7 @@ Block DirectBlock(const Span& span, Owner* owner) {
   return block;
 }
 
-// A list of float32 that are read where they lie.
+// A list of float32. A read looks at the values as they are at that moment.
 struct FloatList {
   const float* values;
 

@@ -15,7 +15,7 @@ template <const Register& kRegister>
 using ValueOf = std::conditional_t<kRegister.type == RegisterType::kU16, std::uint16_t,
                                    std::conditional_t<kRegister.type == RegisterType::kU32, std::uint32_t, float>>;
 
-// The words of a block, or of one register, as they go over the wire: the drive and the client put values in and take
+// The words of a block, or of one register, as they go over the wire. The drive and the client put values in and take
 // them out by the register's declaration. A register of another block, or a value of another type, does not compile.
 template <const auto& kBlock>
 class Words {
@@ -25,7 +25,7 @@ class Words {
   Words() = default;
   explicit Words(const std::uint16_t* from) { std::memcpy(words_, from, sizeof words_); }
 
-  // T: the register's type, or an enumeration or bool that is sent as such.
+  // T is the register's type. It may also be an enumeration or bool, whose number is then sent.
   template <const Register& kRegister, int kElement = 0, class T>
   void Set(T value) {
     using Value = ValueOf<kRegister>;

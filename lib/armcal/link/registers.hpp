@@ -1,9 +1,9 @@
 // link - the register map: each register is declared here once, and everything else about it follows from that.
 //
-// The tables of SPEC.md, the JSON for tools, the offsets at which a drive puts a value and the offsets at which a
-// client finds it are all made from these declarations. Addresses are zero-based PDU addresses. A 32-bit value takes
-// two registers, high word first ("ABCD"). Values are in SI units; there are no scaling factors. An address never
-// changes its meaning inside a major version. 0x8000-0xFFFF of both kinds belongs to the integrator.
+// The declarations make the tables of SPEC.md, the JSON for tools, the offset at which a drive puts a value and the
+// offset at which a client finds it. Addresses are zero-based PDU addresses. A 32-bit value takes two registers, high
+// word first ("ABCD"). Values are in SI units; there are no scaling factors. An address never changes its meaning
+// inside a major version. Addresses 0x8000-0xFFFF of both kinds belong to the integrator.
 #pragma once
 
 #include <array>
@@ -20,14 +20,15 @@ enum class Access : std::uint8_t { kRead, kWrite, kWriteBlock };  // kWriteBlock
 
 constexpr std::uint16_t WordsOf(RegisterType type) { return type == RegisterType::kU16 ? 1 : 2; }
 
-// What a client may write. Not given: every value of the type, or what the text says.
+// The values that a client may write. If no range is given, the text says what may be written.
 struct Range {
   bool given = false;
   double low = 0.0, high = 0.0;
 };
 
-// `count` elements of `type` from `address` on; elements beyond what a device has are not served. A register with a
-// second name exists twice, for trace 0 and for trace 1, which lies `stride` registers further on.
+// One declaration: `count` elements of `type` from `address` on. A device serves as many elements as it has. A register
+// with a second name exists twice: the first is for trace 0, and the one for trace 1 lies `stride` registers further
+// on.
 struct Register {
   const char* name = "";
   RegisterKind kind = RegisterKind::kInput;
@@ -42,7 +43,7 @@ struct Register {
   std::uint16_t stride = 0;
 };
 
-// A run of registers, in words: one register, or a block of several that follow each other without a gap.
+// A run of words: one register, or a block of registers that follow each other without a gap.
 struct Span {
   RegisterKind kind;
   std::uint16_t first;
@@ -67,7 +68,7 @@ constexpr Span Between(const Register& first, const Register& last) {
   return {first.kind, first.address, static_cast<std::uint16_t>(SpanOf(last).end() - first.address),
           first.type, first.access,  first.stride};
 }
-// The address so many words behind a register's first one, for lists of which a part is meant.
+// The address of a later word of a register that has several, for example of one element of a list.
 constexpr std::uint16_t operator+(const Register& r, int words) {
   return static_cast<std::uint16_t>(r.address + words);
 }
@@ -96,12 +97,12 @@ constexpr Register Twice(Register r, const char* second_name, std::uint16_t stri
   r.second_name = second_name, r.stride = stride;
   return r;
 }
-constexpr std::uint16_t kPageStride = 0x2000, kStartStride = 0x0010;  // from a register of trace 0 to that of trace 1
+constexpr std::uint16_t kPageStride = 0x2000, kStartStride = 0x0010;  // from trace 0 to trace 1
 }  // namespace declare
 
 namespace reg {
 
-// How much there can be.
+// The most that there can be.
 inline constexpr std::uint16_t kMaxJoints = 16, kMaxColumns = 256, kMaxTableWords = 0x1000, kMaxPageWords = 0x1F00;
 inline constexpr std::uint16_t kScratchWords = 32, kScratchValues = 4;
 inline constexpr std::uint16_t kResidualSignals = 4, kResidualQuarters = 4, kResidualSums = 8, kResidualSlices = 32;
@@ -150,7 +151,7 @@ inline constexpr Register kSampleTicks = In(0x0018, 1, kU16, "sample_ticks", "",
 inline constexpr Register kPageDataWords = In(0x0019, 1, kU16, "page_data_words", "", "most registers of one trace page's data");
 inline constexpr Span kIdentityBlock = Between(kMagic, kPageDataWords);
 
-// Status: what the device does, and what it refused last.
+// Status: what the device does now, and the last request that it refused.
 inline constexpr Register kTransactionState = In(0x0040, 1, kU16, "transaction_state", "", "0 idle, 1 open, 2 loading, 3 checked, 4 committing, 5 active, 6 failed");
 inline constexpr Register kTransactionStatus = In(0x0041, 1, kU16, "transaction_status", "", "Status of the last command, or why it failed later");
 inline constexpr Register kTableStatus = In(0x0042, 1, kU16, "table_status", "", "Status: 0 a valid table is active, else why not");
@@ -199,7 +200,7 @@ inline constexpr Register kResidualHistory = In(0x1408, kResidualSliceValues, kF
 inline constexpr Span kResidualHeaderBlock = Between(kResidualJoint, kResidualSigma);
 inline constexpr Span kResidualValuesBlock = Between(kResidualReference, kResidualHistory);
 
-// A page of a trace: a header, then records. The words "arm" in two names are older than "recording" and stay.
+// A page of a trace: a header, then records. In two names "arm" means the recording; programs read them, so they stay.
 inline constexpr Register kTraceFirstRecord = Twice(In(0x4000, 1, kU32, "trace0_first_record", "", "number of the page's first record, counted from the start of the recording"), "trace1_first_record", kPageStride);
 inline constexpr Register kTraceFirstTick = Twice(In(0x4002, 1, kU32, "trace0_first_tick", "", "its tick (first tick of its window)"), "trace1_first_tick", kPageStride);
 inline constexpr Register kTraceTickStep = Twice(In(0x4004, 1, kU32, "trace0_tick_step", "", "ticks from record to record inside the page"), "trace1_tick_step", kPageStride);
@@ -229,7 +230,7 @@ inline constexpr Register kUnlock = Hold(0x0040, 1, kU32, kWrite, "unlock", "", 
 inline constexpr Register kScratchFloat = Hold(0x0050, kScratchValues, kF32, kWrite, "scratch_float", "", "does nothing; NaN and infinity are refused");
 inline constexpr Register kScratchU32 = Hold(0x0058, kScratchValues, kU32, kWrite, "scratch_u32", "", "does nothing; half a value is refused");
 
-// What starts a recording, and what releases its pages.
+// These start a recording and release its pages.
 inline constexpr Register kTraceRecording = Twice(Hold(0x0100, 1, kU16, kBlock, "trace0_arm", "", "client's number of this recording"), "trace1_arm", kStartStride);
 inline constexpr Register kTraceMode = Twice(Hold(0x0101, 1, kU16, kBlock, "trace0_mode", "", "0 off, 1 one-shot, 2 streaming"), "trace1_mode", kStartStride);
 inline constexpr Register kTraceDecimation = Twice(Hold(0x0102, 1, kU16, kBlock, "trace0_decimation", "", "samples averaged into one record, at least 1"), "trace1_decimation", kStartStride);
@@ -240,14 +241,14 @@ inline constexpr Register kTraceChannelMask = Twice(Hold(0x0108, 1, kU32, kBlock
 inline constexpr Register kTraceAcknowledge = Twice(Hold(0x010C, 1, kU32, kWrite, "trace0_acknowledge", "", "number of the next record wanted"), "trace1_acknowledge", kStartStride);
 inline constexpr Span kTraceStartBlock = Between(kTraceRecording, kTraceChannelMask);
 
-// The rest of what a client may write, and the two tables.
+// Residual statistics, learning, and the two tables.
 inline constexpr Register kResidualSelect = Hold(0x0140, 1, kU16, kWrite, "residual_select", "", "joint from 1: takes a snapshot of its statistics");
 inline constexpr Register kLearningHold = Hold(0x0150, 1, kU16, kWrite, "learning_hold", "", "1: rows no longer change the estimates, 0: they do; needs unlock");
 inline constexpr Register kLearningReset = Hold(0x0151, 1, kU16, kWrite, "learning_reset", "", "joint from 1, or axes + 1 (links and what else joints share): what was known of it no longer counts; reads 0; needs unlock");
 inline constexpr Register kStagedTable = Hold(0x1000, kMaxTableWords, kU16, kWrite, "staged_table", "", "the table being loaded");
 inline constexpr Register kActiveTable = Hold(0x2000, kMaxTableWords, kU16, kRead, "active_table", "", "the table in force");
 
-// Every register above. The compiler notices if one inside a block is missing, a test notices any other.
+// Every register above. If one is missing here, the compiler notices it inside a block, and a test notices any other.
 inline constexpr const Register* kDeclared[] = {
   &kMagic, &kMapMajor, &kMapMinor, &kLayoutCrc, &kSchema, &kFirmwareVersion, &kSerialNumber, &kProbeFloat, &kProbeU32, &kAxes,
   &kParameters, &kColumns, &kTableWords, &kCapabilities, &kTickRate, &kSampleTicks, &kPageDataWords,
@@ -268,7 +269,7 @@ inline constexpr const Register* kDeclared[] = {
 
 }  // namespace reg
 
-// What stands in `transaction_state`, `trace_mode` and `trace_state`.
+// The values of `transaction_state`, `trace0_mode` and `trace0_state`.
 enum class TransactionState : std::uint16_t {
   kIdle = 0,
   kOpen = 1,        // nothing staged yet
@@ -276,7 +277,7 @@ enum class TransactionState : std::uint16_t {
   kChecked = 3,     // checksum and content accepted
   kCommitting = 4,  // being stored, then adopted
   kActive = 5,      // the staged table is stored and in force
-  kFailed = 6,      // the table before it is stored and in force
+  kFailed = 6,      // the table before the staged one is stored and in force
 };
 enum class TraceMode : std::uint16_t { kOff = 0, kOneShot = 1, kStreaming = 2 };
 enum class TraceState : std::uint16_t { kOff = 0, kWaiting = 1, kRecording = 2, kDone = 3 };
@@ -293,7 +294,7 @@ constexpr bool Before(const Register& a, const Register& b) {
   return a.kind == b.kind ? a.address < b.address : a.kind == RegisterKind::kInput;
 }
 
-// Input registers first, each kind by address.
+// In the order of the wire: input registers first, and each kind by address.
 constexpr std::array<Register, CountWithSecond()> EveryRegister() {
   std::array<Register, CountWithSecond()> all{};
   std::size_t count = 0;
@@ -315,7 +316,7 @@ constexpr std::array<Register, CountWithSecond()> EveryRegister() {
 
 }  // namespace internal
 
-// The whole map, one entry a name.
+// The whole map, with one entry for each name.
 inline constexpr auto kRegisters = internal::EveryRegister();
 
 namespace internal {
@@ -328,7 +329,7 @@ constexpr bool NoneOverlap() {
 }
 static_assert(NoneOverlap(), "two registers share an address");
 
-// All words of the block are registers of the map, of its kind and access.
+// True if every word of the block belongs to a register of the map that has the block's kind and access.
 constexpr bool IsWhole(const Span& block) {
   std::uint32_t at = block.first;
   for (const Register& r : kRegisters)

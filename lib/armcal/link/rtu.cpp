@@ -1,5 +1,4 @@
-// link - from the bytes of a serial line to a request, and back: an RTU frame ends by length and checksum, or by
-// silence.
+// link - from the bytes of a serial line to a request and its reply. An RTU frame ends by its length or by silence.
 #include "armcal/link/rtu.hpp"
 
 #include "armcal/core/crc.hpp"
@@ -10,7 +9,7 @@ namespace {
 
 constexpr std::size_t kNever = 0;
 
-// Length of a whole request frame by what is there of it; kNever while or because it cannot be told.
+// The length of a whole request, by the part of it that is there. kNever: it cannot be told, now or at all.
 std::size_t RequestBytes(const std::uint8_t* frame, std::size_t filled) {
   switch (frame[1]) {
     case 3:
@@ -74,7 +73,7 @@ RtuFramer::Result RtuFramer::OnBytes(const std::uint8_t* bytes, std::size_t coun
     filled_ = 0;
   }
   if ((filled_ != 0 || overrun_) && now_ms - last_byte_ms_ >= silence_ms_) {
-    // A whole frame of a function or length we did not expect still deserves its exception.
+    // A whole frame whose function or length was not expected gets an exception as its answer.
     const bool whole = !overrun_ && ChecksumHolds();
     overrun_ = false;
     if (whole) {

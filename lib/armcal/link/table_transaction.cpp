@@ -1,4 +1,4 @@
-// link - the flashing state machine; knows the order of steps, not what the words mean.
+// link - the steps of flashing a table: command by command, and then one small piece at each turn of the background.
 #include "armcal/link/table_transaction.hpp"
 
 #include <cstring>
@@ -89,7 +89,7 @@ Status TableTransaction::WriteStaged(std::uint16_t offset, std::uint16_t count, 
   if (state_ != TransactionState::kOpen && state_ != TransactionState::kLoading && state_ != TransactionState::kChecked)
     return Status::kWrongOrder;
   std::memcpy(staged_ + offset, words, 2u * count);
-  state_ = TransactionState::kLoading;  // what was checked is no longer what is staged
+  state_ = TransactionState::kLoading;  // the staged words are no longer those that were checked
   touched_ms_ = now_ms_;
   return Status::kOk;
 }
@@ -122,7 +122,8 @@ void TableTransaction::Step(std::uint32_t now_ms) {
   }
 }
 
-// An axis may have been enabled since it was permitted: wait for it, but not for ever.
+// An axis may have been enabled after the application permitted the adoption. Wait until it is disabled, but not for
+// ever.
 void TableTransaction::Adopt() {
   const bool booting = phase_ == Phase::kBooting;
   const Status status = application_.adopt(application_.context);

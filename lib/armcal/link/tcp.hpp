@@ -11,21 +11,21 @@ namespace armcal::link {
 inline constexpr std::size_t kMbapBytes = 7;
 inline constexpr std::size_t kMaxTcpFrame = kMbapBytes + kMaxPdu;
 
-// One connection's receiver: a frame ends where its header says, whatever its function code would suggest.
-// A header that cannot be one (protocol not 0, length outside 2..254) makes the stream unreadable from there on; only
-// closing the connection finds a frame's beginning again.
+// The receiver of one connection. A frame ends where its header says, whatever its function code is. After a header
+// with another protocol than 0 or a length outside 2..254 the beginning of the next frame is unknown, so the connection
+// has to be closed.
 class TcpFramer {
  public:
   enum class Result : std::uint8_t { kNeedMore, kFrame, kBroken };
 
-  // Takes bytes up to the end of one frame; `used` says how many. Call again with the rest. Context: background.
+  // Takes bytes up to the end of one frame; `used` says how many. Call it again with the rest. Context: background.
   Result OnBytes(const std::uint8_t* bytes, std::size_t count, std::size_t& used);
 
-  // After kFrame, until the next OnBytes: function code and data.
+  // Function code and data. Valid after kFrame, until the next OnBytes.
   const std::uint8_t* pdu() const { return frame_ + kMbapBytes; }
   std::size_t pdu_bytes() const { return filled_ - kMbapBytes; }
 
-  // Puts the header of the answer before a reply PDU of `pdu_bytes` bytes: `header` [kMbapBytes].
+  // Fills the header of an answer whose PDU has `pdu_bytes` bytes. header: [kMbapBytes].
   void PutReplyHeader(std::size_t pdu_bytes, std::uint8_t* header) const;
 
   bool mid_frame() const { return filled_ != 0 && !complete_; }
@@ -37,7 +37,7 @@ class TcpFramer {
   bool complete_ = false;
 };
 
-// One framer a connection slot. The three functions fit a byte server's hooks; `context` is the TcpService.
+// One framer for each connection slot. A byte server calls the three functions; `context` is the TcpService.
 template <int kSlots>
 class TcpService {
  public:
@@ -45,11 +45,11 @@ class TcpService {
 
   explicit TcpService(PduEngine& engine) : engine_(engine) {}
 
-  // A new connection uses the slot.
+  // A new connection has taken the slot.
   static void Open(void* context, int slot) { Self(context).framers_[slot].Reset(); }
 
-  // Takes at most one request out of `bytes` and puts its reply into `reply` [kMaxReply]. `used`: bytes taken; call
-  // again with the rest. False: the stream makes no sense any more, close it.
+  // Takes at most one request out of `bytes` and puts its reply into `reply` [kMaxReply]. `used` says how many bytes it
+  // took; call it again with the rest. False: the stream cannot be understood any more, close the connection.
   static bool Receive(void* context, int slot, const std::uint8_t* bytes, std::size_t count, std::size_t* used,
                       std::uint8_t* reply, std::size_t* reply_bytes) {
     TcpFramer& framer = Self(context).framers_[slot];
@@ -63,7 +63,7 @@ class TcpService {
     return true;
   }
 
-  // Part of a frame is there: the rest should follow soon.
+  // True if a part of a frame is there. The rest should follow soon.
   static bool MidFrame(void* context, int slot) { return Self(context).framers_[slot].mid_frame(); }
 
  private:

@@ -50,7 +50,7 @@ const TracePage& Trace::Page() {
   return page_;
 }
 
-// Stamp and record of the n-th unreleased record.
+// The stamp of a record, followed by the record; 0 is the oldest one that is not released.
 const std::uint16_t* Trace::Slot(std::uint32_t behind_tail) const {
   const std::uint32_t slots = Slots(requested_.record_words);
   std::uint32_t slot = tail_slot_ + behind_tail;
@@ -100,7 +100,7 @@ TraceState Trace::state() const {
   return Ready() ? static_cast<TraceState>(state_.load(std::memory_order_acquire)) : TraceState::kWaiting;
 }
 
-// The counters restart before `started_` tells the reader so.
+// The reader looks at the counters only after `started_` has told it that they restarted.
 void Trace::Begin() {
   slots_ = recording_.mode == TraceMode::kOff ? 0 : Slots(recording_.record_words);
   head_slot_ = 0;
@@ -171,7 +171,8 @@ Status Trace::Serve(RegisterMap& map, int number) {
 
 // Reading the header forms a page if there is none.
 void Trace::FillPageHeader(Words<reg::kTracePageBlock>& w) {
-  const TraceState state = this->state();  // before the page: "done" with an empty page means that nothing follows
+  const TraceState state =
+      this->state();  // read before the page is formed, so that "done" with an empty page means: nothing follows
   const TracePage& page = Page();
   const std::uint32_t waiting = this->waiting();
   w.Set<reg::kTraceFirstRecord>(page.first_record);
@@ -201,7 +202,7 @@ Status Trace::TakeStart(const Words<reg::kTraceStartBlock>& w) {
   Words<reg::kTraceStartBlock> present;
   FillStart(present);
   const bool same = std::memcmp(present.data(), w.data(), 2u * w.size()) == 0;
-  if (w.Get<reg::kTraceRecording>() != 0 && same) return Status::kOk;  // a retry
+  if (w.Get<reg::kTraceRecording>() != 0 && same) return Status::kOk;  // the client asks again because a reply was lost
   Recording recording;
   recording.number = w.Get<reg::kTraceRecording>();
   recording.mode = static_cast<TraceMode>(w.Get<reg::kTraceMode>());

@@ -1,4 +1,4 @@
-// client - libmodbus' independent client code against our server: every function, every refusal with its reason.
+// client - our client with libmodbus against our server: every function, and every refusal with its reason.
 #include "host_sim/client/drive_client.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using core::Status;
 namespace reg = link::reg;
 using Words = std::vector<std::uint16_t>;
 
-// The status a call is refused with; kOk if it is not.
+// The status with which a call is refused; kOk if it is not refused.
 Status RefusalOf(const std::function<void()>& call, int exception) {
   try {
     call();
@@ -119,7 +119,7 @@ TEST(DriveClient, AfterTheServerClosedTheConnection_ConnectsAnew) {
   EXPECT_EQ(drive.ReadValue<reg::kProbeU32>(), 0x12345678u);
 }
 
-// The line that README and SPEC show, run by the independent program they name.
+// Runs the line that README and SPEC show, with the program that they name.
 TEST(Mbpoll, FloatProbe_ReadsAsDocumented) {
   if (std::system("command -v mbpoll > /dev/null 2>&1") != 0) GTEST_SKIP() << "mbpoll is not installed";
   test::TestServer server;

@@ -1,4 +1,4 @@
-// client - the table store on the file that plays flash on Linux: survives, and clears bits only.
+// client - the table store on the file that plays flash on Linux.
 #include <gtest/gtest.h>
 
 #include <unistd.h>

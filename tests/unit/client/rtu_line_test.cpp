@@ -1,4 +1,4 @@
-// client - RTU over two pseudo-terminals joined back to back, spoken by libmodbus.
+// client - libmodbus speaks RTU over two pseudo-terminals that a thread connects.
 #include <gtest/gtest.h>
 
 #include <fcntl.h>
@@ -41,7 +41,7 @@ void Move(int from, int to) {
   }
 }
 
-// A drive with address 9 at the far end of a line that a thread carries.
+// A drive with address 9 at the far end of the line.
 class RtuLine : public testing::Test {
  protected:
   void SetUp() override {

@@ -1,4 +1,4 @@
-// client - SPEC.md against the headers it describes: the tables are compared, never trusted.
+// client - compares SPEC.md with the headers that it describes.
 #include <gtest/gtest.h>
 
 #include <algorithm>

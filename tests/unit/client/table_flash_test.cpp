@@ -74,7 +74,7 @@ TEST(Flash, Refused_SaysWhyAndLeavesTheOldTable) {
 TEST(Flash, WithAnAxisEnabledDuringTheSave_FailsAndIsTakenBack) {
   std::atomic<test::TestServer*> running{nullptr};
   test::TestServer server([&](test::TestDevice& drive) {
-    // the drive's own patience is over as soon as everything is stored
+    // as soon as everything is stored, the time runs out in which the drive waits
     if (running != nullptr && drive.store.sequence() == 2) running.load()->Jump(1000);
   });
   auto drive = server.Connect();
@@ -127,8 +127,8 @@ TEST(Flash, WhenTheDriveReadsBackSomethingElse_IsAVerifyError) {
   EXPECT_THROW(FlashTable(drive, MakeTable(1)), client::VerifyError);
 }
 
-// The connection is cut once, after every possible number of reply bytes: the client comes back and finishes, and each
-// table is adopted exactly once.
+// The connection is cut once, after every possible number of reply bytes. The client connects again and finishes, and
+// each table is adopted exactly once.
 TEST(Flash, WithTheConnectionCutAtAnyByte_EndsWithTheNewTable) {
   test::TestServer server;
   test::CuttingProxy proxy(server.port());

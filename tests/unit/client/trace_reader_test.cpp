@@ -1,4 +1,4 @@
-// client - traces over the wire: complete, with losses, read twice, started anew by somebody else.
+// client - traces over the wire: complete, with losses, read twice, and started anew by another client.
 #include "host_sim/client/trace_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ constexpr std::uint32_t kMask = 0x0F;  // four words a record
 
 std::uint16_t WordOf(std::uint32_t tick, std::size_t word) { return static_cast<std::uint16_t>(31 * tick + word); }
 
-// A drive that ticks `per_turn` times in each turn of its loop, up to tick `until`.
+// Makes the drive tick up to 50 times in each turn of its loop, up to tick `until`.
 struct Ticking {
   std::atomic<std::uint32_t> until{0};
   std::uint32_t tick = 0;
@@ -107,7 +107,7 @@ TEST(TraceReader, PageReadTwice_IsTheSame) {
   StartTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, kMask});
   ticking.until = 20;
   ASSERT_TRUE(test::Await([&] { return drive.ReadValue<reg::kTraceCount>() != 0; }));
-  // The rest of the header, from `lost` on, goes on while records arrive.
+  // The header from `lost` on changes while records arrive.
   const link::Span fixed = Between(reg::kTraceFirstRecord, reg::kTraceRecordWords);
   const auto header = drive.Read(fixed);
   const link::Span data_words =

@@ -1,4 +1,4 @@
-// controller - a whole controller without a bus: what a drive does, it does; what it must not, it refuses.
+// controller - a whole controller without a bus: it does what a drive does and refuses what a drive must refuse.
 #include "armcal/controller/controller.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ namespace reg = link::reg;
 constexpr int n = Model::kJoints;
 constexpr std::uint32_t kAllAxes = (1u << n) - 1;
 
-// A controller in front of axes that are as its model says, and a client without a wire.
+// A controller with axes that are as its model says, and a client that needs no wire.
 template <class... Filters>
 struct Bench {
   Bench() { booted = controller.Boot(); }
@@ -33,14 +33,14 @@ struct Bench {
       model::RawSample<n> raw;
       controller::SetPoint<n> set;
       (void)axes.Read(now, raw, set);
-      const int sign = now / Model::kSampleTicks % 2 == 0 ? 1 : -1;  // from sample to sample
+      const int sign = now / Model::kSampleTicks % 2 == 0 ? 1 : -1;  // changes from sample to sample
       for (std::int16_t& current : raw.current) current = static_cast<std::int16_t>(current + sign * disturbance_LSB);
       torque = controller.FeedForward(set, raw.temperature_degC, tau_Nm);
       ASSERT_EQ(controller.Push(raw), Status::kOk);
       Idle();
     }
   }
-  void Idle() {  // an adoption that stays refused would keep it busy until a time-out
+  void Idle() {  // the limit is for an adoption that stays refused, which would keep it busy until a time-out
     for (int k = 0; k < 100000 && controller.Step(); ++k) {
     }
   }
@@ -79,7 +79,7 @@ struct Bench {
     w.template Set<reg::kCommandCrc>(crc);
     return Write(w);
   }
-  // A table staged and checked. Status of the first step that is refused.
+  // Stages a table and checks it. Answers the status of the first step that is refused.
   Status Check(const estimator::Table<Model>& table, std::uint32_t& crc) {
     std::vector<std::uint16_t> words(kWords);
     model::Encode(table, words.data());
@@ -90,7 +90,7 @@ struct Bench {
     crc = core::Crc32Words(words.data(), words.size());
     return Command(reg::kCheck, crc);
   }
-  // kOk: stored, and adopted as far as the status registers say.
+  // Also saves it. kOk: it is stored, and adopted as far as the status registers say.
   Status Flash(const estimator::Table<Model>& table) {
     std::uint32_t crc = 0;
     if (const Status checked = Check(table, crc); !core::IsOk(checked)) return checked;
@@ -181,7 +181,7 @@ TEST(Controller, WhileAxesAreEnabled_AdoptsABumplessTableOnly) {
 TEST(Controller, ATableThatAFilterCannotHold_IsRefusedAndNothingChanges) {
   const auto bench = std::make_unique<Bench<Forgetting, Block>>();
   auto table = estimator::DefaultTable<Model>();
-  for (int k = 0; k < Model::kBodyParameters; ++k)  // links that are not to be learnt, only allowed for
+  for (int k = 0; k < Model::kBodyParameters; ++k)  // the links are not learnt, only considered
     table.parameter[k].state = model::ParameterState::kConsidered;
   EXPECT_EQ(bench->Flash(table), Status::kOutOfRange);
   EXPECT_EQ(bench->controller.generation(), 1u);
@@ -230,7 +230,7 @@ TEST(Controller, ATraceThatAClientStarts_HoldsWhatTheTickWasGiven) {
   ASSERT_EQ(bench->controller.Record(*trace), Status::kOk);
   EXPECT_EQ(bench->Value<reg::kCapabilities>() & reg::kHasRawTrace, reg::kHasRawTrace);
   EXPECT_EQ(bench->controller.Record(*trace), Status::kBadAddress);  // once
-  bench->Run(50);                                                    // nobody has asked
+  bench->Run(50);                                                    // no client has started a recording
   EXPECT_EQ(bench->Value<reg::kTraceCount>(), 0);
 
   const std::uint32_t start = bench->now + 10;

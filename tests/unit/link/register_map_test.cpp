@@ -1,4 +1,4 @@
-// link - the list of registers against what the device serves, and the map's own rules.
+// link - the declared registers against what the device serves, and the rules of the map.
 #include "armcal/link/register_map.hpp"
 
 #include <gtest/gtest.h>
@@ -70,14 +70,14 @@ TEST(Registers, Access_IsWhatTheListSays) {
   }
 }
 
-// The compiler's own sum over the list. A wrong one is a map that old clients cannot read.
+// The compiler makes this checksum out of the declarations. Another one would mean a map that old clients cannot read.
 TEST(Registers, LayoutCrc_IsThatOfMapVersion1_2) {
   EXPECT_EQ(link::reg::kMapMajorValue, 1);
   EXPECT_EQ(link::reg::kMapMinorValue, 2);
   EXPECT_EQ(link::kLayoutCrc, 0x41383644u);
 }
 
-// Put in and taken out by declaration; every word of the block has its own value, so a wrong place would show.
+// Every word of the block has a value of its own, so a wrong place would show.
 TEST(Words, ValuesLieWhereTheRegisterIsDeclared) {
   namespace reg = link::reg;
   std::uint16_t raw[reg::kStatusBlock.count];

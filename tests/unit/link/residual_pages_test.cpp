@@ -1,4 +1,4 @@
-// link - the statistics' page: one snapshot, however it is read.
+// link - the page of residual statistics holds one snapshot, however it is read.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -24,7 +24,7 @@ TEST(ResidualPages, BeforeASelection_SayJointZero) {
   EXPECT_EQ(drive.estimator.snapshots_taken, 0);
 }
 
-// The values of the test drive change with each snapshot; reading must not take one.
+// The values of the test drive change with each snapshot, so a read that took one would show.
 TEST(ResidualPages, ReadWordByWord_AreTheSnapshotOfTheSelection) {
   test::TestDevice drive;
   ASSERT_EQ(Select(drive, 5), Status::kOk);

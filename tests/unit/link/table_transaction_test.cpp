@@ -1,5 +1,4 @@
-// link - flashing step by step: order, retries, refusals, time-outs, power cuts. The table in force is always the old
-// one or the new one.
+// link - flashing step by step: order, retries, refusals, time-outs and power cuts.
 #include "armcal/link/table_transaction.hpp"
 
 #include <gtest/gtest.h>
@@ -45,7 +44,7 @@ class Transaction : public testing::Test {
     Run();
     ASSERT_EQ(t().state(), TransactionState::kActive);
   }
-  // Stored, adopted and served are one table.
+  // The stored, the adopted and the served table are this one.
   void ExpectInForce(int number) {
     EXPECT_EQ(drive_.active, MakeTable(number));
     EXPECT_EQ(drive_.application.adopted, MakeTable(number));
@@ -73,7 +72,7 @@ TEST_F(Transaction, Flash_OfAGoodTable_IsStoredAdoptedAndServed) {
   ExpectInForce(2);
 }
 
-// Checking builds what is adopted later, so it must happen once for a table, and always for the table that is staged.
+// The check builds what is adopted later. So each table is checked once, and what is adopted is what was checked last.
 TEST_F(Transaction, EachTable_IsCheckedOnce_AndWhatWasCheckedIsAdopted) {
   Flash(1);
   EXPECT_EQ(drive_.application.checks, 1);

@@ -28,14 +28,14 @@ inline std::vector<std::uint16_t> MakeTable(int number, std::uint32_t schema = k
   return words;
 }
 
-// What the drive's application does with a table. Switches may be turned from another thread.
+// What the application of the drive does with a table. Another thread may turn the switches.
 struct FakeApplication {
   std::atomic<bool> enabled{false};         // an axis is enabled
   std::atomic<bool> enable_on_save{false};  // becomes enabled between permission and adoption
-  std::atomic<int> busy{0};                 // answers kBusy so many times before it adopts
-  std::atomic<bool> refuse_check{false};    // the next checks find fault with any table
+  std::atomic<int> busy{0};                 // answers kBusy this many times before it adopts
+  std::atomic<bool> refuse_check{false};    // every check refuses
   std::atomic<int> checks{0}, adoptions{0};
-  std::vector<std::uint16_t> built, adopted;  // by the last check that found no fault; by the last adoption
+  std::vector<std::uint16_t> built, adopted;  // by the last check; by the last adoption
 
   link::TableApplication Functions() { return {this, &Check, &Permit, &Adopt}; }
 
@@ -63,7 +63,7 @@ struct FakeApplication {
   }
 };
 
-// What the drive's application does about learning and about residual statistics.
+// What the application of the drive does about learning and about residual statistics.
 struct FakeEstimator {
   core::Status answer = core::Status::kOk;
   std::vector<bool> holds;
@@ -80,7 +80,7 @@ struct FakeEstimator {
     static_cast<FakeEstimator*>(self)->resets.push_back(block);
     return static_cast<FakeEstimator*>(self)->answer;
   }
-  // The statistics of a joint: recognisable figures that change with every snapshot.
+  // The statistics of a joint are recognisable figures that change with every snapshot.
   static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
     auto& e = *static_cast<FakeEstimator*>(self);
     page.generation = 3;
@@ -92,7 +92,7 @@ struct FakeEstimator {
   }
 };
 
-// Records of channel mask m have as many words as m has bits; masks beyond 8 bits are not served.
+// A record has as many words as its channel mask has bits. Masks of more than 8 bits are not served.
 inline std::uint16_t RecordWords(void*, std::uint32_t channels) {
   if (channels > 0xFF) return 0;
   std::uint16_t words = 0;

@@ -1,4 +1,4 @@
-// link - the trace ring: pages, re-reads, losses, gaps, new recordings; and producer and reader as two threads.
+// link - the trace ring: pages read twice, losses, gaps, new recordings, and producer and reader as two threads.
 #include "armcal/link/trace.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ constexpr std::uint32_t kRecords = 20;
 
 Recording Streaming(std::uint16_t number = 1) { return {number, TraceMode::kStreaming, 1, 0, 0, kMask, 0}; }
 
-// The record of a tick, so that a reader can tell every word's place.
+// Each word of a record says which tick and which place it belongs to.
 std::uint16_t WordOf(std::uint32_t tick, std::uint32_t word) { return static_cast<std::uint16_t>(17 * tick + word); }
 
 Status Produce(Trace& trace, std::uint32_t tick, std::uint32_t generation = 1) {
@@ -36,7 +36,7 @@ Status Produce(Trace& trace, std::uint32_t tick, std::uint32_t generation = 1) {
   return trace.Push(record, generation);
 }
 
-// Reads the page word by word in odd portions and checks each.
+// Reads the page in portions that do not fit the records, and checks every word.
 void ExpectPage(Trace& trace, std::uint32_t first_record, std::uint32_t first_tick, std::uint32_t count) {
   const link::TracePage page = trace.Page();
   EXPECT_EQ(page.first_record, first_record);

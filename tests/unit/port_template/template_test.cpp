@@ -1,4 +1,4 @@
-// port_template tests - what a porter copies works as it is: with lib's table store, and byte by byte.
+// port_template tests - the template works as it is: with lib's table store, and byte by byte.
 #include <gtest/gtest.h>
 
 #include <array>

@@ -58,8 +58,8 @@ struct ClientRequests {
 // Context of every call: background.
 class Device {
  public:
-  static constexpr std::uint32_t kUnlock_ms =
-      60000;  // the lock closes this long after the last write that needs it open
+  // The lock closes this long after the last write that needs it open.
+  static constexpr std::uint32_t kUnlock_ms = 60000;
 
   // `live` and `transaction` outlive the device.
   Device(const Identity& identity, const LiveStatus& live, TableTransaction& transaction,

@@ -20,7 +20,8 @@ using ValueOf = std::conditional_t<kRegister.type == RegisterType::kU16, std::ui
 template <const auto& kBlock>
 class Words {
  public:
-  static constexpr Span kSpan = SpanOf(kBlock);
+  static constexpr Span span() { return SpanOf(kBlock); }
+  static constexpr std::uint16_t size() { return span().count; }
 
   Words() = default;
   explicit Words(const std::uint16_t* from) { std::memcpy(words_, from, sizeof words_); }
@@ -46,19 +47,18 @@ class Words {
 
   const std::uint16_t* data() const { return words_; }
   std::uint16_t* data() { return words_; }
-  static constexpr std::uint16_t size() { return kSpan.count; }
 
  private:
   template <const Register& kRegister, int kElement>
   static constexpr int OffsetOf() {
     constexpr Span kOne = SpanOf(kRegister);
-    static_assert(kOne.kind == kSpan.kind && kOne.first >= kSpan.first && kOne.end() <= kSpan.end(),
+    static_assert(kOne.kind == span().kind && kOne.first >= span().first && kOne.end() <= span().end(),
                   "the register does not lie in this block");
     static_assert(kElement >= 0 && kElement < kRegister.count, "the register has fewer elements");
-    return kOne.first - kSpan.first + kElement * WordsOf(kRegister.type);
+    return kOne.first - span().first + kElement * WordsOf(kRegister.type);
   }
 
-  std::uint16_t words_[kSpan.count] = {};
+  std::uint16_t words_[SpanOf(kBlock).count] = {};
 };
 
 }  // namespace armcal::link

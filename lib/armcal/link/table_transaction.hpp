@@ -39,8 +39,8 @@ struct TableCommand {
 // sequence number and content has no second effect, so a client that lost a reply may ask again. Context: background.
 class TableTransaction {
  public:
-  static constexpr std::uint32_t kStageTimeout_ms =
-      30000;  // then a stage without writes, or an adoption that stays refused, is given up
+  // After this time a stage without writes is dropped, and an adoption that stays refused is given up.
+  static constexpr std::uint32_t kStageTimeout_ms = 30000;
 
   // `staged`, `active`: buffers [words] that outlive this. `active` may hold defaults, which Boot() replaces.
   TableTransaction(const TableApplication& application, table::TableStore& store, std::uint32_t schema,

@@ -47,7 +47,7 @@ struct Bench {
 
   template <const auto& kBlock>
   Status Write(const link::Words<kBlock>& words) {
-    return controller.map().Write(words.kSpan.first, words.size(), words.data());
+    return controller.map().Write(words.span().first, words.size(), words.data());
   }
   template <const link::Register& kRegister>
   Status WriteValue(link::ValueOf<kRegister> value) {

@@ -1,4 +1,4 @@
-// client - libmodbus with time-outs, retries and reasons; its float helpers are not used, their word order varies.
+// client - libmodbus with time-outs, retries and reasons.
 #include "host_sim/client/drive_client.hpp"
 
 #include <fmt/core.h>
@@ -8,17 +8,15 @@
 #include <cerrno>
 
 #include "armcal/core/words.hpp"
-#include "armcal/link/registers.hpp"
 #include "host_sim/client/register_text.hpp"
 
 namespace armcal::client {
 
 namespace reg = link::reg;
-using core::GetU32;
 
 namespace {
 
-constexpr int kChunk = 120;  // even, so that no request splits a 32-bit value, and below the protocol's 123
+constexpr int kChunk = 120;  // below the protocol's 123, and even, so that no request splits a 32-bit value
 constexpr int kAttempts = 3;
 constexpr std::uint32_t kResponse_s = 2;
 
@@ -60,7 +58,7 @@ void DriveClient::Connect() {
   modbus_set_response_timeout(fresh.get(), kResponse_s, 0);
   if (modbus_connect(fresh.get()) != 0)
     throw LinkError(fmt::format("{}: cannot connect: {}", name_, modbus_strerror(errno)));
-  modbus_flush(fresh.get());  // a line keeps what came late for the request before
+  modbus_flush(fresh.get());  // a serial line may still hold the late answer to an earlier request
   connection_ = std::move(fresh);
 }
 
@@ -76,17 +74,19 @@ void DriveClient::Request(const std::string& what, const std::function<int(_modb
   throw LinkError(fmt::format("{}: {}: {} (tried {} times)", name_, what, failure, kAttempts));
 }
 
-// Asks the drive for its own reason; without an answer to that the exception alone has to do.
+// Asks the drive for its own reason. If it does not answer, there is only the exception.
 void DriveClient::Refused(const std::string& what, int exception) {
-  std::uint16_t w[4] = {};
-  const bool told = modbus_read_input_registers(connection_.get(), reg::kStatus + 24, 4, w) == 4 && w[0] == exception;
-  const auto status = static_cast<core::Status>(told ? w[3] : 0);
+  link::Words<reg::kErrorBlock> w;
+  const bool told =
+      modbus_read_input_registers(connection_.get(), reg::kErrorBlock.first, w.size(), w.data()) == w.size() &&
+      w.Get<reg::kErrorException>() == exception;
+  const auto status = static_cast<core::Status>(told ? w.Get<reg::kErrorStatus>() : 0);
   const std::string reason = told ? StatusName(status) : "no reason given";
   throw RefusedError(fmt::format("{}: {} refused: {} (exception {:02})", name_, what, reason, exception), exception,
                      status);
 }
 
-std::vector<std::uint16_t> DriveClient::Read(bool input, int first, int count) {
+std::vector<std::uint16_t> DriveClient::ReadWords(bool input, int first, int count) {
   std::vector<std::uint16_t> words(static_cast<std::size_t>(count));
   for (int done = 0; done < count; done += kChunk) {
     const int part = std::min(kChunk, count - done);
@@ -100,8 +100,8 @@ std::vector<std::uint16_t> DriveClient::Read(bool input, int first, int count) {
   return words;
 }
 
-std::vector<std::uint16_t> DriveClient::ReadInput(int first, int count) { return Read(true, first, count); }
-std::vector<std::uint16_t> DriveClient::ReadHolding(int first, int count) { return Read(false, first, count); }
+std::vector<std::uint16_t> DriveClient::ReadInput(int first, int count) { return ReadWords(true, first, count); }
+std::vector<std::uint16_t> DriveClient::ReadHolding(int first, int count) { return ReadWords(false, first, count); }
 
 void DriveClient::Write(int first, std::span<const std::uint16_t> words) {
   const int count = static_cast<int>(words.size());
@@ -117,64 +117,73 @@ void DriveClient::WriteSingle(int address, std::uint16_t word) {
           [&](modbus_t* c) { return modbus_write_register(c, address, word); });
 }
 
-std::uint32_t DriveClient::ReadInputU32(int first) { return GetU32(ReadInput(first, 2).data()); }
+std::vector<std::uint16_t> DriveClient::Read(const link::Span& span) {
+  return ReadWords(span.kind == link::RegisterKind::kInput, span.first, span.count);
+}
 
-std::vector<float> DriveClient::ReadInputFloats(int first, int count) {
-  const std::vector<std::uint16_t> words = ReadInput(first, 2 * count);
+std::vector<float> DriveClient::ReadFloats(const link::Register& list, int count) {
+  const std::vector<std::uint16_t> words = Read(link::SpanOf(list, count));
   std::vector<float> values(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = core::GetF32(words.data() + 2 * i);
   return values;
 }
 
-void DriveClient::WriteU32(int first, std::uint32_t value) {
-  std::uint16_t words[2];
-  core::PutU32(words, value);
-  Write(first, words);
-}
-
 Identity DriveClient::ReadIdentity() {
-  const std::vector<std::uint16_t> w = ReadInput(reg::kIdentity, reg::kIdentityCount);
-  const auto u32 = [&](int at) { return GetU32(w.data() + at); };
-  if (u32(0) != reg::kMagic) throw LinkError(fmt::format("{}: not an armcal drive (magic 0x{:08X})", name_, u32(0)));
-  if (w[2] != reg::kMapMajor)
-    throw LinkError(fmt::format("{}: register map version {}, this tool speaks {}", name_, w[2], reg::kMapMajor));
-  if (u32(14) != reg::kProbeU32 || core::GetF32(w.data() + 12) != reg::kProbeFloat)
+  const auto w = Read<reg::kIdentityBlock>();
+  if (const auto magic = w.Get<reg::kMagic>(); magic != reg::kMagicValue)
+    throw LinkError(fmt::format("{}: not an armcal drive (magic 0x{:08X})", name_, magic));
+  if (const auto major = w.Get<reg::kMapMajor>(); major != reg::kMapMajorValue)
+    throw LinkError(fmt::format("{}: register map version {}, this tool speaks {}", name_, major, reg::kMapMajorValue));
+  if (const auto probe = w.Get<reg::kProbeU32>();
+      probe != reg::kProbeU32Value || w.Get<reg::kProbeFloat>() != reg::kProbeFloatValue)
     throw LinkError(
-        fmt::format("{}: word-order probe reads 0x{:08X}, expected 0x{:08X}", name_, u32(14), reg::kProbeU32));
-  return {w[2], w[3], u32(4), u32(6), u32(8), u32(10), w[16], w[17], w[18], w[19], u32(20), u32(22), w[24]};
+        fmt::format("{}: word-order probe reads 0x{:08X}, expected 0x{:08X}", name_, probe, reg::kProbeU32Value));
+  Identity id{};
+  id.map_major = w.Get<reg::kMapMajor>();
+  id.map_minor = w.Get<reg::kMapMinor>();
+  id.layout_crc = w.Get<reg::kLayoutCrc>();
+  id.schema = w.Get<reg::kSchema>();
+  id.firmware_version = w.Get<reg::kFirmwareVersion>();
+  id.serial_number = w.Get<reg::kSerialNumber>();
+  id.axes = w.Get<reg::kAxes>();
+  id.parameters = w.Get<reg::kParameters>();
+  id.columns = w.Get<reg::kColumns>();
+  id.table_words = w.Get<reg::kTableWords>();
+  id.capabilities = w.Get<reg::kCapabilities>();
+  id.tick_rate_Hz = w.Get<reg::kTickRate>();
+  id.sample_ticks = w.Get<reg::kSampleTicks>();
+  return id;
 }
 
 DriveStatus DriveClient::ReadStatus() {
-  const std::vector<std::uint16_t> w = ReadInput(reg::kStatus, reg::kStatusCount);
-  const auto u32 = [&](int at) { return GetU32(w.data() + at); };
-  const auto status = [&](int at) { return static_cast<core::Status>(w[at]); };
+  const auto w = Read<reg::kStatusBlock>();
   DriveStatus s{};
-  s.transaction_state = w[0];
-  s.transaction_status = status(1);
-  s.table_status = status(2);
-  s.feedforward_state = w[3];
-  s.generation = u32(4);
-  s.tick = u32(6);
-  s.active_crc = u32(8);
-  s.command_sequence = u32(10);
-  s.store_sequence = u32(12);
-  s.slot_state[0] = w[14];
-  s.slot_state[1] = w[15];
-  s.enabled_axes = u32(16);
-  s.clamp_count = u32(18);
-  s.sample_gaps = u32(20);
-  s.request_count = u32(22);
-  s.error_exception = w[24];
-  s.error_function = w[25];
-  s.error_address = w[26];
-  s.error_status = status(27);
-  s.error_request = u32(28);
-  s.unlocked = w[30] != 0;
-  s.health = w[31];
-  for (int filter = 0; filter < 2; ++filter) {
-    s.rows_used[filter] = u32(32 + 4 * filter);
-    s.rows_gated[filter] = u32(34 + 4 * filter);
-  }
+  s.transaction_state = static_cast<link::TransactionState>(w.Get<reg::kTransactionState>());
+  s.transaction_status = static_cast<core::Status>(w.Get<reg::kTransactionStatus>());
+  s.table_status = static_cast<core::Status>(w.Get<reg::kTableStatus>());
+  s.feedforward_state = w.Get<reg::kFeedForwardState>();
+  s.generation = w.Get<reg::kGeneration>();
+  s.tick = w.Get<reg::kTick>();
+  s.active_crc = w.Get<reg::kActiveCrc>();
+  s.command_sequence = w.Get<reg::kCommandSequence>();
+  s.store_sequence = w.Get<reg::kStoreSequence>();
+  s.slot_state[0] = w.Get<reg::kSlotState, 0>();
+  s.slot_state[1] = w.Get<reg::kSlotState, 1>();
+  s.enabled_axes = w.Get<reg::kEnabledAxes>();
+  s.clamp_count = w.Get<reg::kClampCount>();
+  s.sample_gaps = w.Get<reg::kSampleGaps>();
+  s.request_count = w.Get<reg::kRequestCount>();
+  s.error_exception = w.Get<reg::kErrorException>();
+  s.error_function = w.Get<reg::kErrorFunction>();
+  s.error_address = w.Get<reg::kErrorAddress>();
+  s.error_status = static_cast<core::Status>(w.Get<reg::kErrorStatus>());
+  s.error_request = w.Get<reg::kErrorRequest>();
+  s.unlocked = w.Get<reg::kUnlocked>() != 0;
+  s.health = w.Get<reg::kHealth>();
+  s.rows_used[0] = w.Get<reg::kRowsUsedA>();
+  s.rows_gated[0] = w.Get<reg::kRowsGatedA>();
+  s.rows_used[1] = w.Get<reg::kRowsUsedB>();
+  s.rows_gated[1] = w.Get<reg::kRowsGatedB>();
   return s;
 }
 

@@ -1,4 +1,4 @@
-// client - registers of a drive over Modbus TCP or RTU, and what its identity and status say; knows no table, no model.
+// client - reads and writes the registers of a drive over Modbus TCP or RTU.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "armcal/core/status.hpp"
+#include "armcal/link/register_words.hpp"
 #include "host_sim/client/errors.hpp"
 
 struct _modbus;  // libmodbus' connection
@@ -25,7 +26,7 @@ struct Identity {
 
 // One consistent reading of the status block (SPEC.md).
 struct DriveStatus {
-  std::uint16_t transaction_state;
+  link::TransactionState transaction_state;
   core::Status transaction_status, table_status;
   std::uint16_t feedforward_state;
   std::uint32_t generation, tick, active_crc, command_sequence, store_sequence;
@@ -46,9 +47,9 @@ struct SerialLine {
   char parity = 'E';  // N, E or O
 };
 
-// Every call throws LinkError after three attempts without a sensible answer (two seconds each; the connection is made
-// anew between them, so that a late answer is never taken for the next one) and RefusedError, with the drive's own
-// reason, when it answers with an exception. Repeating is safe because every armcal write is idempotent.
+// Every call throws LinkError after three attempts without a sensible answer, two seconds each. Between them it
+// connects anew, so that a late answer is never taken for the next one. It throws RefusedError, with the drive's own
+// reason, if the drive answers with an exception. An attempt may be repeated because every armcal write may come twice.
 class DriveClient {
  public:
   DriveClient(const std::string& host, int port, int unit = 1);
@@ -57,16 +58,36 @@ class DriveClient {
   DriveClient(DriveClient&&) noexcept;
   DriveClient& operator=(DriveClient&&) noexcept;
 
-  // Any number of registers; split into requests of at most 120.
+  // Any number of registers. They are split into requests of at most 120.
   std::vector<std::uint16_t> ReadInput(int first, int count);
   std::vector<std::uint16_t> ReadHolding(int first, int count);
-  // The same for writing; a block that must be written whole is at most 120 registers.
+  // The same for writing. A block that must be written whole has at most 120 registers.
   void Write(int first, std::span<const std::uint16_t> words);
   void WriteSingle(int address, std::uint16_t word);  // function 6
 
-  std::uint32_t ReadInputU32(int first);
-  std::vector<float> ReadInputFloats(int first, int count);
-  void WriteU32(int first, std::uint32_t value);
+  // A block or a register by its declaration (registers.hpp). `trace`: 0 or 1, for registers that exist twice.
+  template <const auto& kBlock>
+  link::Words<kBlock> Read(int trace = 0) {
+    return link::Words<kBlock>(Read(link::SpanOf(kBlock).Of(trace)).data());
+  }
+  template <const link::Register& kRegister>
+  link::ValueOf<kRegister> ReadValue(int trace = 0) {
+    return Read<kRegister>(trace).template Get<kRegister>();
+  }
+  template <const auto& kBlock>
+  void Write(const link::Words<kBlock>& words, int trace = 0) {
+    Write(link::SpanOf(kBlock).Of(trace).first, {words.data(), words.size()});
+  }
+  // A value of one register is written with function 6, a 32-bit value with function 16.
+  template <const link::Register& kRegister>
+  void WriteValue(link::ValueOf<kRegister> value, int trace = 0) {
+    link::Words<kRegister> words;
+    words.template Set<kRegister>(value);
+    if (words.size() == 1) return WriteSingle(link::SpanOf(kRegister).Of(trace).first, *words.data());
+    Write(words, trace);
+  }
+  std::vector<std::uint16_t> Read(const link::Span& span);
+  std::vector<float> ReadFloats(const link::Register& list, int count);
 
   // Throws LinkError if it is not an armcal drive, of another major map version, or its word order is not ours.
   Identity ReadIdentity();
@@ -81,7 +102,7 @@ class DriveClient {
   void Connect();
   void Request(const std::string& what, const std::function<int(_modbus*)>& call);
   [[noreturn]] void Refused(const std::string& what, int exception);
-  std::vector<std::uint16_t> Read(bool input, int first, int count);
+  std::vector<std::uint16_t> ReadWords(bool input, int first, int count);
 
   std::string name_;
   int unit_;

@@ -1,4 +1,4 @@
-// client - the ways in which talking to a drive fails; knows no register.
+// client - the ways in which talking to a drive fails.
 #pragma once
 
 #include <stdexcept>
@@ -8,12 +8,12 @@
 
 namespace armcal::client {
 
-// No answer, or one that makes no sense; the tool exits with 3.
+// There is no answer, or one that makes no sense. The tool exits with 3.
 struct LinkError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// The drive answered no; `status` is its reason, kOk if it gave none. The tool exits with 4.
+// The drive refused. `status` is its reason, or kOk if it gave none. The tool exits with 4.
 struct RefusedError : std::runtime_error {
   RefusedError(const std::string& what, int exception_code, core::Status reason)
       : std::runtime_error(what), exception(exception_code), status(reason) {}
@@ -21,7 +21,7 @@ struct RefusedError : std::runtime_error {
   core::Status status;
 };
 
-// What was read back is not what was written; the tool exits with 5.
+// What was read back is not what was written. The tool exits with 5.
 struct VerifyError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -84,12 +84,12 @@ class Traces {
     request.decimation = static_cast<std::uint16_t>(o.decimation > 0 ? o.decimation : sample_ticks);
     request.start_tick = (drive.ReadStatus().tick / sample_ticks + 2) * sample_ticks;
     request.channels = o.lean ? estimator::kRawMotion | estimator::kRawFlags : estimator::kRawAll;
-    ArmTrace(drive, 0, request);
+    StartTrace(drive, 0, request);
     reader_.emplace(drive, 0);
     if (o.samples.empty()) return;
     TraceRequest all;
     all.channels = estimator::kSampleAll;
-    ArmTrace(drive, 1, all);
+    StartTrace(drive, 1, all);
     sample_reader_.emplace(drive, 1);
   }
   // How many records came; a moment's rest for the drive if none waited.
@@ -101,8 +101,8 @@ class Traces {
   void Stop() {
     TraceRequest off;
     off.mode = TraceMode::kOff;
-    ArmTrace(drive_, 0, off);
-    if (sample_reader_) ArmTrace(drive_, 1, off);
+    StartTrace(drive_, 0, off);
+    if (sample_reader_) StartTrace(drive_, 1, off);
   }
 
  private:

@@ -1,18 +1,16 @@
-// client - prints registers.hpp and status.hpp; knows no connection.
+// client - prints registers.hpp and status.hpp.
 #include "host_sim/client/register_text.hpp"
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
-#include <vector>
 
 #include "armcal/link/registers.hpp"
 
 namespace armcal::client {
 
 using core::Status;
-using link::Item;
+using link::Register;
 using link::RegisterKind;
 using link::RegisterType;
 
@@ -23,7 +21,7 @@ struct StatusText {
   const char* meaning;
 };
 
-// A switch without default: the compiler names the enumerator that is missing here.
+// There is no default case, so that the compiler names an enumerator that is missing here.
 StatusText TextOf(Status status) {
   switch (status) {
     case Status::kOk:
@@ -84,14 +82,6 @@ const char* AccessName(link::Access access) {
   return access == link::Access::kRead ? "r" : access == link::Access::kWrite ? "rw" : "rw block";
 }
 
-std::vector<Item> Sorted(RegisterKind kind) {
-  std::vector<Item> items;
-  for (const Item& item : link::kItems)
-    if (item.kind == kind) items.push_back(item);
-  std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.address < b.address; });
-  return items;
-}
-
 const char* KindName(RegisterKind kind) { return kind == RegisterKind::kInput ? "input" : "holding"; }
 
 std::string KindMarkdown(RegisterKind kind, int function, int base) {
@@ -99,10 +89,11 @@ std::string KindMarkdown(RegisterKind kind, int function, int base) {
       "### {} registers (function {})\n\n| dec | hex | number | count | type | access | name | unit | meaning |\n"
       "|---|---|---|---|---|---|---|---|---|\n",
       kind == RegisterKind::kInput ? "Input" : "Holding", function, base);
-  for (const Item& i : Sorted(kind))
-    text +=
-        fmt::format("| {} | 0x{:04X} | {} | {} | {} | {} | {} | {} | {} |\n", i.address, i.address,
-                    base + 1 + i.address, i.count, TypeName(i.type), AccessName(i.access), i.name, i.unit, i.meaning);
+  for (const Register& r : link::kRegisters)
+    if (r.kind == kind)
+      text +=
+          fmt::format("| {} | 0x{:04X} | {} | {} | {} | {} | {} | {} | {} |\n", r.address, r.address,
+                      base + 1 + r.address, r.count, TypeName(r.type), AccessName(r.access), r.name, r.unit, r.meaning);
   return text;
 }
 
@@ -129,29 +120,27 @@ std::string StatusMarkdown() {
 
 std::string RegisterCsv() {
   std::string text = "kind,address,count,type,access,name,unit\n";
-  for (const RegisterKind kind : {RegisterKind::kInput, RegisterKind::kHolding})
-    for (const Item& i : Sorted(kind))
-      text += fmt::format("{},{},{},{},{},{},{}\n", KindName(kind), i.address, i.count, TypeName(i.type),
-                          AccessName(i.access), i.name, i.unit);
+  for (const Register& r : link::kRegisters)
+    text += fmt::format("{},{},{},{},{},{},{}\n", KindName(r.kind), r.address, r.count, TypeName(r.type),
+                        AccessName(r.access), r.name, r.unit);
   return text;
 }
 
 std::string RegisterJson() {
   nlohmann::ordered_json json;
-  json["map_major"] = link::reg::kMapMajor;
-  json["map_minor"] = link::reg::kMapMinor;
+  json["map_major"] = link::reg::kMapMajorValue;
+  json["map_minor"] = link::reg::kMapMinorValue;
   json["layout_crc"] = link::kLayoutCrc;
   json["word_order"] = "big";
-  for (const RegisterKind kind : {RegisterKind::kInput, RegisterKind::kHolding})
-    for (const Item& i : Sorted(kind))
-      json["items"].push_back({{"name", i.name},
-                               {"kind", KindName(kind)},
-                               {"address", i.address},
-                               {"count", i.count},
-                               {"type", TypeName(i.type)},
-                               {"access", AccessName(i.access)},
-                               {"unit", i.unit},
-                               {"meaning", i.meaning}});
+  for (const Register& r : link::kRegisters)
+    json["items"].push_back({{"name", r.name},
+                             {"kind", KindName(r.kind)},
+                             {"address", r.address},
+                             {"count", r.count},
+                             {"type", TypeName(r.type)},
+                             {"access", AccessName(r.access)},
+                             {"unit", r.unit},
+                             {"meaning", r.meaning}});
   return json.dump(2) + "\n";
 }
 

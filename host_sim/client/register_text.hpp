@@ -1,4 +1,4 @@
-// client - names: the register map and the status numbers as text for people and tools; knows no connection.
+// client - the register map and the status numbers as text, for people and for tools.
 #pragma once
 
 #include <string>
@@ -7,14 +7,14 @@
 
 namespace armcal::client {
 
-// "kAxisEnabled: an axis is enabled" without the k; "status 200" for a number without a name.
+// For example "AxisEnabled: an axis is enabled". A number without a name gives "status 200".
 std::string StatusName(core::Status status);
 
-// The tables of SPEC.md; a test compares them.
+// The tables of SPEC.md. A test compares them.
 std::string RegisterMarkdown();
 std::string StatusMarkdown();
 
-// The same map for tools: one line or object an item, addresses zero-based.
+// The same map for tools: one line or object for each register, with zero-based addresses.
 std::string RegisterCsv();
 std::string RegisterJson();
 

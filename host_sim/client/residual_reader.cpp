@@ -1,9 +1,10 @@
-// client - selects, reads, and makes sure that it was one snapshot.
+// client - selects a joint, reads its statistics, and makes sure that all of them are of one snapshot.
 #include "host_sim/client/residual_reader.hpp"
 
 #include <fmt/core.h>
 
 #include <cmath>
+#include <cstring>
 
 #include "armcal/core/words.hpp"
 
@@ -34,15 +35,16 @@ JointResiduals ReadResiduals(DriveClient& drive, int joint) {
   if ((drive.ReadIdentity().capabilities & reg::kHasResiduals) == 0)
     throw RefusedError(drive.name() + ": keeps no residual statistics", 0, core::Status::kBadAddress);
   for (int attempt = 0; attempt < kSnapshots; ++attempt) {
-    drive.WriteSingle(reg::kResidualSelect, static_cast<std::uint16_t>(joint));
-    const std::vector<std::uint16_t> header = drive.ReadInput(reg::kResidualPage, reg::kResidualHeaderCount);
-    const std::vector<std::uint16_t> values = drive.ReadInput(reg::kResidualValues, 2 * reg::kResidualValueCount);
-    if (header[0] != joint || drive.ReadInput(reg::kResidualPage, reg::kResidualHeaderCount) != header) continue;
+    drive.WriteValue<reg::kResidualSelect>(static_cast<std::uint16_t>(joint));
+    const auto header = drive.Read<reg::kResidualHeaderBlock>();
+    const auto values = drive.Read<reg::kResidualValuesBlock>();
+    const auto again = drive.Read<reg::kResidualHeaderBlock>();
+    if (header.Get<reg::kResidualJoint>() != joint || std::memcmp(&header, &again, sizeof header) != 0) continue;
     JointResiduals r;
     r.joint = joint;
-    r.generation = core::GetU32(&header[2]);
-    r.elapsed_s = core::GetU32(&header[4]);
-    r.sigma_Nm = core::GetF32(&header[6]);
+    r.generation = header.Get<reg::kResidualGeneration>();
+    r.elapsed_s = header.Get<reg::kResidualElapsed>();
+    r.sigma_Nm = header.Get<reg::kResidualSigma>();
     const std::uint16_t* w = values.data();
     r.reference = TakeBins(w);
     r.recent = TakeBins(w);

@@ -1,4 +1,4 @@
-// client - reads the residual statistics that a drive keeps of each joint; knows sums and slices, not what they say.
+// client - reads the residual statistics that a drive keeps of each joint.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,8 @@
 
 namespace armcal::client {
 
-// Sums over the rows of one bin, as SPEC.md has them; quotients by count are means. The count fades, so it is a number.
+// Sums over the rows of one bin (SPEC.md). A sum divided by the count is a mean. The count fades, so it is not an
+// integer.
 struct ResidualBin {
   double count = 0, residual = 0, square = 0, speed = 0, position = 0, load = 0, load_size = 0, temperature = 0;
 };
@@ -31,8 +32,8 @@ struct JointResiduals {
   std::vector<ResidualSlice> slices;
 };
 
-// One consistent reading. joint from 1. Throws RefusedError if the drive keeps no statistics or has no such joint,
-// LinkError if another client keeps selecting while we read.
+// Reads one snapshot. joint: from 1. Throws RefusedError if the drive keeps no statistics or has no such joint, and
+// LinkError if another client goes on selecting joints meanwhile.
 JointResiduals ReadResiduals(DriveClient& drive, int joint);
 
 }  // namespace armcal::client

@@ -1,4 +1,4 @@
-// client - the flashing transaction seen from the PC (SPEC.md); knows no meaning of the words.
+// client - the flashing transaction seen from the PC (SPEC.md).
 #include "host_sim/client/table_flash.hpp"
 
 #include <fmt/core.h>
@@ -9,7 +9,6 @@
 
 #include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
-#include "armcal/link/registers.hpp"
 #include "host_sim/client/register_text.hpp"
 
 namespace armcal::client {
@@ -21,7 +20,6 @@ namespace {
 constexpr std::size_t kWordsAtOnce = 120;
 constexpr auto kCommitPoll = std::chrono::milliseconds(5);
 constexpr auto kPatience = std::chrono::seconds(60);  // twice the drive's own limit on a commit
-constexpr std::uint16_t kActive = 5, kFailed = 6;     // transaction_state
 
 class Flash {
  public:
@@ -32,19 +30,19 @@ class Flash {
 
   void Command(std::uint32_t command) {
     if (++sequence_ == 0) sequence_ = 1;
-    std::uint16_t w[reg::kCommandCount] = {};
-    core::PutU32(w, sequence_);
-    core::PutU32(w + 2, command);
-    if (words_.size() >= 2) core::PutU32(w + 4, core::GetU32(words_.data()));
-    w[6] = static_cast<std::uint16_t>(words_.size());
-    core::PutU32(w + 8, crc_);
-    drive_.Write(reg::kCommand, w);
+    link::Words<reg::kCommandBlock> w;
+    w.Set<reg::kSequence>(sequence_);
+    w.Set<reg::kCommand>(command);
+    if (words_.size() >= 2) w.Set<reg::kCommandSchema>(core::GetU32(words_.data()));
+    w.Set<reg::kCommandWords>(static_cast<std::uint16_t>(words_.size()));
+    w.Set<reg::kCommandCrc>(crc_);
+    drive_.Write(w);
   }
 
   void Stage(const FlashProgress& progress) {
     for (std::size_t done = 0; done < words_.size(); done += kWordsAtOnce) {
       const std::size_t part = std::min(kWordsAtOnce, words_.size() - done);
-      drive_.Write(reg::kStaged + static_cast<int>(done), words_.subspan(done, part));
+      drive_.Write(reg::kStagedTable + static_cast<int>(done), words_.subspan(done, part));
       if (progress) progress(0.8 * static_cast<double>(done + part) / static_cast<double>(words_.size()));
     }
   }
@@ -53,8 +51,8 @@ class Flash {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
     while (std::chrono::steady_clock::now() < deadline) {
       const DriveStatus s = drive_.ReadStatus();
-      if (s.transaction_state == kActive) return s;
-      if (s.transaction_state == kFailed)
+      if (s.transaction_state == link::TransactionState::kActive) return s;
+      if (s.transaction_state == link::TransactionState::kFailed)
         throw RefusedError(fmt::format("{}: the table was not taken: {}; the table before it stays in force",
                                        drive_.name(), StatusName(s.transaction_status)),
                            0, s.transaction_status);
@@ -64,11 +62,11 @@ class Flash {
   }
 
   void Verify(const DriveStatus& s) {
-    const std::vector<std::uint16_t> back = drive_.ReadHolding(reg::kActive, static_cast<int>(words_.size()));
+    const std::vector<std::uint16_t> back = drive_.Read(SpanOf(reg::kActiveTable, static_cast<int>(words_.size())));
     const auto differs = std::mismatch(words_.begin(), words_.end(), back.begin()).first;
     if (differs != words_.end())
       throw VerifyError(fmt::format("{}: register 0x{:04X} of the active table reads back differently", drive_.name(),
-                                    reg::kActive + (differs - words_.begin())));
+                                    reg::kActiveTable + static_cast<int>(differs - words_.begin())));
     if (s.active_crc != crc_ || s.table_status != core::Status::kOk)
       throw VerifyError(fmt::format("{}: active table has CRC 0x{:08X} ({}), expected 0x{:08X}", drive_.name(),
                                     s.active_crc, StatusName(s.table_status), crc_));
@@ -84,7 +82,7 @@ class Flash {
 }  // namespace
 
 FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress) {
-  drive.WriteU32(reg::kUnlock, reg::kUnlockKey);
+  drive.WriteValue<reg::kUnlock>(reg::kUnlockKey);
   Flash flash(drive, words);
   flash.Command(reg::kOpen);
   flash.Stage(progress);
@@ -97,7 +95,7 @@ FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words,
 }
 
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive) {
-  return drive.ReadHolding(reg::kActive, drive.ReadIdentity().table_words);
+  return drive.Read(SpanOf(reg::kActiveTable, drive.ReadIdentity().table_words));
 }
 
 }  // namespace armcal::client

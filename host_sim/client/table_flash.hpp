@@ -1,4 +1,4 @@
-// client - brings a parameter table into a drive and proves it is there; knows no meaning of its words.
+// client - brings a parameter table into a drive and proves that it is there.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ struct FlashReport {
 // Called with 0 to 1 while the table is on its way.
 using FlashProgress = std::function<void(double share)>;
 
-// unlock, open, staged words, check, save, wait, read back. `words`: the byte layout of model/parameters.hpp, whose
-// first two words are the schema. Throws RefusedError (the table before it stays in force and stored), VerifyError (the
-// drive says it is active but reads back otherwise), LinkError.
+// Unlocks, opens, stages the words, checks, saves, waits and reads back. `words`: the layout of model/parameters.hpp,
+// whose first two words are the schema. Throws RefusedError (the table before it stays in force and stored),
+// VerifyError (the drive says that the table is active, but it reads back otherwise) and LinkError.
 FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress = {});
 
 // The table in force.

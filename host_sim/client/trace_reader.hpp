@@ -1,4 +1,4 @@
-// client - arms a drive's trace and takes its pages; knows records and ticks, not channels.
+// client - starts a recording on a drive and takes its pages.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,19 @@
 
 namespace armcal::client {
 
-enum class TraceMode : std::uint16_t { kOff = 0, kOneShot = 1, kStreaming = 2 };
-enum class TraceState : std::uint16_t { kOff = 0, kWaiting = 1, kRecording = 2, kDone = 3 };
+using link::TraceMode;
+using link::TraceState;
 enum class Gaps { kAllow, kRefuse };
 
 struct TraceRequest {
   TraceMode mode = TraceMode::kStreaming;
   std::uint16_t decimation = 1;  // samples averaged into one record
-  std::uint32_t start_tick = 0;  // one that has passed starts at once
+  std::uint32_t start_tick = 0;  // a tick that has passed starts at once
   std::uint32_t limit = 0;       // records, 0: until full (one-shot) or switched off (streaming)
-  std::uint32_t channels = 0;    // what the drive's documentation says
+  std::uint32_t channels = 0;    // which ones there are: see the drive's documentation
 };
 
-// Records one after the other; record i is words[i * record_words ...], its window began at ticks[i].
+// Records in order. Record i begins at words[i * record_words], and its window began at ticks[i].
 struct TraceRecords {
   std::uint16_t record_words = 0;
   std::uint32_t tick_step = 0;
@@ -28,26 +28,26 @@ struct TraceRecords {
   std::vector<std::uint32_t> ticks;
   std::vector<std::uint16_t> generations;  // low word of the table generation, per record
   std::vector<std::uint16_t> words;
-  std::uint32_t lost = 0;  // refused by the drive since the arm
+  std::uint32_t lost = 0;  // refused by the drive since the recording started
   TraceState state = TraceState::kOff;
 
   std::size_t count() const { return ticks.size(); }
 };
 
-// Trace 0: raw samples, 1: processed samples. Drops what the drive had recorded before.
-void ArmTrace(DriveClient& drive, int trace, const TraceRequest& request);
+// trace: 0 raw samples, 1 processed samples. Drops what the drive had recorded before.
+void StartTrace(DriveClient& drive, int trace, const TraceRequest& request);
 
-// Reads the pages of one arm in order.
+// Reads the pages of one recording in order.
 class TraceReader {
  public:
   TraceReader(DriveClient& drive, int trace, Gaps gaps = Gaps::kAllow);
 
-  // Takes one page, appends it to `records` and releases it on the drive; returns the number of records, 0 if there is
-  // none now. Also refreshes `records.lost` and `.state`. Throws LinkError if the trace was armed anew meanwhile, and,
-  // with Gaps::kRefuse, if ticks are missing between two records.
+  // Takes one page, appends it to `records` and releases it on the drive. Returns the number of records, 0 if there is
+  // none now. It also refreshes `records.lost` and `.state`. Throws LinkError if another client has started the trace
+  // anew meanwhile, and, with Gaps::kRefuse, if ticks are missing between two records.
   std::size_t TakePage(TraceRecords& records);
 
-  // Takes pages until the recording is done and empty; for one-shot traces and streams with a limit.
+  // Takes pages until the recording is done and nothing is left. For one-shot recordings and streams with a limit.
   TraceRecords TakeAll();
 
  private:
@@ -55,7 +55,7 @@ class TraceReader {
   int trace_;
   Gaps gaps_;
   std::uint32_t next_ = 0;
-  std::uint16_t arm_ = 0;
+  std::uint16_t recording_ = 0;  // its number
 };
 
 }  // namespace armcal::client

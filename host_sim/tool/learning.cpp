@@ -28,7 +28,7 @@ std::uint16_t BlockOf(const std::string& what, int axes) {
 
 // Says what the drive says of itself, in words and as JSON.
 void Report(client::DriveClient& drive, const client::Identity& id, const LearningOptions& o) {
-  const bool held = drive.ReadHolding(reg::kLearningHold, 1)[0] != 0;
+  const bool held = drive.ReadValue<reg::kLearningHold>() != 0;
   const client::DriveStatus status = drive.ReadStatus();
   nlohmann::ordered_json json{{"held", held}, {"reset", o.reset}, {"filters", nlohmann::ordered_json::array()}};
   fmt::print("{}: {}\n", drive.name(), held ? "on hold" : "learning");
@@ -41,7 +41,7 @@ void Report(client::DriveClient& drive, const client::Identity& id, const Learni
                consistent ? "innovations as large as it believes"
                           : "innovations larger than it believes: the arm has changed, or does what the model lacks");
   }
-  const std::vector<float> squared = drive.ReadInputFloats(reg::kConsistency, id.axes);
+  const std::vector<float> squared = drive.ReadFloats(reg::kConsistency, id.axes);
   json["consistency"] = squared;
   fmt::print("normalised innovation squared by joint, 1 expected: {:.2f}\n", fmt::join(squared, "  "));
   WriteJson(o.json, json);
@@ -51,9 +51,9 @@ int RunLearning(const LearningOptions& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   const client::Identity id = drive.ReadIdentity();
   const std::uint16_t block = BlockOf(o.reset, id.axes);
-  if (block != 0 || o.hold || o.resume) drive.WriteU32(reg::kUnlock, reg::kUnlockKey);
-  if (o.hold || o.resume) drive.WriteSingle(reg::kLearningHold, o.hold ? 1 : 0);
-  if (block != 0) drive.WriteSingle(reg::kLearningReset, block);
+  if (block != 0 || o.hold || o.resume) drive.WriteValue<reg::kUnlock>(reg::kUnlockKey);
+  if (o.hold || o.resume) drive.WriteValue<reg::kLearningHold>(o.hold ? 1 : 0);
+  if (block != 0) drive.WriteValue<reg::kLearningReset>(block);
   Report(drive, id, o);
   return kOk;
 }

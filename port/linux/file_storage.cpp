@@ -1,4 +1,4 @@
-// port_linux - NOR flash played by a file; knows no record.
+// port_linux - a file that plays NOR flash.
 #include "port/linux/file_storage.hpp"
 
 #include <fcntl.h>
@@ -39,7 +39,7 @@ Status FileStorage::Open(const std::string& path) {
   return WriteAll(file_, static_cast<std::uint32_t>(there), std::vector<std::uint8_t>(wanted - there, kErased));
 }
 
-port::Storage FileStorage::storage() {
+hardware::Storage FileStorage::storage() {
   return {this, sector_count_, sector_bytes_, program_unit_, kErased, &Read, &Program, &Erase};
 }
 

@@ -1,15 +1,15 @@
-// port_linux - storage in a file that behaves like NOR flash; knows no record.
+// port_linux - storage in a file that behaves like NOR flash.
 #pragma once
 
 #include <cstdint>
 #include <string>
 
-#include "armcal/port/storage.hpp"
+#include "armcal/hardware/storage.hpp"
 
 namespace armcal::port_linux {
 
-// Erase sets bytes to 0xFF, programming only clears bits. What an operation wrote survives the end of the process at
-// any instant; surviving the end of the machine is left to the file system.
+// Erasing sets bytes to 0xFF, and programming only clears bits. What an operation has written survives if the process
+// ends at any instant. Whether it survives a power failure of the machine depends on the file system.
 class FileStorage {
  public:
   FileStorage(std::uint32_t sector_count, std::uint32_t sector_bytes, std::uint32_t program_unit);
@@ -17,11 +17,12 @@ class FileStorage {
   FileStorage(const FileStorage&) = delete;
   FileStorage& operator=(const FileStorage&) = delete;
 
-  // Opens the file; one that is missing or short is filled up as erased. kStorageFault: cannot be opened or written.
+  // Opens the file. A file that is missing or too short is filled up with erased bytes. kStorageFault: the file cannot
+  // be opened or written.
   core::Status Open(const std::string& path);
 
   // Valid while this object lives. Context: background.
-  port::Storage storage();
+  hardware::Storage storage();
 
  private:
   static core::Status Read(void* self, std::uint32_t address, std::uint8_t* bytes, std::uint32_t count);

@@ -1,4 +1,4 @@
-// port_linux - the machine's monotonic time as the port's clock; knows no application.
+// port_linux - the monotonic time of the machine as lib's clock.
 #include "port/linux/steady_clock.hpp"
 
 #include <chrono>
@@ -19,6 +19,6 @@ std::uint32_t Milliseconds(void*) {
 
 }  // namespace
 
-port::Clock SteadyClock(std::atomic<std::uint32_t>& ticks) { return {&ticks, &Ticks, &Milliseconds}; }
+hardware::Clock SteadyClock(std::atomic<std::uint32_t>& ticks) { return {&ticks, &Ticks, &Milliseconds}; }
 
 }  // namespace armcal::port_linux

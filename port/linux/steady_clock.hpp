@@ -1,14 +1,14 @@
-// port_linux - the machine's monotonic time as the port's clock; knows no application.
+// port_linux - the monotonic time of the machine as lib's clock.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 
-#include "armcal/port/clock.hpp"
+#include "armcal/hardware/clock.hpp"
 
 namespace armcal::port_linux {
 
-// Milliseconds of the machine; ticks as counted by the application in `ticks`, which outlives the clock.
-port::Clock SteadyClock(std::atomic<std::uint32_t>& ticks);
+// Milliseconds are the machine's. Ticks are what the application counts in `ticks`, which outlives the clock.
+hardware::Clock SteadyClock(std::atomic<std::uint32_t>& ticks);
 
 }  // namespace armcal::port_linux

@@ -1,4 +1,4 @@
-// port_linux - poll() over a listener and four sockets; knows no protocol.
+// port_linux - poll() over a listener and four sockets.
 #include "port/linux/tcp_server.hpp"
 
 #include <arpa/inet.h>
@@ -24,7 +24,7 @@ bool WouldWait() { return errno == EAGAIN || errno == EWOULDBLOCK || errno == EI
 
 }  // namespace
 
-TcpServer::TcpServer(const ByteService& service, const port::Clock& clock, const TcpLimits& limits)
+TcpServer::TcpServer(const ByteService& service, const hardware::Clock& clock, const TcpLimits& limits)
     : service_(service), clock_(clock), limits_(limits) {}
 
 TcpServer::~TcpServer() {
@@ -101,7 +101,7 @@ void TcpServer::Accept() {
   ::close(socket);
 }
 
-// Sends what waits, then receives and answers until the socket or the client's appetite is exhausted.
+// Sends what waits. Then receives and answers until no request is there, or the socket takes no more of a reply.
 void TcpServer::Serve(int index) {
   Slot& slot = slots_[index];
   if (!Send(slot)) return Close(slot);

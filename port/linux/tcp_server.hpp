@@ -1,4 +1,4 @@
-// port_linux - a few TCP connections for a request-reply service; knows no protocol.
+// port_linux - a few TCP connections for a service that answers requests.
 #pragma once
 
 #include <cstddef>
@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "armcal/core/status.hpp"
-#include "armcal/port/clock.hpp"
+#include "armcal/hardware/clock.hpp"
 
 namespace armcal::port_linux {
 
-// What is served. `receive` takes at most one request out of `bytes` (`used` tells how many it took), puts the reply
-// into `reply` [max_reply], and answers false when the connection should be closed.
+// The service. `receive` takes at most one request out of `bytes`, says in `used` how many bytes it took, and puts the
+// reply into `reply` [max_reply]. It answers false if the connection should be closed.
 struct ByteService {
   void* context;
   std::size_t max_reply;
@@ -24,25 +24,25 @@ struct ByteService {
 
 struct TcpLimits {
   std::uint32_t idle_ms = 60000;          // a connection without any byte is closed; 0: never
-  std::uint32_t partial_frame_ms = 2000;  // so is one whose frame began so long ago
+  std::uint32_t partial_frame_ms = 2000;  // and one whose frame is not complete after this time
 };
 
-// Fixed slots, one thread, nothing waits for a client: one that does not read is not read from either. A connection
-// beyond the slots is accepted and closed. Every call: background context.
+// It has fixed slots and one thread, and it never waits for a client. From a client that does not read its replies it
+// reads no requests. A connection for which there is no slot is accepted and closed. Context of every call: background.
 class TcpServer {
  public:
   static constexpr int kSlots = 4;
 
-  TcpServer(const ByteService& service, const port::Clock& clock, const TcpLimits& limits = {});
+  TcpServer(const ByteService& service, const hardware::Clock& clock, const TcpLimits& limits = {});
   ~TcpServer();
   TcpServer(const TcpServer&) = delete;
   TcpServer& operator=(const TcpServer&) = delete;
 
-  // `address`: IPv4 in digits; `port` 0: any free one, see port(). kBusy: port in use; kOutOfRange: not an address;
-  // kBadAddress: cannot be bound. error() says it in words.
+  // `address`: IPv4 in digits. `port` 0: any free port, see port(). kBusy: the port is in use. kOutOfRange: not an
+  // address. kBadAddress: it cannot be bound. error() says it in words.
   core::Status Listen(const std::string& address, std::uint16_t port);
 
-  // Waits for something to do, at most `timeout_ms`, and does it. kWrongOrder: not listening.
+  // Waits for something to do, at most `timeout_ms`, and does it. kWrongOrder: it does not listen.
   core::Status Poll(int timeout_ms);
 
   std::uint16_t port() const { return port_; }
@@ -52,9 +52,9 @@ class TcpServer {
  private:
   struct Slot {
     int socket = -1;
-    std::vector<std::uint8_t> in, out;  // received and not yet taken; replied and not yet sent
-    std::uint32_t active_ms = 0;        // the last byte in either direction
-    std::uint32_t frame_ms = 0;         // when the frame began that is incomplete
+    std::vector<std::uint8_t> in, out;  // bytes received and not yet taken; bytes of replies not yet sent
+    std::uint32_t active_ms = 0;        // time of the last byte in either direction
+    std::uint32_t frame_ms = 0;         // time when the incomplete frame began
     bool mid_frame = false;
     bool leaving = false;  // the client will send no more
   };
@@ -69,7 +69,7 @@ class TcpServer {
   void CloseLate(Slot& slot);
 
   ByteService service_;
-  port::Clock clock_;
+  hardware::Clock clock_;
   TcpLimits limits_;
   int listener_ = -1;
   std::uint16_t port_ = 0;

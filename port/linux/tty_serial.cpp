@@ -1,4 +1,4 @@
-// port_linux - termios settings and non-blocking reads; knows no frame.
+// port_linux - sets a terminal up with termios and reads it without waiting.
 #include "port/linux/tty_serial.hpp"
 
 #include <fcntl.h>
@@ -50,7 +50,7 @@ Status TtySerial::Open(const std::string& path, int baud, Parity parity) {
   return Status::kOk;
 }
 
-port::Serial TtySerial::serial() { return {this, &Read, &Write}; }
+hardware::Serial TtySerial::serial() { return {this, &Read, &Write}; }
 
 std::size_t TtySerial::Read(void* self, std::uint8_t* bytes, std::size_t capacity) {
   const ssize_t count = ::read(static_cast<TtySerial*>(self)->tty_, bytes, capacity);

@@ -1,10 +1,10 @@
-// port_linux - a serial line, real or a pseudo-terminal, as the port's serial; knows no frame.
+// port_linux - a serial line of the machine, or a pseudo-terminal, as lib's serial line.
 #pragma once
 
 #include <string>
 
 #include "armcal/core/status.hpp"
-#include "armcal/port/serial.hpp"
+#include "armcal/hardware/serial.hpp"
 
 namespace armcal::port_linux {
 
@@ -17,12 +17,12 @@ class TtySerial {
   TtySerial(const TtySerial&) = delete;
   TtySerial& operator=(const TtySerial&) = delete;
 
-  // Raw bytes, eight data bits, one stop bit. kBadAddress: cannot be opened or is no terminal; kOutOfRange: not a speed
-  // of 9600, 19200, 38400, 57600, 115200 or 230400 baud.
+  // Raw bytes, eight data bits, one stop bit. kBadAddress: it cannot be opened or is no terminal. kOutOfRange: the
+  // speed is not 9600, 19200, 38400, 57600, 115200 or 230400 baud.
   core::Status Open(const std::string& path, int baud = 115200, Parity parity = Parity::kEven);
 
   // Valid while this object lives.
-  port::Serial serial();
+  hardware::Serial serial();
 
  private:
   static std::size_t Read(void* self, std::uint8_t* bytes, std::size_t capacity);

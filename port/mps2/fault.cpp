@@ -1,11 +1,12 @@
-// mps2 - what the example firmware does about a fault; knows no peripheral.
+// mps2 - what the example firmware does after a fault.
 #include "port/mps2/interrupts.hpp"
 
 namespace armcal::port::mps2 {
 FaultRecord fault_record;
 }  // namespace armcal::port::mps2
 
-// Keeps what the core says about the fault for a debugger and stops. A drive takes the power stage's enable away here.
+// Keeps what the core says about the fault, for a debugger, and stops. In a drive this function disables the power
+// stage.
 extern "C" void Fault() {
   const auto reg = [](std::uint32_t address) { return *reinterpret_cast<volatile std::uint32_t*>(address); };
   constexpr std::uint32_t kConfigurableFault = 0xE000ED28, kHardFault = 0xE000ED2C;

@@ -1,4 +1,4 @@
-// mps2 - NOR flash played by PSRAM; knows no record.
+// mps2 - PSRAM that plays NOR flash.
 #include "port/mps2/psram_storage.hpp"
 
 extern "C" volatile std::uint8_t nor_begin[];  // linker script
@@ -37,6 +37,6 @@ core::Status Erase(void*, std::uint32_t sector) {
 
 }  // namespace
 
-Storage PsramStorage() { return {nullptr, kSectors, kSector_bytes, kUnit_bytes, 0xFF, Read, Program, Erase}; }
+hardware::Storage PsramStorage() { return {nullptr, kSectors, kSector_bytes, kUnit_bytes, 0xFF, Read, Program, Erase}; }
 
 }  // namespace armcal::port::mps2

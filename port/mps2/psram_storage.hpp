@@ -1,12 +1,12 @@
-// mps2 - storage in the board's PSRAM under the rules of NOR flash; knows no record.
+// mps2 - storage in the board's PSRAM, with the rules of NOR flash.
 #pragma once
 
-#include "armcal/port/storage.hpp"
+#include "armcal/hardware/storage.hpp"
 
 namespace armcal::port::mps2 {
 
-// 8 sectors of 4 KB, program unit 8 bytes, erased to 0xFF; programming can only clear bits. Under QEMU the memory may
-// be backed by a file, and then outlives the power.
-Storage PsramStorage();
+// 8 sectors of 4 KB, program unit 8 bytes, erased to 0xFF. Programming can only clear bits. QEMU may back the memory
+// with a file; then its content survives a power cycle.
+hardware::Storage PsramStorage();
 
 }  // namespace armcal::port::mps2

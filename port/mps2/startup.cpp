@@ -1,4 +1,4 @@
-// mps2 - vector table and reset of a Cortex-M4F/M7; knows no peripheral and no room of armcal.
+// mps2 - vector table and reset of a Cortex-M4F or M7.
 #include <cstdint>
 
 #include "port/mps2/interrupts.hpp"
@@ -20,7 +20,7 @@ constexpr std::uint32_t kCoprocessorAccess = 0xE000ED88;
 
 extern "C" {
 
-// GCC must not turn these loops into memcpy and memset: nothing of the image is there yet.
+// GCC must not turn these loops into memcpy and memset, because the data of the firmware are not there yet.
 __attribute__((optimize("no-tree-loop-distribute-patterns"), noreturn)) void Reset() {
   Register(kCoprocessorAccess) = Register(kCoprocessorAccess) | (0xFu << 20);  // FPU on, before any float instruction
   __asm volatile("dsb\n isb" ::: "memory");
@@ -31,7 +31,7 @@ __attribute__((optimize("no-tree-loop-distribute-patterns"), noreturn)) void Res
   Application();
 }
 
-// Entry 0 is the initial stack pointer. Interrupts that nobody serves end in Fault.
+// Entry 0 is the initial stack pointer. An interrupt that nobody serves ends in Fault.
 __attribute__((section(".vectors"), used)) const Function vectors[16 + 32] = {
     reinterpret_cast<Function>(stack_top),
     Reset,

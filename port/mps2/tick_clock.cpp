@@ -1,4 +1,4 @@
-// mps2 - SysTick's registers; knows no application.
+// mps2 - the registers of SysTick.
 #include "port/mps2/tick_clock.hpp"
 
 #include <atomic>
@@ -14,7 +14,7 @@ volatile std::uint32_t& Register(std::uint32_t address) { return *reinterpret_ca
 std::atomic<std::uint32_t> tick_count{0};
 std::atomic<std::uint32_t> ms_count{0};
 std::uint32_t rate_Hz = 1000;
-std::uint32_t ms_remainder = 0;  // thousandths of a millisecond x tick rate, so that no rounding adds up
+std::uint32_t ms_remainder = 0;  // of a millisecond, in 1/(1000 rate_Hz), so that no rounding adds up
 
 }  // namespace
 
@@ -36,7 +36,7 @@ std::uint32_t CountTick() {
   return tick;
 }
 
-Clock TickClock() {
+hardware::Clock TickClock() {
   return {nullptr, [](void*) { return tick_count.load(std::memory_order_relaxed); },
           [](void*) { return ms_count.load(std::memory_order_relaxed); }};
 }

@@ -1,19 +1,19 @@
-// mps2 - SysTick as control tick and clock; knows no application.
+// mps2 - SysTick as control tick and clock.
 #pragma once
 
 #include <cstdint>
 
-#include "armcal/port/clock.hpp"
+#include "armcal/hardware/clock.hpp"
 
 namespace armcal::port::mps2 {
 
 // Starts the tick interrupt. tick_rate_Hz: 2 to 1000000, an integer part of the core clock (25 MHz).
 void StartTick(std::uint32_t tick_rate_Hz);
 
-// One more tick has begun; call once in TickInterrupt. Returns its number.
+// Call it once in TickInterrupt. Returns the number of the tick that has begun.
 std::uint32_t CountTick();
 
-// Ticks, and milliseconds made of them.
-Clock TickClock();
+// Ticks, and milliseconds that are counted by ticks.
+hardware::Clock TickClock();
 
 }  // namespace armcal::port::mps2

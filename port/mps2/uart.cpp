@@ -1,4 +1,4 @@
-// mps2 - the CMSDK UART's registers and what its interrupt does; knows no frame.
+// mps2 - the registers of the CMSDK UART, and what its interrupt does.
 #include "port/mps2/uart.hpp"
 
 #include "armcal/core/sample_ring.hpp"
@@ -42,12 +42,12 @@ void StartUart1(std::uint32_t baud) {
   *reinterpret_cast<volatile std::uint32_t*>(kInterruptEnable) = 1u << kUart1ReceiveIrq;
 }
 
-Serial Uart1() { return {nullptr, Read, Write}; }
+hardware::Serial Uart1() { return {nullptr, Read, Write}; }
 
 void OnUart1() {
-  Uart().interrupt = 2u;  // before the bytes: one that comes while they are taken has to ask again, or nobody takes it
+  Uart().interrupt = 2u;  // first: a byte that comes while bytes are taken must raise the interrupt again
   while ((Uart().state & 2u) != 0) {
-    // A full ring counts the byte that it refuses; the frame's checksum will fail.
+    // A full ring refuses the byte and counts it. The checksum of the frame will fail.
     (void)received.Push(static_cast<std::uint8_t>(Uart().data));
   }
 }

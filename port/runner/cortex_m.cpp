@@ -1,4 +1,4 @@
-// runner - cycles from the trace unit (DWT) and text through ITM, on any Cortex-M3, M4, M7 or later; knows no program.
+// runner - takes cycles from the DWT and sends text through the ITM, on any Cortex-M3, M4, M7 or later.
 #include "port/runner/cortex_m.hpp"
 
 #include "port/runner/runner.hpp"

@@ -1,10 +1,10 @@
-// runner - starts a program on a Cortex-M board with a debugger; knows no program and no board.
+// runner - starts a program on a Cortex-M board that has a debugger.
 #pragma once
 
 namespace armcal::port::runner {
 
-// Switches the cycle counter on and runs the program. Call from your main with the clocks at full speed and interrupts
-// off. Text goes out through ITM port 0, which the debugger shows as SWO output once it has enabled it.
+// Switches the cycle counter on and runs the program. Call it from your main, with the clocks at full speed and the
+// interrupts off. Text goes out through ITM port 0. The debugger shows it as SWO output after it has enabled the port.
 int Run();
 
 }  // namespace armcal::port::runner

@@ -1,4 +1,4 @@
-// runner - a line of text put together without a library; knows no program.
+// runner - puts a line of text together without a library.
 #pragma once
 
 #include "port/runner/runner.hpp"

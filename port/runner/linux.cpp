@@ -1,4 +1,4 @@
-// runner - a program as a process of a PC: `program [input file]`; knows no program.
+// runner - runs a program as a process of a PC: `program [input file]`.
 #include <cstdio>
 
 #include "port/runner/runner.hpp"

@@ -1,7 +1,7 @@
-// runner - a program on an emulated MPS2 board, by semihosting; knows no program.
+// runner - runs a program on an emulated MPS2 board, by semihosting.
 //
-// QEMU is started with -semihosting-config enable=on,arg=[input file] and -icount shift=7: an instruction then takes
-// 128 ns of virtual time, which is 3.2 ticks of the 25 MHz timer, so that single instructions can be told apart.
+// QEMU is started with -semihosting-config enable=on,arg=[input file] and -icount shift=7. An instruction then takes
+// 128 ns of virtual time, which is 3.2 ticks of the 25 MHz timer. So the timer tells single instructions apart.
 #include "port/mps2/interrupts.hpp"
 #include "port/runner/line.hpp"
 
@@ -59,7 +59,7 @@ void Write(const char* text) { Ask(kWriteText, AddressOf(text)); }
 std::size_t Read(void* bytes, std::size_t capacity) {
   if (input == kNotOpen) return 0;
   const std::uintptr_t block[3] = {input, AddressOf(bytes), capacity};
-  return capacity - Ask(kRead, AddressOf(block));  // the answer is what is missing
+  return capacity - Ask(kRead, AddressOf(block));  // it answers how many bytes are missing
 }
 
 std::uint32_t Count() { return ~Timer0().value; }

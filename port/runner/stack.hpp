@@ -1,12 +1,12 @@
-// runner - how deep a call goes, by painting the stack below it; knows no program.
+// runner - measures how much stack a call uses, by painting the stack below it.
 #pragma once
 
 #include <cstdint>
 
 namespace armcal::port::runner {
 
-// Bytes of stack that `call` used below the caller's own frame, up to 6 KB; 0 on a PC. With interrupts off, or they
-// count as well.
+// Bytes of stack that `call` used below the caller's own frame, up to 6 KB; 0 on a PC. Switch interrupts off before,
+// because their stack would count as well.
 template <class Call>
 std::uint32_t StackOf(Call call) {
 #ifdef __arm__

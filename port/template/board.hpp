@@ -1,4 +1,4 @@
-// template - a new board as the README's example firmware asks for it; complete what says "here".
+// template - a new board, as the README's example firmware asks for it. Complete each line that says "here".
 #pragma once
 
 #include "armcal/controller/controller.hpp"
@@ -10,13 +10,13 @@ namespace board {
 
 namespace target = armcal::port::target;
 
-inline constexpr std::uint32_t kSilence_ms = 2;  // that ends a frame; at 115200 baud 3.5 characters are 0.3 ms
+inline constexpr std::uint32_t kSilence_ms = 2;  // a pause that ends a frame; at 115200 baud 3.5 characters take 0.3 ms
 
-inline armcal::port::Storage Storage() { return target::TargetStorage(); }
-inline armcal::port::Clock Clock() { return target::TargetClock(); }
-inline armcal::port::Serial Serial() { return target::TargetSerial(); }
+inline armcal::hardware::Storage Storage() { return target::TargetStorage(); }
+inline armcal::hardware::Clock Clock() { return target::TargetClock(); }
+inline armcal::hardware::Serial Serial() { return target::TargetSerial(); }
 
-// Answers which axes are under control, a bit each.
+// Answers which axes are under control, one bit for each.
 template <int n>
 std::uint32_t Measure(armcal::model::RawSample<n>& raw, armcal::controller::SetPoint<n>& set) {
   raw = {};

@@ -1,4 +1,4 @@
-// template - counts ticks; knows no application.
+// template - counts ticks and milliseconds.
 #include "port/template/clock.hpp"
 
 #include <atomic>
@@ -12,7 +12,7 @@ std::uint32_t remainder = 0;  // of a millisecond, in 1/(1000 kTickRate_Hz), so 
 
 }  // namespace
 
-Clock TargetClock() {
+hardware::Clock TargetClock() {
   return {nullptr, [](void*) { return tick_count.load(std::memory_order_relaxed); },
           [](void*) { return ms_count.load(std::memory_order_relaxed); }};
 }

@@ -1,4 +1,4 @@
-// template - the two rings of a serial line; knows no frame.
+// template - the two rings of a serial line.
 #include "port/template/serial.hpp"
 
 #include "armcal/core/sample_ring.hpp"
@@ -25,10 +25,10 @@ std::size_t Write(void*, const std::uint8_t* bytes, std::size_t count) {
 
 }  // namespace
 
-Serial TargetSerial() { return {nullptr, Read, Write}; }
+hardware::Serial TargetSerial() { return {nullptr, Read, Write}; }
 
 void OnReceived(std::uint8_t byte) {
-  (void)received.Push(byte);  // refused when full; the ring counts it and the frame's checksum fails
+  (void)received.Push(byte);  // a full ring refuses the byte, and the checksum of the frame fails
 }
 
 bool NextToSend(std::uint8_t& byte) { return core::IsOk(to_send.Pop(byte)); }

@@ -1,13 +1,13 @@
-// template - a serial line for a new target: two rings between interrupt and background; knows no frame.
+// template - a serial line for a new target: two rings between its interrupts and the background.
 #pragma once
 
 #include <cstdint>
 
-#include "armcal/port/serial.hpp"
+#include "armcal/hardware/serial.hpp"
 
 namespace armcal::port::target {
 
-Serial TargetSerial();
+hardware::Serial TargetSerial();
 
 // Your receive interrupt calls this with every byte. A byte that finds the ring full is lost, and its frame with it.
 void OnReceived(std::uint8_t byte);

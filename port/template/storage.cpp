@@ -1,10 +1,10 @@
-// template - flash rules over an array; knows no record.
+// template - an array that keeps the rules of flash.
 #include "port/template/storage.hpp"
 
 namespace armcal::port::target {
 namespace {
 
-// Your flash: two sectors or more, alike; the program unit is what one write command takes.
+// Your flash: two or more sectors of equal size. The program unit is what one write command takes.
 constexpr std::uint32_t kSectors = 2, kSector_bytes = 4096, kUnit_bytes = 8;
 constexpr std::uint8_t kErased = 0xFF;
 
@@ -39,6 +39,8 @@ core::Status Erase(void*, std::uint32_t sector) {
 
 }  // namespace
 
-Storage TargetStorage() { return {nullptr, kSectors, kSector_bytes, kUnit_bytes, kErased, Read, Program, Erase}; }
+hardware::Storage TargetStorage() {
+  return {nullptr, kSectors, kSector_bytes, kUnit_bytes, kErased, Read, Program, Erase};
+}
 
 }  // namespace armcal::port::target

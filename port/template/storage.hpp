@@ -1,12 +1,13 @@
-// template - storage for a new target, in RAM until its flash driver is there; knows no record.
+// template - storage for a new target. It lies in RAM until you put your flash driver here.
 #pragma once
 
-#include "armcal/port/storage.hpp"
+#include "armcal/hardware/storage.hpp"
 
 namespace armcal::port::target {
 
-// Keeps the rules of flash (programming clears bits, a unit is written once per erase), but not the content: a table
-// saved here is gone at power-off. Give your flash's geometry, and put its driver behind the three functions.
-Storage TargetStorage();
+// It keeps the rules of flash: programming clears bits, and a unit is written once after each erase. It does not keep
+// the content: a saved table is gone at power-off. Give the geometry of your flash, and call its driver in the three
+// functions.
+hardware::Storage TargetStorage();
 
 }  // namespace armcal::port::target

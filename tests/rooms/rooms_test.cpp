@@ -16,7 +16,7 @@ const std::string kLib = "lib/armcal/", kCode = "codegen/src/", kHost = "host_si
 // clang-format off
 const Edges kEdges = {
     // The firmware library: core <- math <- {signal, model, filter, physical} <- monitor <- estimator;
-    // core, model <- feedforward; core <- port <- table <- link. Model and filter meet in estimator only.
+    // core, model <- feedforward; core <- hardware <- table <- link. Model and filter meet in estimator only.
     {"lib/armcal/core",        {}},
     {"lib/armcal/math",        {kLib + "core"}},
     {"lib/armcal/model",       {kLib + "core", kLib + "math"}},
@@ -27,16 +27,16 @@ const Edges kEdges = {
     {"lib/armcal/monitor",     {kLib + "core", kLib + "math", kLib + "signal", kLib + "filter", kLib + "physical"}},
     {"lib/armcal/estimator",   {kLib + "core", kLib + "math", kLib + "model", kLib + "signal", kLib + "filter",
                                 kLib + "physical", kLib + "monitor", kLib + "feedforward"}},
-    {"lib/armcal/port",        {kLib + "core"}},
-    {"lib/armcal/table",       {kLib + "core", kLib + "port"}},
-    {"lib/armcal/link",        {kLib + "core", kLib + "port", kLib + "table"}},
+    {"lib/armcal/hardware",    {kLib + "core"}},
+    {"lib/armcal/table",       {kLib + "core", kLib + "hardware"}},
+    {"lib/armcal/link",        {kLib + "core", kLib + "hardware", kLib + "table"}},
     {"lib/armcal/controller",  {kLib}},  // introduces the rooms to each other
 
     // Targets fill the port's contracts; a board.hpp gives them the names of the README's example.
-    {"port/linux",             {kLib + "core", kLib + "port"}},
-    {"port/mps2",              {kLib + "core", kLib + "port"}},
-    {"port/template",          {kLib + "core", kLib + "port", kLib + "controller"}},
-    {"port/runner",            {kLib + "core", kLib + "port", "port/mps2"}},  // what a test program needs of its machine
+    {"port/linux",             {kLib + "core", kLib + "hardware"}},
+    {"port/mps2",              {kLib + "core", kLib + "hardware"}},
+    {"port/template",          {kLib + "core", kLib + "hardware", kLib + "controller"}},
+    {"port/runner",            {kLib + "core", kLib + "hardware", "port/mps2"}},  // what a test program needs of its machine
     {"port/mps2/application",  {kLib, "codegen/generated/", "port/mps2"}},
 
     // The generator prints includes of lib but uses none; its output sees numbers only.

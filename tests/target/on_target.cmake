@@ -25,19 +25,19 @@ endforeach()
 
 # With a board's own start-up instead of the runner's.
 add_executable(cortex_m_bench cortex_m_main.cpp ${PROJECT_SOURCE_DIR}/port/mps2/startup.cpp ${PROJECT_SOURCE_DIR}/port/mps2/fault.cpp)
-target_link_libraries(cortex_m_bench PRIVATE armcal_bench armcal_port)
+target_link_libraries(cortex_m_bench PRIVATE armcal_bench armcal_hardware)
 target_include_directories(cortex_m_bench PRIVATE ${PROJECT_SOURCE_DIR})
 target_link_options(cortex_m_bench PRIVATE -L${PROJECT_SOURCE_DIR}/port/mps2 -T ${ARMCAL_BOARD}.ld)
 
 # The example firmware's three contexts; together with three exception frames they have 16 KB (sections.ld).
 add_test(NAME Stack_OfEveryContextOfTheFirmware_IsBounded COMMAND_EXPAND_LISTS
   COMMAND ${stack_check} --limit 4096 --root "^void Application" --root "^void TickInterrupt" --root "^void SerialInterrupt"
-          --indirect ${PROJECT_SOURCE_DIR}/port/mps2/application/indirect_calls.txt $<TARGET_OBJECTS:armcal_image>
+          --indirect ${PROJECT_SOURCE_DIR}/port/mps2/application/indirect_calls.txt $<TARGET_OBJECTS:armcal_firmware>
           $<TARGET_OBJECTS:armcal_port_mps2> $<TARGET_OBJECTS:armcal_link> $<TARGET_OBJECTS:armcal_table>)
 
 # The README's firmware, spoken to over its serial line.
 add_test(NAME Firmware_OverItsSerialLine_TakesATableAndLearns
-  COMMAND ${PROJECT_SOURCE_DIR}/tests/readme/firmware_session.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_image>
+  COMMAND ${PROJECT_SOURCE_DIR}/tests/readme/firmware_session.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_firmware>
           ${PROJECT_SOURCE_DIR}/build/host/armcal)
 set_tests_properties(Firmware_OverItsSerialLine_TakesATableAndLearns PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300 LABELS target)
 

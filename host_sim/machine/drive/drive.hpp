@@ -12,8 +12,8 @@
 #include "armcal/estimator/trace_records.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
-#include "armcal/link/tcp_service.hpp"
-#include "armcal/link/trace_registers.hpp"
+#include "armcal/link/tcp.hpp"
+#include "armcal/link/trace.hpp"
 #include "codegen/src/robot/robot.hpp"
 #include "host_sim/machine/drive/player.hpp"
 #include "host_sim/machine/drive/vendor_block.hpp"
@@ -48,7 +48,7 @@ class Drive {
         controller_(Opened(storage_, o.storage), port_linux::SteadyClock(tick_), Identity()),
         vendor_(player_, n) {
     Require(controller_.Record(raw_trace_));
-    Require(link::ServeTrace(controller_.map(), 1, sample_trace_));
+    Require(sample_trace_.Serve(controller_.map(), 1));
     Require(vendor_.Serve(controller_.map()));
     controller_.template filter<0>().SetObserver(&OnSample, this);
     (void)controller_.Boot();  // its answer is served as table_status
@@ -94,7 +94,7 @@ class Drive {
     identity.capabilities = link::reg::kHasSampleTrace;
     return identity;
   }
-  static port::Storage Opened(port_linux::FileStorage& storage, const std::string& path) {
+  static hardware::Storage Opened(port_linux::FileStorage& storage, const std::string& path) {
     if (!core::IsOk(storage.Open(path))) throw io::InputError(path + ": expected a file that can be written");
     return storage.storage();
   }
@@ -128,8 +128,8 @@ class Drive {
     bool busy = false;
     for (int k = 0; k < kSlices; ++k) {
       // A streaming reader that is behind holds the estimators up, and through their rings virtual time.
-      const bool room =
-          options_.real_time || sample_trace_.armed().mode != link::TraceMode::kStreaming || sample_trace_.room() > 2;
+      const bool room = options_.real_time || sample_trace_.recording().mode != link::TraceMode::kStreaming ||
+                        sample_trace_.room() > 2;
       if (!room || !controller_.Step()) break;
       busy = true;
     }
@@ -160,7 +160,7 @@ class Drive {
     }
   }
   bool MayAdvance() {
-    if (raw_trace_.armed().mode == link::TraceMode::kStreaming && raw_trace_.room() < 2) return false;
+    if (raw_trace_.recording().mode == link::TraceMode::kStreaming && raw_trace_.room() < 2) return false;
     if (controller_.template filter<0>().pending() > kBacklog || controller_.template filter<1>().pending() > kBacklog)
       return false;
     return player_.moving() || player_.command_pending() || grant_.load() > 0;

@@ -79,7 +79,7 @@ int Live(const Options& o, const codegen::Model& m) {
   HostPort port(table);
   client::TraceRequest request;
   request.channels = estimator::kSampleAll;
-  client::ArmTrace(drive, 1, request);
+  client::StartTrace(drive, 1, request);
   client::TraceReader reader(drive, 1, client::Gaps::kRefuse);
   std::printf("estimate: listening to %s\n", drive.name().c_str());
   std::fflush(stdout);
@@ -112,11 +112,11 @@ int Live(const Options& o, const codegen::Model& m) {
   }
   client::TraceRequest off;
   off.mode = client::TraceMode::kOff;
-  client::ArmTrace(drive, 1, off);
+  client::StartTrace(drive, 1, off);
   port.Finish();
-  const auto drive_a = drive.ReadInputFloats(link::reg::kEstimateA, Model::kColumns),
-             drive_b = drive.ReadInputFloats(link::reg::kEstimateB, Model::kColumns);
-  const auto drive_sd = drive.ReadInputFloats(link::reg::kDeviationA, Model::kColumns);
+  const auto drive_a = drive.ReadFloats(link::reg::kEstimateA, Model::kColumns),
+             drive_b = drive.ReadFloats(link::reg::kEstimateB, Model::kColumns);
+  const auto drive_sd = drive.ReadFloats(link::reg::kDeviationA, Model::kColumns);
   const bool same_a = !std::memcmp(drive_a.data(), port.a.value, sizeof port.a.value),
              same_b = !std::memcmp(drive_b.data(), port.b.value, sizeof port.b.value);
   const auto names = ColumnNames(m);

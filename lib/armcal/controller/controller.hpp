@@ -1,4 +1,4 @@
-// controller - introduces estimators, feed-forward, table and link to each other; knows no board and no bus.
+// controller - connects estimators, feed-forward, table and link to one motion controller.
 #pragma once
 
 #include <atomic>
@@ -10,12 +10,11 @@
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/estimator/image.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
+#include "armcal/hardware/clock.hpp"
+#include "armcal/hardware/storage.hpp"
 #include "armcal/link/device.hpp"
-#include "armcal/link/learning_registers.hpp"
-#include "armcal/link/residual_registers.hpp"
-#include "armcal/link/trace_registers.hpp"
-#include "armcal/port/clock.hpp"
-#include "armcal/port/storage.hpp"
+#include "armcal/link/table_transaction.hpp"
+#include "armcal/link/trace.hpp"
 #include "armcal/table/table_store.hpp"
 
 namespace armcal::controller {
@@ -33,11 +32,11 @@ class Controller {
 
   // What the model says of itself is filled in; what of `identity` remains is the integrator's: versions, texts,
   // capabilities beyond those of this class.
-  Controller(const port::Storage& storage, const port::Clock& clock, const link::Identity& identity = {})
+  Controller(const hardware::Storage& storage, const hardware::Clock& clock, const link::Identity& identity = {})
       : clock_(clock),
         store_(storage, Model::kSchema, kWords),
         transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords),
-        device_(Describe(identity), live_, transaction_) {
+        device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals}) {
     model::Encode(estimator::DefaultTable<Model>(), active_);
     filter<0>().SetResiduals(&residuals_);
   }
@@ -62,10 +61,10 @@ class Controller {
   void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
 
   // From now on a client can record what Push and FeedForward were given; `ring` outlives this. Once, before the first
-  // tick. Answers as link::ServeTrace. Context: background.
+  // tick. Answers as link::Trace::Serve. Context: background.
   template <std::uint32_t kRingWords>
   core::Status Record(RawTrace<Model, kRingWords>& ring) {
-    const core::Status served = link::ServeTrace(device_.map(), 0, ring);
+    const core::Status served = ring.Serve(device_.map(), 0);
     if (!core::IsOk(served)) return served;
     device_.Declare(link::reg::kHasRawTrace);
     trace_ = &ring;
@@ -140,21 +139,23 @@ class Controller {
     return identity;
   }
 
+  // The lists of floats that a client may read.
   template <std::size_t... k>
   core::Status Serve(std::index_sequence<k...>) {
-    core::Status map = core::Status::kOk;
-    const auto serve = [&](std::uint16_t first, const float* values, std::uint16_t count) {
-      if (core::IsOk(map)) map = device_.AddFloats(first, values, count);
+    namespace reg = link::reg;
+    core::Status served = core::Status::kOk;
+    const auto serve = [&](const link::Span& list, const float* values) {
+      if (core::IsOk(served)) served = device_.Serve(list, values);
     };
-    constexpr std::uint16_t kEstimate[] = {link::reg::kEstimateA, link::reg::kEstimateB},
-                            kDeviation[] = {link::reg::kDeviationA, link::reg::kDeviationB};
-    (serve(kEstimate[k], estimates_[k].value, Model::kColumns), ...);
-    (serve(kDeviation[k], estimates_[k].sd, Model::kColumns), ...);
-    serve(link::reg::kResidualRms, estimates_[0].residual_rms_Nm, n);
-    serve(link::reg::kConsistency, estimates_[kFilters - 1].nis, n);
-    if (core::IsOk(map)) map = residual_pages_.Serve(device_.map());
-    if (core::IsOk(map)) map = learning_.Serve();
-    return map;
+    constexpr link::Span kEstimate[] = {SpanOf(reg::kEstimateA, Model::kColumns),
+                                        SpanOf(reg::kEstimateB, Model::kColumns)},
+                         kDeviation[] = {SpanOf(reg::kDeviationA, Model::kColumns),
+                                         SpanOf(reg::kDeviationB, Model::kColumns)};
+    (serve(kEstimate[k], estimates_[k].value), ...);
+    (serve(kDeviation[k], estimates_[k].sd), ...);
+    serve(SpanOf(reg::kResidualRms, n), estimates_[0].residual_rms_Nm);
+    serve(SpanOf(reg::kConsistency, n), estimates_[kFilters - 1].nis);
+    return served;
   }
 
   template <std::size_t... k>
@@ -188,14 +189,14 @@ class Controller {
     record_.Add(raw, told_q_, told_Nm_);
     if (!turn.last) return;
     std::uint16_t words[estimator::RawRecordWords<n>(estimator::kRawAll)];
-    record_.Write(trace_->armed().channels, words);
+    record_.Write(trace_->recording().channels, words);
     (void)trace_->Push(words, feed_forward_.generation());
   }
 
-  // Callbacks of the link. Context: background.
+  // What link::Device asks for when a client does. Context: background.
   static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
     static_assert(monitor::ResidualBins::kValues == link::reg::kResidualBinValues &&
-                  monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValueCount);
+                  monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValues);
     const auto& c = *static_cast<const Controller*>(self);
     page.generation = c.generation_;
     page.elapsed_s = c.residuals_.elapsed_s();
@@ -206,7 +207,7 @@ class Controller {
     static_cast<Controller*>(self)->ForEach([&](auto& estimator) { estimator.Hold(hold); });
     return core::Status::kOk;
   }
-  // Each filter that can; kOutOfRange: none can.
+  // Resets each filter that can. kOutOfRange: none can.
   static core::Status Reset(void* self, int block) {
     core::Status status = core::Status::kOutOfRange;
     static_cast<Controller*>(self)->ForEach([&](auto& estimator) {
@@ -215,30 +216,33 @@ class Controller {
     return status;
   }
 
-  static core::Status Check(void* self, const std::uint16_t* words, std::uint32_t) {
+  // What link::TableTransaction asks for when a table is flashed. Check decodes and builds the table, once. What it has
+  // built waits in the spare until it is adopted or until another table is checked. Context: background.
+  static core::Status Check(void* self, const std::uint16_t* words) {
     auto& c = *static_cast<Controller*>(self);
-    const core::Status decoded = model::Decode(words, Model::kSchema, c.table_);
-    return core::IsOk(decoded) ? c.BuildSpare() : decoded;
+    c.spare_is_checked_ = false;
+    core::Status status = model::Decode(words, Model::kSchema, c.table_);
+    if (core::IsOk(status)) status = c.BuildSpare();
+    c.spare_is_checked_ = core::IsOk(status);
+    return status;
   }
-  static core::Status Permit(void* self, const std::uint16_t* words, std::uint32_t) {
+  static core::Status Permit(void* self) {
     auto& c = *static_cast<Controller*>(self);
-    const core::Status decoded = model::Decode(words, Model::kSchema, c.table_);
-    if (!core::IsOk(decoded)) return decoded;
-    return c.enabled() && (c.table_.flags & model::kFlagBumpless) == 0 ? core::Status::kAxisEnabled : core::Status::kOk;
+    if (!c.spare_is_checked_) return core::Status::kWrongOrder;
+    return c.enabled() && !c.Spare().committed.bumpless ? core::Status::kAxisEnabled : core::Status::kOk;
   }
-  static core::Status Adopt(void* self, const std::uint16_t* words, std::uint32_t count) {
+  static core::Status Adopt(void* self) {
     auto& c = *static_cast<Controller*>(self);
-    const core::Status built = Check(self, words, count);
-    if (!core::IsOk(built)) return built;
+    if (!c.spare_is_checked_) return core::Status::kWrongOrder;
     const core::Status offered = c.feed_forward_.Offer(c.Spare().committed, c.enabled());
     if (core::IsOk(offered)) c.PutInForce();
     return offered;
   }
 
   bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
-  // The image that nobody reads: estimators hold the other one, feed-forward a copy.
+  // The one of the two that nobody reads. The estimators read the other one, and the feed-forward has a copy.
   estimator::Image<Model>& Spare() { return images_[1 - in_force_.load(std::memory_order_relaxed)]; }
-  // kOutOfRange, too: a filter's form cannot hold what the table asks for.
+  // Answers as BuildImage; kOutOfRange also if a filter's form cannot hold what the table asks for.
   core::Status BuildSpare() {
     const core::Status built = estimator::BuildImage(table_, generation_ + 1, work_, Spare());
     if (!core::IsOk(built)) return built;
@@ -247,6 +251,7 @@ class Controller {
     return suits ? core::Status::kOk : core::Status::kOutOfRange;
   }
   void PutInForce() {
+    spare_is_checked_ = false;  // from now on the spare is the table before
     const std::uint32_t now = clock_.Ticks();
     adopted_tick_.store(now, std::memory_order_relaxed);
     ForEach([&](auto& estimator) { estimator.Adopt(Spare(), now); });
@@ -254,7 +259,7 @@ class Controller {
     in_force_.store(1 - in_force_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }
 
-  port::Clock clock_;
+  hardware::Clock clock_;
   std::uint16_t staged_[kWords] = {}, active_[kWords] = {};
   table::TableStore store_;
   link::TableTransaction transaction_;
@@ -268,11 +273,10 @@ class Controller {
   std::tuple<estimator::Estimator<Model, Filters>...> estimators_;
   estimator::Estimates<Model> estimates_[kFilters];
   monitor::ResidualStatistics<n> residuals_;
-  link::ResidualPages residual_pages_{TakeResiduals, this, n};
-  link::LearningRegisters learning_{{this, Hold, Reset}, device_, n};
-  estimator::Table<Model> table_;
+  estimator::Table<Model> table_;  // the last one that was decoded
   estimator::ImageWork<Model> work_;
   estimator::Image<Model> images_[2];
+  bool spare_is_checked_ = false;  // the spare is what the last Check was given
   std::uint32_t generation_ = 0;
   std::atomic<int> in_force_{0};
   std::atomic<std::uint32_t> adopted_tick_{0}, enabled_axes_{0}, feedforward_state_{0}, clamp_count_{0};

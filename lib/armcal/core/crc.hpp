@@ -1,4 +1,4 @@
-// core - the two checksums on the wire and in storage; knows no frame and no record.
+// core - the two checksums that the wire and the storage use.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 namespace armcal::core {
 
 namespace crc {
-// Sixteen-entry (nibble) tables: 64 + 32 bytes of flash instead of 1 KB each.
+// Tables of sixteen entries, for half a byte at a time: 64 + 32 bytes of flash instead of 1 KB each.
 struct Tables {
   std::uint32_t ieee[16];
   std::uint16_t modbus[16];
@@ -38,7 +38,7 @@ constexpr std::uint32_t StepIeee(std::uint32_t crc, std::uint8_t byte) {
 }  // namespace crc
 
 // CRC-32 of IEEE 802.3 (reflected, 0xEDB88320, initial and final 0xFFFFFFFF); "123456789" gives 0xCBF43926.
-// `previous`: the result over the bytes before these, so that a long text can be fed in pieces.
+// `previous`: the result over the bytes before these, so that a long text can be given in pieces.
 constexpr std::uint32_t Crc32(const std::uint8_t* bytes, std::size_t count, std::uint32_t previous = 0) {
   std::uint32_t c = ~previous;
   for (std::size_t i = 0; i < count; ++i) c = crc::StepIeee(c, bytes[i]);

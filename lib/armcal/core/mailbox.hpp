@@ -1,4 +1,4 @@
-// core - the latest value from one context to another; knows nothing of what it carries.
+// core - hands the latest value from one context to another.
 #pragma once
 
 #include <atomic>
@@ -7,32 +7,33 @@
 
 namespace armcal::core {
 
-// One writer, one reader, wait-free on both sides: the writer owns one slot, the reader another, the third lies between
-// them and is exchanged whole. A value is never seen half written; an older one that nobody took is replaced.
+// For one writer and one reader; neither ever waits. The writer owns one slot and the reader another. The third slot
+// lies between them, and each side exchanges its own slot for it. So nobody sees a value half written. If the reader
+// has not taken a value yet, the next one replaces it.
 template <class T>
 class Mailbox {
   static_assert(std::is_trivially_copyable<T>::value, "values are copied between contexts");
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free, "the exchange must not need a lock");
 
  public:
-  // Writer: copy `value` in and publish it.
+  // Writer: copies `value` in and publishes it.
   void Post(const T& value) {
     draft() = value;
     Publish();
   }
 
-  // Writer: the slot to fill in place (its content is an older value); then Publish(). For large T.
+  // Writer, for a large T: fill the slot in place, then call Publish(). The slot holds an older value before.
   T& draft() { return slots_[back_]; }
   void Publish() { back_ = between_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex; }
 
-  // Reader: copy the latest value out. False: nothing new since the last Take or Refresh, `value` unchanged.
+  // Reader: copies the latest value out. False: nothing is new since the last Take or Refresh; `value` is unchanged.
   bool Take(T& value) {
     if (!Refresh()) return false;
     value = slots_[front_];
     return true;
   }
 
-  // Reader: make latest() the newest value in place; it stays unchanged until the next Refresh. False: nothing new.
+  // Reader: makes latest() the newest value. It stays unchanged until the next Refresh. False: nothing is new.
   bool Refresh() {
     if ((between_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
     front_ = between_.exchange(front_, std::memory_order_acq_rel) & kIndex;
@@ -45,9 +46,9 @@ class Mailbox {
   static constexpr std::uint32_t kFresh = 4;
 
   T slots_[3] = {};
-  std::uint32_t back_ = 0;                 // the writer's
-  std::atomic<std::uint32_t> between_{1};  // index of the middle slot, and whether it is news
-  std::uint32_t front_ = 2;                // the reader's
+  std::uint32_t back_ = 0;                 // of the writer
+  std::atomic<std::uint32_t> between_{1};  // index of the third slot, and kFresh if the reader has not seen it
+  std::uint32_t front_ = 2;                // of the reader
 };
 
 }  // namespace armcal::core

@@ -1,4 +1,4 @@
-// core - a queue from one context to another; knows nothing of what it carries.
+// core - a queue from one context to another.
 #pragma once
 
 #include <atomic>
@@ -9,8 +9,8 @@
 
 namespace armcal::core {
 
-// Single producer, single consumer, wait-free on both sides. N: capacity, a power of two.
-// Full: the NEW item is refused whole and counted, so what was accepted stays in order and complete.
+// For one producer and one consumer; neither ever waits. N: capacity, a power of two. When the queue is full, the new
+// item is refused whole and counted. So the items that were accepted stay complete and in order.
 template <class T, std::uint32_t N>
 class SampleRing {
   static_assert(N > 0 && (N & (N - 1)) == 0, "capacity must be a power of two: the indices run freely and wrap");
@@ -39,13 +39,13 @@ class SampleRing {
     return Status::kOk;
   }
 
-  // Items waiting; exact for the consumer as a lower bound, for the producer as an upper one. Context: any.
+  // Items that wait. At the next moment the consumer may find more, and the producer may find fewer. Context: any.
   std::uint32_t size() const {
     const std::uint32_t tail = tail_.load(std::memory_order_acquire);
     return head_.load(std::memory_order_acquire) - tail;
   }
 
-  // Items refused since construction, wraps. Context: any.
+  // Items refused since construction; wraps. Context: any.
   std::uint32_t refused() const { return refused_.load(std::memory_order_relaxed); }
 
   static constexpr std::uint32_t capacity() { return N; }

@@ -1,13 +1,13 @@
-// core - the one answer every call gives; knows no room above it.
-// Numbers are part of SPEC.md (readable as a register) and never change meaning.
+// core - the answer that every call gives.
+// A client can read the numbers (SPEC.md), so a number never changes its meaning.
 #pragma once
 
 #include <cstdint>
 
 namespace armcal::core {
 
-// 0 ok; 1-31 refused (the caller's input); 32-63 fault (the world); 64-95 limited (done, but held back).
-// Unless ok or limited, the object that answered is byte-identical to before the call.
+// 0: ok. 1-31: refused because of what the caller gave. 32-63: fault of a device or a partner. 64-95: limited, that is,
+// done, but held back. Unless it is ok or limited, the object that answered is the same as before the call.
 enum class [[nodiscard]] Status : std::uint8_t{
     kOk = 0,
     kNotFinite = 1,      // a number is NaN or infinite

@@ -1,4 +1,4 @@
-// core - 32-bit values in 16-bit words and words in bytes, high part first; knows no register and no record.
+// core - puts 32-bit values into 16-bit words, and words into bytes, high part first.
 #pragma once
 
 #include <cstdint>

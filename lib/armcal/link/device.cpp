@@ -1,68 +1,45 @@
-// link - every block of the map and the values in it; knows no transport.
+// link - what each register of a drive answers, and what a write to it does.
 #include "armcal/link/device.hpp"
-
-#include <cstring>
-
-#include "armcal/core/words.hpp"
 
 namespace armcal::link {
 
-namespace {
-
-using core::PutF32;
-using core::PutU32;
 using core::Status;
-using Words = std::uint16_t;
 
-Status ReadFloats(void* context, Words offset, Words count, Words* words) {
-  const float* values = *static_cast<const float**>(context);
-  for (unsigned i = 0; i < count; ++i) {
-    Words pair[2];
-    PutF32(pair, values[(offset + i) / 2]);
-    words[i] = pair[(offset + i) % 2];
-  }
-  return Status::kOk;
+Device::Device(const Identity& identity, const LiveStatus& live, TableTransaction& transaction,
+               const ClientRequests& requests)
+    : identity_(identity), live_(live), transaction_(transaction), requests_(requests), engine_(map_, identity.texts) {
+  static_cast<void>(ServeOwn());  // cannot be refused: the map is still empty, and a test reads every register
 }
 
-Status ReadScratch(void* context, Words offset, Words count, Words* words) {
-  return CopyWords(static_cast<const Words*>(context), offset, count, words);
-}
-
-Status WriteScratch(void* context, Words offset, Words count, const Words* words) {
-  std::memcpy(static_cast<Words*>(context) + offset, words, 2u * count);
-  return Status::kOk;
-}
-
-}  // namespace
-
-Device::Device(const Identity& identity, const LiveStatus& live, TableTransaction& transaction)
-    : identity_(identity), live_(live), transaction_(transaction), engine_(map_, identity.texts) {
-  constexpr auto kIn = RegisterKind::kInput, kHold = RegisterKind::kHolding;
-  constexpr auto kAny = WriteRule::kWords, kWhole = WriteRule::kWhole;
-  const Words table = transaction.words();
+Status Device::ServeOwn() {
+  const Span staged = SpanOf(reg::kStagedTable, transaction_.words());
+  const Span active = SpanOf(reg::kActiveTable, transaction_.words());
+  using Words32 = Scratch<reg::kScratchWords>;
+  using Values4 = Scratch<2 * reg::kScratchValues>;
   const Block blocks[] = {
-      {kIn, reg::kIdentity, reg::kIdentityCount, this, Read<&Device::ReadIdentity>, nullptr, kAny},
-      {kIn, reg::kStatus, reg::kStatusCount, this, Read<&Device::ReadStatus>, nullptr, kAny},
-      {kHold, reg::kCommand, reg::kCommandCount, this, Read<&Device::ReadCommand>, Write<&Device::WriteCommand>,
-       kWhole},
-      {kHold, reg::kUnlock, 2, this, Read<&Device::ReadUnlock>, Write<&Device::WriteUnlock>, kWhole},
-      {kHold, reg::kStaged, table, this, Read<&Device::ReadStaged>, Write<&Device::WriteStaged>, kAny},
-      {kHold, reg::kActive, table, this, Read<&Device::ReadActive>, nullptr, kAny},
-      {kHold, reg::kScratch, reg::kScratchCount, scratch_, ReadScratch, WriteScratch, kAny},
-      {kHold, reg::kScratchFloat, 2 * reg::kScratchPairs, scratch_float_, ReadScratch, WriteScratch,
-       WriteRule::kFloats},
-      {kHold, reg::kScratchU32, 2 * reg::kScratchPairs, scratch_u32_, ReadScratch, WriteScratch, WriteRule::kPairs},
+      FilledBlock<reg::kIdentityBlock, &Device::FillIdentity>(this),
+      FilledBlock<reg::kStatusBlock, &Device::FillStatus>(this),
+      FilledBlock<reg::kResidualHeaderBlock, &Device::FillResidualHeader>(this),
+      DirectBlock<&FloatList::Read>(reg::kResidualValuesBlock, &residual_values_),
+      FilledBlock<reg::kCommandBlock, &Device::FillCommand, &Device::TakeCommand>(this),
+      FilledBlock<reg::kUnlock, &Device::FillUnlock, &Device::TakeUnlock>(this),
+      DirectBlock<&Device::ReadStaged, &Device::WriteStaged>(staged, this),
+      DirectBlock<&Device::ReadActive>(active, this),
+      FilledBlock<reg::kResidualSelect, &Device::FillSelect, &Device::TakeSelect>(this),
+      FilledBlock<reg::kLearningHold, &Device::FillHold, &Device::TakeHold>(this),
+      FilledBlock<reg::kLearningReset, &Device::FillReset, &Device::TakeReset>(this),
+      DirectBlock<&Words32::Read, &Words32::Write>(SpanOf(reg::kScratch), &scratch_),
+      DirectBlock<&Values4::Read, &Values4::Write>(SpanOf(reg::kScratchFloat), &scratch_float_),
+      DirectBlock<&Values4::Read, &Values4::Write>(SpanOf(reg::kScratchU32), &scratch_u32_),
   };
-  // An empty map has room for them and registers.hpp keeps them apart; a test reads every one.
-  for (const Block& block : blocks) static_cast<void>(map_.Add(block));
+  return map_.Add(blocks);
 }
 
-Status Device::AddFloats(Words first, const float* values, Words count) {
-  if (float_lists_ == kMaxFloatLists) return Status::kFull;
-  floats_[float_lists_] = values;
-  const Status added = map_.Add({RegisterKind::kInput, first, static_cast<Words>(2 * count), &floats_[float_lists_],
-                                 ReadFloats, nullptr, WriteRule::kWords});
-  if (core::IsOk(added)) ++float_lists_;
+Status Device::Serve(const Span& list, const float* values) {
+  if (list_count_ == kMaxLists) return Status::kFull;
+  lists_[list_count_].values = values;
+  const Status added = map_.Add(DirectBlock<&FloatList::Read>(list, &lists_[list_count_]));
+  if (core::IsOk(added)) ++list_count_;
   return added;
 }
 
@@ -72,108 +49,147 @@ void Device::Step(std::uint32_t now_ms) {
   transaction_.Step(now_ms);
 }
 
-// kLocked, or the lock stays open for another while.
-Status Device::Unlocked() {
+// Identity and status ------------------------------------------------------------------------------------------------
+
+void Device::FillIdentity(Words<reg::kIdentityBlock>& w) {
+  w.Set<reg::kMagic>(reg::kMagicValue);
+  w.Set<reg::kMapMajor>(reg::kMapMajorValue);
+  w.Set<reg::kMapMinor>(reg::kMapMinorValue);
+  w.Set<reg::kLayoutCrc>(kLayoutCrc);
+  w.Set<reg::kSchema>(identity_.schema);
+  w.Set<reg::kFirmwareVersion>(identity_.firmware_version);
+  w.Set<reg::kSerialNumber>(identity_.serial_number);
+  w.Set<reg::kProbeFloat>(reg::kProbeFloatValue);
+  w.Set<reg::kProbeU32>(reg::kProbeU32Value);
+  w.Set<reg::kAxes>(identity_.axes);
+  w.Set<reg::kParameters>(identity_.parameters);
+  w.Set<reg::kColumns>(identity_.columns);
+  w.Set<reg::kTableWords>(transaction_.words());
+  w.Set<reg::kCapabilities>(identity_.capabilities);
+  w.Set<reg::kTickRate>(identity_.tick_rate_Hz);
+  w.Set<reg::kSampleTicks>(identity_.sample_ticks);
+  w.Set<reg::kPageDataWords>(reg::kMaxPageWords);
+}
+
+void Device::FillStatus(Words<reg::kStatusBlock>& w) {
+  const LastError& error = map_.last_error();
+  const table::TableStore& store = transaction_.store();
+  w.Set<reg::kTransactionState>(transaction_.state());
+  w.Set<reg::kTransactionStatus>(transaction_.status());
+  w.Set<reg::kTableStatus>(transaction_.table_status());
+  w.Set<reg::kFeedForwardState>(live_.feedforward_state);
+  w.Set<reg::kGeneration>(live_.generation);
+  w.Set<reg::kTick>(live_.tick);
+  w.Set<reg::kActiveCrc>(transaction_.active_crc());
+  w.Set<reg::kCommandSequence>(transaction_.last_command().sequence);
+  w.Set<reg::kStoreSequence>(store.sequence());
+  w.Set<reg::kSlotState, 0>(store.slot_state(0));
+  w.Set<reg::kSlotState, 1>(store.slot_state(1));
+  w.Set<reg::kEnabledAxes>(live_.enabled_axes);
+  w.Set<reg::kClampCount>(live_.clamp_count);
+  w.Set<reg::kSampleGaps>(live_.sample_gaps);
+  w.Set<reg::kRequestCount>(map_.requests());
+  w.Set<reg::kErrorException>(static_cast<std::uint16_t>(error.exception));
+  w.Set<reg::kErrorFunction>(static_cast<std::uint16_t>(error.function));
+  w.Set<reg::kErrorAddress>(error.address);
+  w.Set<reg::kErrorStatus>(error.status);
+  w.Set<reg::kErrorRequest>(error.request);
+  w.Set<reg::kUnlocked>(unlocked_);
+  w.Set<reg::kHealth>(live_.health);
+  w.Set<reg::kRowsUsedA>(live_.rows_used[0]);
+  w.Set<reg::kRowsGatedA>(live_.rows_gated[0]);
+  w.Set<reg::kRowsUsedB>(live_.rows_used[1]);
+  w.Set<reg::kRowsGatedB>(live_.rows_gated[1]);
+}
+
+// Lock and tables ----------------------------------------------------------------------------------------------------
+
+// kLocked; or kOk, and the lock stays open for another while.
+Status Device::NeedsUnlock() {
   if (!unlocked_) return Status::kLocked;
   touched_ms_ = now_ms_;
   return Status::kOk;
 }
 
-Status Device::ReadIdentity(Words offset, Words count, Words* words) {
-  Words w[reg::kIdentityCount];
-  PutU32(w, reg::kMagic);
-  w[2] = reg::kMapMajor;
-  w[3] = reg::kMapMinor;
-  PutU32(w + 4, kLayoutCrc);
-  PutU32(w + 6, identity_.schema);
-  PutU32(w + 8, identity_.firmware_version);
-  PutU32(w + 10, identity_.serial_number);
-  PutF32(w + 12, reg::kProbeFloat);
-  PutU32(w + 14, reg::kProbeU32);
-  w[16] = identity_.axes;
-  w[17] = identity_.parameters;
-  w[18] = identity_.columns;
-  w[19] = transaction_.words();
-  PutU32(w + 20, identity_.capabilities);
-  PutU32(w + 22, identity_.tick_rate_Hz);
-  w[24] = identity_.sample_ticks;
-  w[25] = reg::kPageDataCount;
-  return CopyWords(w, offset, count, words);
-}
+void Device::FillUnlock(Words<reg::kUnlock>& w) { w.Set<reg::kUnlock>(std::uint32_t{unlocked_ ? 1u : 0u}); }
 
-Status Device::ReadStatus(Words offset, Words count, Words* words) {
-  const LastError& error = map_.last_error();
-  const table::TableStore& store = transaction_.store();
-  Words w[reg::kStatusCount];
-  w[0] = static_cast<Words>(transaction_.state());
-  w[1] = static_cast<Words>(transaction_.status());
-  w[2] = static_cast<Words>(transaction_.table_status());
-  w[3] = live_.feedforward_state;
-  PutU32(w + 4, live_.generation);
-  PutU32(w + 6, live_.tick);
-  PutU32(w + 8, transaction_.active_crc());
-  PutU32(w + 10, transaction_.last_command().sequence);
-  PutU32(w + 12, store.sequence());
-  w[14] = static_cast<Words>(store.slot_state(0));
-  w[15] = static_cast<Words>(store.slot_state(1));
-  PutU32(w + 16, live_.enabled_axes);
-  PutU32(w + 18, live_.clamp_count);
-  PutU32(w + 20, live_.sample_gaps);
-  PutU32(w + 22, map_.requests());
-  w[24] = error.exception;
-  w[25] = error.function;
-  w[26] = error.address;
-  w[27] = static_cast<Words>(error.status);
-  PutU32(w + 28, error.request);
-  w[30] = unlocked_ ? 1 : 0;
-  w[31] = live_.health;
-  for (int filter = 0; filter < 2; ++filter) {
-    PutU32(w + 32 + 4 * filter, live_.rows_used[filter]);
-    PutU32(w + 34 + 4 * filter, live_.rows_gated[filter]);
-  }
-  return CopyWords(w, offset, count, words);
-}
-
-Status Device::ReadCommand(Words offset, Words count, Words* words) {
-  const TableCommand& c = transaction_.last_command();
-  Words w[reg::kCommandCount] = {};
-  PutU32(w, c.sequence);
-  PutU32(w + 2, c.command);
-  PutU32(w + 4, c.schema);
-  w[6] = c.words;
-  PutU32(w + 8, c.crc);
-  return CopyWords(w, offset, count, words);
-}
-
-Status Device::WriteCommand(Words, Words, const Words* w) {
-  const Status unlocked = Unlocked();
-  if (!core::IsOk(unlocked)) return unlocked;
-  if (w[7] != 0) return Status::kOutOfRange;
-  return transaction_.Command({core::GetU32(w), core::GetU32(w + 2), core::GetU32(w + 4), w[6], core::GetU32(w + 8)});
-}
-
-Status Device::ReadUnlock(Words offset, Words count, Words* words) {
-  const Words w[2] = {0, static_cast<Words>(unlocked_ ? 1 : 0)};
-  return CopyWords(w, offset, count, words);
-}
-
-Status Device::WriteUnlock(Words, Words, const Words* words) {
-  unlocked_ = core::GetU32(words) == reg::kUnlockKey;
+Status Device::TakeUnlock(const Words<reg::kUnlock>& w) {
+  unlocked_ = w.Get<reg::kUnlock>() == reg::kUnlockKey;
   touched_ms_ = now_ms_;
   return unlocked_ ? Status::kOk : Status::kLocked;
 }
 
-Status Device::ReadStaged(Words offset, Words count, Words* words) {
+void Device::FillCommand(Words<reg::kCommandBlock>& w) {
+  const TableCommand& last = transaction_.last_command();
+  w.Set<reg::kSequence>(last.sequence);
+  w.Set<reg::kCommand>(last.command);
+  w.Set<reg::kCommandSchema>(last.schema);
+  w.Set<reg::kCommandWords>(last.words);
+  w.Set<reg::kCommandCrc>(last.crc);
+}
+
+Status Device::TakeCommand(const Words<reg::kCommandBlock>& w) {
+  const Status unlocked = NeedsUnlock();
+  if (!core::IsOk(unlocked)) return unlocked;
+  if (w.Get<reg::kCommandReserved>() != 0) return Status::kOutOfRange;
+  return transaction_.Command({w.Get<reg::kSequence>(), w.Get<reg::kCommand>(), w.Get<reg::kCommandSchema>(),
+                               w.Get<reg::kCommandWords>(), w.Get<reg::kCommandCrc>()});
+}
+
+Status Device::ReadStaged(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
   return CopyWords(transaction_.staged(), offset, count, words);
 }
 
-Status Device::WriteStaged(Words offset, Words count, const Words* words) {
-  const Status unlocked = Unlocked();
+Status Device::WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words) {
+  const Status unlocked = NeedsUnlock();
   return core::IsOk(unlocked) ? transaction_.WriteStaged(offset, count, words) : unlocked;
 }
 
-Status Device::ReadActive(Words offset, Words count, Words* words) {
+Status Device::ReadActive(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
   return CopyWords(transaction_.active(), offset, count, words);
+}
+
+// Learning -----------------------------------------------------------------------------------------------------------
+
+void Device::FillHold(Words<reg::kLearningHold>& w) { w.Set<reg::kLearningHold>(held_); }
+
+Status Device::TakeHold(const Words<reg::kLearningHold>& w) {
+  const std::uint16_t hold = w.Get<reg::kLearningHold>();
+  if (hold > 1) return Status::kOutOfRange;
+  const Status unlocked = NeedsUnlock();
+  const Status done = core::IsOk(unlocked) ? requests_.hold(requests_.context, hold == 1) : unlocked;
+  if (core::IsOk(done)) held_ = hold;
+  return done;
+}
+
+void Device::FillReset(Words<reg::kLearningReset>&) {}  // it is a command and reads 0
+
+Status Device::TakeReset(const Words<reg::kLearningReset>& w) {
+  const std::uint16_t block = w.Get<reg::kLearningReset>();
+  if (block < 1 || block > identity_.axes + 1) return Status::kOutOfRange;
+  const Status unlocked = NeedsUnlock();
+  return core::IsOk(unlocked) ? requests_.reset(requests_.context, block - 1) : unlocked;
+}
+
+// Residual statistics ------------------------------------------------------------------------------------------------
+
+void Device::FillSelect(Words<reg::kResidualSelect>& w) { w.Set<reg::kResidualSelect>(residual_joint_); }
+
+Status Device::TakeSelect(const Words<reg::kResidualSelect>& w) {
+  const std::uint16_t joint = w.Get<reg::kResidualSelect>();
+  if (joint < 1 || joint > identity_.axes) return Status::kOutOfRange;
+  residual_joint_ = joint;
+  ++snapshot_;
+  requests_.take_residuals(requests_.context, joint - 1, residuals_);
+  return Status::kOk;
+}
+
+void Device::FillResidualHeader(Words<reg::kResidualHeaderBlock>& w) {
+  w.Set<reg::kResidualJoint>(residual_joint_);
+  w.Set<reg::kResidualSnapshot>(snapshot_);
+  w.Set<reg::kResidualGeneration>(residuals_.generation);
+  w.Set<reg::kResidualElapsed>(residuals_.elapsed_s);
+  w.Set<reg::kResidualSigma>(residuals_.sigma_Nm);
 }
 
 }  // namespace armcal::link

@@ -1,4 +1,4 @@
-// link - the whole register map of a drive, put together; knows where every value is served, not how it comes about.
+// link - serves the registers of a drive, all but the traces, and keeps the lock of a session.
 #pragma once
 
 #include <cstdint>
@@ -35,67 +35,106 @@ struct LiveStatus {
   std::uint32_t rows_gated[2] = {};
 };
 
-// Serves what registers.hpp lists, traces apart (trace_registers.hpp). Context of every call: background.
+// The residual statistics of one joint at one instant. SPEC.md lists the values.
+struct ResidualPage {
+  std::uint32_t generation = 0;
+  std::uint32_t elapsed_s = 0;
+  float sigma_Nm = 0.0f;
+  float values[reg::kResidualValues] = {};
+};
+
+// What the application does when a client asks for it. None of these may wait. Context: background.
+struct ClientRequests {
+  void* context;
+  // Puts learning on hold (true) or lets it go on (false).
+  core::Status (*hold)(void* context, bool hold);
+  // Forgets what was learnt of a block: a joint from 0, or the number of joints for what acts on several of them. If it
+  // is refused, nothing changes.
+  core::Status (*reset)(void* context, int block);
+  // Fills all of `page`. joint: from 0.
+  void (*take_residuals)(void* context, int joint, ResidualPage& page);
+};
+
+// Context of every call: background.
 class Device {
  public:
-  static constexpr std::uint32_t kUnlock_ms = 60000;  // the lock falls shut so long after the last table access
+  // The lock closes this long after the last write that needs it open.
+  static constexpr std::uint32_t kUnlock_ms = 60000;
 
   // `live` and `transaction` outlive the device.
-  Device(const Identity& identity, const LiveStatus& live, TableTransaction& transaction);
+  Device(const Identity& identity, const LiveStatus& live, TableTransaction& transaction,
+         const ClientRequests& requests);
   Device(const Device&) = delete;
 
-  // Serves `count` float32 from an input register on (reg::kEstimateA ...); `values` are read at each request.
-  // kFull: no room for another list; else what RegisterMap::Add answers.
-  core::Status AddFloats(std::uint16_t first, const float* values, std::uint16_t count);
+  // Serves a list of float32. Each request reads `values` anew. kFull: no room for another list; else what
+  // RegisterMap::Add answers.
+  core::Status Serve(const Span& list, const float* values);
 
-  // What else the device can do (reg::kHasRawTrace ...). Before the first request.
+  // Adds to what the device says it can do (reg::kHasRawTrace ...). Call it before the first request.
   void Declare(std::uint32_t capabilities) { identity_.capabilities |= capabilities; }
 
-  // Time goes on for the transaction and the lock. Call it in every turn of the background loop.
+  // Tells the transaction and the lock what time it is. Call it in every turn of the background loop.
   void Step(std::uint32_t now_ms);
 
-  RegisterMap& map() { return map_; }  // for further blocks: traces, the vendor range
+  RegisterMap& map() { return map_; }  // for further blocks: traces, and the integrator's own
   PduEngine& engine() { return engine_; }
   bool unlocked() const { return unlocked_; }
-  // kLocked; or kOk, and the lock stays open for another while. For whoever serves a write that needs it.
-  core::Status Unlocked();
 
  private:
-  static constexpr int kMaxFloatLists = 8;
-  using Words = std::uint16_t;
+  static constexpr int kMaxLists = 8;
 
-  template <core::Status (Device::*kMethod)(Words, Words, Words*)>
-  static core::Status Read(void* device, Words offset, Words count, Words* words) {
-    return (static_cast<Device*>(device)->*kMethod)(offset, count, words);
-  }
-  template <core::Status (Device::*kMethod)(Words, Words, const Words*)>
-  static core::Status Write(void* device, Words offset, Words count, const Words* words) {
-    return (static_cast<Device*>(device)->*kMethod)(offset, count, words);
-  }
+  // Memory that a client may write and read. Nothing else happens.
+  template <int kWords>
+  struct Scratch {
+    core::Status Read(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
+      return CopyWords(word, offset, count, words);
+    }
+    core::Status Write(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words) {
+      std::memcpy(word + offset, words, 2u * count);
+      return core::Status::kOk;
+    }
+    std::uint16_t word[kWords] = {};
+  };
 
-  core::Status ReadIdentity(Words offset, Words count, Words* words);
-  core::Status ReadStatus(Words offset, Words count, Words* words);
-  core::Status ReadCommand(Words offset, Words count, Words* words);
-  core::Status WriteCommand(Words offset, Words count, const Words* words);
-  core::Status ReadUnlock(Words offset, Words count, Words* words);
-  core::Status WriteUnlock(Words offset, Words count, const Words* words);
-  core::Status ReadStaged(Words offset, Words count, Words* words);
-  core::Status WriteStaged(Words offset, Words count, const Words* words);
-  core::Status ReadActive(Words offset, Words count, Words* words);
+  core::Status ServeOwn();
+  core::Status NeedsUnlock();
+
+  void FillIdentity(Words<reg::kIdentityBlock>& w);
+  void FillStatus(Words<reg::kStatusBlock>& w);
+  void FillUnlock(Words<reg::kUnlock>& w);
+  core::Status TakeUnlock(const Words<reg::kUnlock>& w);
+  void FillCommand(Words<reg::kCommandBlock>& w);
+  core::Status TakeCommand(const Words<reg::kCommandBlock>& w);
+  core::Status ReadStaged(std::uint16_t offset, std::uint16_t count, std::uint16_t* words);
+  core::Status WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
+  core::Status ReadActive(std::uint16_t offset, std::uint16_t count, std::uint16_t* words);
+  void FillHold(Words<reg::kLearningHold>& w);
+  core::Status TakeHold(const Words<reg::kLearningHold>& w);
+  void FillReset(Words<reg::kLearningReset>& w);
+  core::Status TakeReset(const Words<reg::kLearningReset>& w);
+  void FillSelect(Words<reg::kResidualSelect>& w);
+  core::Status TakeSelect(const Words<reg::kResidualSelect>& w);
+  void FillResidualHeader(Words<reg::kResidualHeaderBlock>& w);
 
   Identity identity_;
   const LiveStatus& live_;
   TableTransaction& transaction_;
+  ClientRequests requests_;
   RegisterMap map_;
   PduEngine engine_;
-  const float* floats_[kMaxFloatLists] = {};
-  int float_lists_ = 0;
-  Words scratch_[reg::kScratchCount] = {};
-  Words scratch_float_[2 * reg::kScratchPairs] = {};
-  Words scratch_u32_[2 * reg::kScratchPairs] = {};
+  FloatList lists_[kMaxLists] = {};
+  int list_count_ = 0;
+  Scratch<reg::kScratchWords> scratch_;
+  Scratch<2 * reg::kScratchValues> scratch_float_, scratch_u32_;
   bool unlocked_ = false;
   std::uint32_t now_ms_ = 0;
   std::uint32_t touched_ms_ = 0;
+  std::uint16_t held_ = 0;
+  // A page is larger than one request. So the selection of a joint copies its statistics, and the copy stays until the
+  // next selection. Two clients that select in turn notice it, because the number of the snapshot changes.
+  ResidualPage residuals_;
+  FloatList residual_values_{residuals_.values};
+  std::uint16_t residual_joint_ = 0, snapshot_ = 0;
 };
 
 }  // namespace armcal::link

@@ -1,4 +1,4 @@
-// link - the function codes, checked and answered; knows no transport and no meaning of a register.
+// link - checks a request by its function code and answers it.
 #include "armcal/link/pdu_engine.hpp"
 
 #include "armcal/core/words.hpp"
@@ -14,7 +14,8 @@ using core::Status;
 constexpr std::uint8_t kReadHolding = 3, kReadInput = 4, kWriteSingle = 6, kWriteMultiple = 16, kEncapsulated = 43;
 constexpr std::uint8_t kReadDeviceId = 14;
 constexpr std::uint16_t kMaxRead = 125, kMaxWrite = 123;
-constexpr std::uint8_t kBasicStream = 1, kSpecificObject = 4, kConformity = 0x81;  // basic, stream and single access
+constexpr std::uint8_t kBasicStream = 1, kSpecificObject = 4,
+                       kConformity = 0x81;  // basic objects, as a stream or one by one
 constexpr std::uint8_t kObjects = 3;
 constexpr std::size_t kMaxText = 60;
 
@@ -97,7 +98,7 @@ std::size_t PduEngine::WriteMany(const std::uint8_t* request, std::size_t count,
   return 5;
 }
 
-// Read Device Identification. Categories "regular" and "extended" are answered with what there is: the basic objects.
+// Read Device Identification. There are basic objects only, so "regular" and "extended" are answered with these.
 std::size_t PduEngine::Identify(const std::uint8_t* request, std::size_t count, std::uint8_t* reply) {
   if (count >= 2 && request[1] != kReadDeviceId) return Refuse(request[0], 0, Status::kBadFunction, reply);
   if (count != 4) return Refuse(request[0], 0, Status::kWrongSize, reply);
@@ -107,13 +108,14 @@ std::size_t PduEngine::Identify(const std::uint8_t* request, std::size_t count, 
   if (code == kSpecificObject && object >= kObjects) return Refuse(request[0], object, Status::kBadAddress, reply);
 
   const char* const text[kObjects] = {identification_.vendor, identification_.product, identification_.revision};
-  const std::uint8_t from = object < kObjects ? object : 0;  // an unknown start of a stream means its beginning
+  const std::uint8_t from =
+      object < kObjects ? object : 0;  // a stream that shall start at an unknown object starts at the first one
   const std::uint8_t to = code == kSpecificObject ? static_cast<std::uint8_t>(from + 1) : kObjects;
   reply[0] = request[0];
   reply[1] = kReadDeviceId;
   reply[2] = code;
   reply[3] = kConformity;
-  reply[4] = 0;  // more follows: no
+  reply[4] = 0;  // nothing more follows
   reply[5] = 0;
   reply[6] = static_cast<std::uint8_t>(to - from);
   std::size_t at = 7;

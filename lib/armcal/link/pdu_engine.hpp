@@ -1,4 +1,4 @@
-// link - one Modbus request in, one reply out; knows function codes, not transports and not what registers mean.
+// link - one Modbus request in, one reply out, whatever the transport.
 #pragma once
 
 #include <cstddef>
@@ -10,22 +10,22 @@ namespace armcal::link {
 
 inline constexpr std::size_t kMaxPdu = 253;
 
-// Texts of function 43/14, at most 60 characters each so that a reply holds them all.
+// Texts of function 43/14. Each has at most 60 characters, so that one reply holds them all.
 struct DeviceIdentification {
   const char* vendor;
   const char* product;
   const char* revision;
 };
 
-// Serves functions 3, 4, 6, 16 and 43/14. The whole request is checked before anything is applied, in the order
-// function (01), quantity and byte count (03), address (02), values (03), state (04), busy (06).
-// Reference: MODBUS Application Protocol Specification V1.1b3, section 6. Context: background.
+// Serves functions 3, 4, 6, 16 and 43/14. The whole request is checked before anything is applied. The order of the
+// checks is: function (01), quantity and byte count (03), address (02), values (03), state (04), busy (06). Reference:
+// MODBUS Application Protocol Specification V1.1b3, section 6. Context: background.
 class PduEngine {
  public:
   PduEngine(RegisterMap& map, const DeviceIdentification& identification)
       : map_(map), identification_(identification) {}
 
-  // `request` [count], `reply` [kMaxPdu]. Returns the reply's length; 0 for an empty request, which has no answer.
+  // `request` [count], `reply` [kMaxPdu]. Returns the reply's length. An empty request has no answer: 0.
   std::size_t Handle(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
 
  private:

@@ -1,7 +1,5 @@
-// link - lookup and the checks that need no meaning: gaps, half values, not-a-number; knows no function code.
+// link - finds the block of a request, and checks what needs no meaning: gaps, halves of values, not-a-number.
 #include "armcal/link/register_map.hpp"
-
-#include "armcal/core/words.hpp"
 
 namespace armcal::link {
 
@@ -46,7 +44,8 @@ const Block* RegisterMap::Find(RegisterKind kind, std::uint32_t address) const {
 
 Status RegisterMap::Read(RegisterKind kind, std::uint16_t first, std::uint16_t count, std::uint16_t* words) const {
   const std::uint32_t end = static_cast<std::uint32_t>(first) + count;
-  for (std::uint32_t at = first; at < end;) {  // no side effect before all of the range is known to be there
+  for (std::uint32_t at = first;
+       at < end;) {  // a read may have a side effect, so look first whether all of the range is there
     const Block* block = Find(kind, at);
     if (block == nullptr) return Status::kBadAddress;
     at = static_cast<std::uint32_t>(block->first) + block->count;

@@ -1,4 +1,4 @@
-// link - the flashing state machine; knows the order of steps, not what the words mean.
+// link - the steps of flashing a table: command by command, and then one small piece at each turn of the background.
 #include "armcal/link/table_transaction.hpp"
 
 #include <cstring>
@@ -25,7 +25,7 @@ TableTransaction::TableTransaction(const TableApplication& application, table::T
 Status TableTransaction::Boot() {
   table_status_ = store_.Load(staged_);
   if (!core::IsOk(table_status_)) return table_status_;
-  table_status_ = application_.check(application_.context, staged_, words_);
+  table_status_ = application_.check(application_.context, staged_);
   if (!core::IsOk(table_status_)) return table_status_;
   state_ = TransactionState::kCommitting;
   phase_ = Phase::kBooting;
@@ -65,17 +65,17 @@ Status TableTransaction::Open() {
 Status TableTransaction::Check(const TableCommand& command) {
   if (state_ != TransactionState::kLoading && state_ != TransactionState::kChecked) return Status::kWrongOrder;
   if (core::Crc32Words(staged_, words_) != command.crc) return Status::kBadCrc;
-  const Status status = application_.check(application_.context, staged_, words_);
-  if (!core::IsOk(status)) return status;
+  const Status status = application_.check(application_.context, staged_);
+  // A refused check has thrown away what an earlier one built, so nothing is left that could be saved.
+  state_ = core::IsOk(status) ? TransactionState::kChecked : TransactionState::kLoading;
   checked_crc_ = command.crc;
-  state_ = TransactionState::kChecked;
-  return Status::kOk;
+  return status;
 }
 
 Status TableTransaction::Save(const TableCommand& command) {
   if (state_ != TransactionState::kChecked) return Status::kWrongOrder;
   if (command.crc != checked_crc_) return Status::kBadCrc;
-  Status status = application_.permit(application_.context, staged_, words_);
+  Status status = application_.permit(application_.context);
   if (!core::IsOk(status)) return status;
   status = store_.Save(staged_);
   if (!core::IsOk(status)) return status;
@@ -89,7 +89,7 @@ Status TableTransaction::WriteStaged(std::uint16_t offset, std::uint16_t count, 
   if (state_ != TransactionState::kOpen && state_ != TransactionState::kLoading && state_ != TransactionState::kChecked)
     return Status::kWrongOrder;
   std::memcpy(staged_ + offset, words, 2u * count);
-  state_ = TransactionState::kLoading;  // what was checked is no longer what is staged
+  state_ = TransactionState::kLoading;  // the staged words are no longer those that were checked
   touched_ms_ = now_ms_;
   return Status::kOk;
 }
@@ -122,10 +122,11 @@ void TableTransaction::Step(std::uint32_t now_ms) {
   }
 }
 
-// An axis may have been enabled since it was permitted: wait for it, but not for ever.
+// An axis may have been enabled after the application permitted the adoption. Wait until it is disabled, but not for
+// ever.
 void TableTransaction::Adopt() {
   const bool booting = phase_ == Phase::kBooting;
-  const Status status = application_.adopt(application_.context, staged_, words_);
+  const Status status = application_.adopt(application_.context);
   if (core::IsOk(status)) {
     Activate();
     return Finish(booting ? TransactionState::kIdle : TransactionState::kActive, Status::kOk);

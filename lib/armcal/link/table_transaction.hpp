@@ -1,4 +1,4 @@
-// link - flashing a table: staged, checked, stored, adopted; knows the order of steps, not what the words mean.
+// link - flashing a table: the order in which its words are staged, checked, stored and adopted.
 #pragma once
 
 #include <cstdint>
@@ -9,18 +9,22 @@
 
 namespace armcal::link {
 
-// What the application answers about a table of words. Context: background; none may wait.
+// What the application does with a table, in the order in which the transaction asks for it. None of these may wait.
+// Context: background.
 struct TableApplication {
   void* context;
-  // Decodes and judges without effect: kOk or the reason of refusal.
-  core::Status (*check)(void* context, const std::uint16_t* words, std::uint32_t count);
-  // Would adopt() be accepted now (kAxisEnabled)? Without effect; asked before anything is stored.
-  core::Status (*permit)(void* context, const std::uint16_t* words, std::uint32_t count);
-  // Puts the table in force. kBusy: still at it, call again with the same words. Anything else but kOk: no effect.
-  core::Status (*adopt)(void* context, const std::uint16_t* words, std::uint32_t count);
+  // Decodes `words`, judges them and builds what adopt() will put in force. kOk, or the reason of refusal. What was
+  // built stays ready until the next check; nothing is in force yet.
+  core::Status (*check)(void* context, const std::uint16_t* words);
+  // Answers what adopt() would answer now: kOk or kAxisEnabled. It has no effect. The transaction asks before it stores
+  // anything.
+  core::Status (*permit)(void* context);
+  // Puts in force what the last check built. kBusy: call again, it is not finished. Any other answer but kOk: no
+  // effect. The transaction calls it only as long as the staged words are those of the last check.
+  core::Status (*adopt)(void* context);
 };
 
-// The command block as written by the client in one request.
+// The command block, which a client writes in one request.
 struct TableCommand {
   std::uint32_t sequence = 0;
   std::uint32_t command = 0;
@@ -29,41 +33,32 @@ struct TableCommand {
   std::uint32_t crc = 0;
 };
 
-// The numbers are readable as a register (SPEC.md).
-enum class TransactionState : std::uint16_t {
-  kIdle = 0,
-  kOpen = 1,        // nothing staged yet
-  kLoading = 2,     // something staged
-  kChecked = 3,     // checksum and content accepted
-  kCommitting = 4,  // being stored, then adopted
-  kActive = 5,      // the staged table is stored and in force
-  kFailed = 6,      // the table before it is stored and in force
-};
-
-// open -> staged words in any order -> check -> save -> poll the state. The table in force changes last: stored, read
-// back, adopted. If adopting stays refused, the stored record is taken back, so that kFailed always means "as before".
-// A command repeated with its sequence number and content has no second effect; a lost reply may be asked for again.
-// Context: background.
+// A client opens, stages words in any order, checks, saves and polls the state. A save stores the table, reads it back
+// and then adopts it, so the table in force changes last. If the application goes on refusing the adoption, the stored
+// record is taken back: kFailed always means that everything is as before. A command that comes again with the same
+// sequence number and content has no second effect, so a client that lost a reply may ask again. Context: background.
 class TableTransaction {
  public:
-  static constexpr std::uint32_t kStageTimeout_ms = 30000;  // an abandoned stage, or an adoption that stays refused
+  // After this time a stage without writes is dropped, and an adoption that stays refused is given up.
+  static constexpr std::uint32_t kStageTimeout_ms = 30000;
 
-  // `staged`, `active`: buffers [words] of the caller's. `active` may hold defaults; Boot() replaces them.
+  // `staged`, `active`: buffers [words] that outlive this. `active` may hold defaults, which Boot() replaces.
   TableTransaction(const TableApplication& application, table::TableStore& store, std::uint32_t schema,
                    std::uint16_t* staged, std::uint16_t* active, std::uint16_t words);
 
-  // At power-up: load, check, adopt. The answer is kept as table_status(): kOk; kBlank, kCorrupt, kWrongSchema,
-  // kWrongSize of the store; or why the application refused. kBusy: the application still adopts, Step() finishes.
+  // At power-up: loads the stored table, checks it and adopts it. The answer is kept as table_status(): kOk; what the
+  // store answers (kBlank, kCorrupt, kWrongSchema, kWrongSize); or why the application refused. kBusy: the application
+  // is still adopting, and Step() finishes it.
   core::Status Boot();
 
-  // kWrongOrder: not in this state, sequence 0 or used with other content; kOutOfRange: no such command; kWrongSchema,
-  // kWrongSize: not the table of this image or not the one opened; kBadCrc; kBusy: committing; or the application's.
+  // kWrongOrder: not in this state, or the sequence is 0 or was used with other content. kOutOfRange: no such command.
+  // kWrongSchema, kWrongSize: not a table of this firmware. kBadCrc. kBusy: committing. Or the application's answer.
   core::Status Command(const TableCommand& command);
 
-  // kWrongOrder: nothing open. kBusy: committing. The range is inside the table.
+  // offset + count <= words(). kWrongOrder: no stage is open. kBusy: committing.
   core::Status WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
 
-  // One bounded piece of a commit; drops an abandoned stage (back to kIdle with kTimeout).
+  // Does one bounded piece of a commit. Drops a stage without writes (state kIdle, status kTimeout).
   void Step(std::uint32_t now_ms);
 
   TransactionState state() const { return state_; }

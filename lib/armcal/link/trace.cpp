@@ -1,10 +1,9 @@
-// link - the trace ring: the producer's constant-time half and the reader's pages; knows no channel.
+// link - the producer's half of a trace, which takes constant time, the reader's pages, and their registers.
 #include "armcal/link/trace.hpp"
 
 #include <cstring>
 
 #include "armcal/core/words.hpp"
-#include "armcal/link/registers.hpp"
 
 namespace armcal::link {
 
@@ -18,19 +17,19 @@ Trace::Trace(std::uint16_t* storage, std::uint32_t storage_words, std::uint32_t 
       record_words_(record_words),
       context_(context) {}
 
-Status Trace::Arm(TraceArm arm) {
-  if (arm.mode != TraceMode::kOff) {
-    if (arm.mode != TraceMode::kOneShot && arm.mode != TraceMode::kStreaming) return Status::kOutOfRange;
-    arm.record_words = record_words_(context_, arm.channels);
-    if (arm.decimation == 0 || arm.record_words == 0 || arm.record_words > reg::kPageDataCount)
+Status Trace::Start(Recording recording) {
+  if (recording.mode != TraceMode::kOff) {
+    if (recording.mode != TraceMode::kOneShot && recording.mode != TraceMode::kStreaming) return Status::kOutOfRange;
+    recording.record_words = record_words_(context_, recording.channels);
+    if (recording.decimation == 0 || recording.record_words == 0 || recording.record_words > reg::kMaxPageWords)
       return Status::kOutOfRange;
-    if (Slots(arm.record_words) == 0) return Status::kOutOfRange;
+    if (Slots(recording.record_words) == 0) return Status::kOutOfRange;
   }
-  requested_ = arm;
+  requested_ = recording;
   page_ = TracePage{};
   tail_slot_ = 0;
   tail_.store(0, std::memory_order_release);
-  mailbox_.Post({arm, ++serial_});
+  mailbox_.Post({recording, ++serial_});
   return Status::kOk;
 }
 
@@ -51,7 +50,7 @@ const TracePage& Trace::Page() {
   return page_;
 }
 
-// Stamp and record of the n-th unreleased record.
+// The stamp of a record, followed by the record; 0 is the oldest one that is not released.
 const std::uint16_t* Trace::Slot(std::uint32_t behind_tail) const {
   const std::uint32_t slots = Slots(requested_.record_words);
   std::uint32_t slot = tail_slot_ + behind_tail;
@@ -62,7 +61,7 @@ const std::uint16_t* Trace::Slot(std::uint32_t behind_tail) const {
 void Trace::FormPage() {
   const std::uint32_t tail = tail_.load(std::memory_order_relaxed);
   std::uint32_t there = head_.load(std::memory_order_acquire) - tail;
-  const std::uint32_t most = reg::kPageDataCount / requested_.record_words;
+  const std::uint32_t most = reg::kMaxPageWords / requested_.record_words;
   if (there == 0) return;
   if (there > most) there = most;
   const std::uint32_t first_tick = core::GetU32(Slot(0));
@@ -101,26 +100,26 @@ TraceState Trace::state() const {
   return Ready() ? static_cast<TraceState>(state_.load(std::memory_order_acquire)) : TraceState::kWaiting;
 }
 
-// The counters restart before `started_` tells the reader so.
+// The reader looks at the counters only after `started_` has told it that they restarted.
 void Trace::Begin() {
-  slots_ = armed_.mode == TraceMode::kOff ? 0 : Slots(armed_.record_words);
+  slots_ = recording_.mode == TraceMode::kOff ? 0 : Slots(recording_.record_words);
   head_slot_ = 0;
   taken_ = 0;
   phase_ = 0;
   head_.store(0, std::memory_order_relaxed);
   lost_.store(0, std::memory_order_relaxed);
-  const TraceState begin = armed_.mode == TraceMode::kOff ? TraceState::kOff : TraceState::kWaiting;
+  const TraceState begin = recording_.mode == TraceMode::kOff ? TraceState::kOff : TraceState::kWaiting;
   state_.store(static_cast<std::uint32_t>(begin), std::memory_order_relaxed);
 }
 
 TraceTurn Trace::Offer(std::uint32_t tick) {
   if (mailbox_.Refresh()) {
-    armed_ = mailbox_.latest().arm;
+    recording_ = mailbox_.latest().recording;
     Begin();
     started_.store(mailbox_.latest().serial, std::memory_order_release);
   }
   auto state = static_cast<TraceState>(state_.load(std::memory_order_relaxed));
-  if (state == TraceState::kWaiting && static_cast<std::int32_t>(tick - armed_.start_tick) >= 0) {
+  if (state == TraceState::kWaiting && static_cast<std::int32_t>(tick - recording_.start_tick) >= 0) {
     state = TraceState::kRecording;
     state_.store(static_cast<std::uint32_t>(state), std::memory_order_relaxed);
     expected_tick_ = tick;
@@ -130,7 +129,7 @@ TraceTurn Trace::Offer(std::uint32_t tick) {
   expected_tick_ = tick + tick_step_;
   const bool first = phase_ == 0;
   if (first) window_tick_ = tick;
-  const bool last = ++phase_ == armed_.decimation;
+  const bool last = ++phase_ == recording_.decimation;
   if (last) phase_ = 0;
   return {true, first, last};
 }
@@ -138,7 +137,7 @@ TraceTurn Trace::Offer(std::uint32_t tick) {
 Status Trace::Push(const std::uint16_t* record, std::uint32_t generation) {
   const std::uint32_t head = head_.load(std::memory_order_relaxed);
   const bool full = head - tail_.load(std::memory_order_acquire) >= slots_;
-  if (full && armed_.mode == TraceMode::kStreaming) {
+  if (full && recording_.mode == TraceMode::kStreaming) {
     lost_.store(lost_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     return Status::kFull;
   }
@@ -146,15 +145,78 @@ Status Trace::Push(const std::uint16_t* record, std::uint32_t generation) {
     state_.store(static_cast<std::uint32_t>(TraceState::kDone), std::memory_order_release);
     return Status::kFull;
   }
-  std::uint16_t* slot = storage_ + head_slot_ * (armed_.record_words + kStampWords);
+  std::uint16_t* slot = storage_ + head_slot_ * (recording_.record_words + kStampWords);
   core::PutU32(slot, window_tick_);
   slot[2] = static_cast<std::uint16_t>(generation & 0xFFFFu);
-  std::memcpy(slot + kStampWords, record, 2u * armed_.record_words);
+  std::memcpy(slot + kStampWords, record, 2u * recording_.record_words);
   head_slot_ = head_slot_ + 1 == slots_ ? 0 : head_slot_ + 1;
   head_.store(head + 1, std::memory_order_release);
-  if (armed_.limit != 0 && ++taken_ == armed_.limit)
+  if (recording_.limit != 0 && ++taken_ == recording_.limit)
     state_.store(static_cast<std::uint32_t>(TraceState::kDone), std::memory_order_release);
   return Status::kOk;
+}
+
+// Registers ----------------------------------------------------------------------------------------------------------
+
+Status Trace::Serve(RegisterMap& map, int number) {
+  if (number < 0 || number >= reg::kTraces) return Status::kOutOfRange;
+  const Block blocks[] = {
+      FilledBlock<reg::kTracePageBlock, &Trace::FillPageHeader>(this, number),
+      DirectBlock<&Trace::ReadPage>(SpanOf(reg::kTraceData).Of(number), this),
+      FilledBlock<reg::kTraceStartBlock, &Trace::FillStart, &Trace::TakeStart>(this, number),
+      FilledBlock<reg::kTraceAcknowledge, &Trace::FillAcknowledge, &Trace::TakeAcknowledge>(this, number),
+  };
+  return map.Add(blocks);
+}
+
+// Reading the header forms a page if there is none.
+void Trace::FillPageHeader(Words<reg::kTracePageBlock>& w) {
+  const TraceState state =
+      this->state();  // read before the page is formed, so that "done" with an empty page means: nothing follows
+  const TracePage& page = Page();
+  const std::uint32_t waiting = this->waiting();
+  w.Set<reg::kTraceFirstRecord>(page.first_record);
+  w.Set<reg::kTraceFirstTick>(page.first_tick);
+  w.Set<reg::kTraceTickStep>(record_ticks());
+  w.Set<reg::kTraceCount>(page.count);
+  w.Set<reg::kTraceRecordWords>(requested_.record_words);
+  w.Set<reg::kTraceLost>(lost());
+  w.Set<reg::kTracePageRecording>(requested_.number);
+  w.Set<reg::kTraceGeneration>(page.generation);
+  w.Set<reg::kTraceState>(state);
+  w.Set<reg::kTraceWaiting>(static_cast<std::uint16_t>(waiting > 0xFFFFu ? 0xFFFFu : waiting));
+  w.Set<reg::kTraceChannels>(requested_.channels);
+}
+
+void Trace::FillStart(Words<reg::kTraceStartBlock>& w) {
+  w.Set<reg::kTraceRecording>(requested_.number);
+  w.Set<reg::kTraceMode>(requested_.mode);
+  w.Set<reg::kTraceDecimation>(requested_.decimation);
+  w.Set<reg::kTraceStartTick>(requested_.start_tick);
+  w.Set<reg::kTraceLimit>(requested_.limit);
+  w.Set<reg::kTraceChannelMask>(requested_.channels);
+}
+
+Status Trace::TakeStart(const Words<reg::kTraceStartBlock>& w) {
+  if (w.Get<reg::kTraceReserved>() != 0) return Status::kOutOfRange;
+  Words<reg::kTraceStartBlock> present;
+  FillStart(present);
+  const bool same = std::memcmp(present.data(), w.data(), 2u * w.size()) == 0;
+  if (w.Get<reg::kTraceRecording>() != 0 && same) return Status::kOk;  // the client asks again because a reply was lost
+  Recording recording;
+  recording.number = w.Get<reg::kTraceRecording>();
+  recording.mode = static_cast<TraceMode>(w.Get<reg::kTraceMode>());
+  recording.decimation = w.Get<reg::kTraceDecimation>();
+  recording.start_tick = w.Get<reg::kTraceStartTick>();
+  recording.limit = w.Get<reg::kTraceLimit>();
+  recording.channels = w.Get<reg::kTraceChannelMask>();
+  return Start(recording);
+}
+
+void Trace::FillAcknowledge(Words<reg::kTraceAcknowledge>& w) { w.Set<reg::kTraceAcknowledge>(acknowledged()); }
+
+Status Trace::TakeAcknowledge(const Words<reg::kTraceAcknowledge>& w) {
+  return Acknowledge(w.Get<reg::kTraceAcknowledge>());
 }
 
 }  // namespace armcal::link

@@ -1,4 +1,4 @@
-// link - a ring of fixed-size records that the reader takes in pages; knows words and ticks, not what is recorded.
+// link - a trace: a ring of records of equal length, which a client starts and reads in pages.
 #pragma once
 
 #include <atomic>
@@ -6,20 +6,19 @@
 
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/status.hpp"
+#include "armcal/link/register_map.hpp"
 
 namespace armcal::link {
 
-enum class TraceMode : std::uint16_t { kOff = 0, kOneShot = 1, kStreaming = 2 };
-enum class TraceState : std::uint16_t { kOff = 0, kWaiting = 1, kRecording = 2, kDone = 3 };
-
-struct TraceArm {
-  std::uint16_t number = 0;  // the client's; the same arm written twice starts one recording
+// What a client asks for when it starts a recording.
+struct Recording {
+  std::uint16_t number = 0;  // the client's; a request that is written twice starts one recording
   TraceMode mode = TraceMode::kOff;
   std::uint16_t decimation = 1;  // samples averaged into one record
-  std::uint32_t start_tick = 0;  // one in the past (up to 2^31 ticks) starts at once
+  std::uint32_t start_tick = 0;  // a tick in the past (up to 2^31 ticks) starts at once
   std::uint32_t limit = 0;       // records, 0: no limit
   std::uint32_t channels = 0;
-  std::uint16_t record_words = 0;  // follows from channels
+  std::uint16_t record_words = 0;  // the Trace sets it, it follows from the channels
 };
 
 // Where one sample stands in the averaging window of a record.
@@ -29,7 +28,7 @@ struct TraceTurn {
   bool last;       // of its window: Push the record
 };
 
-// What a page is: consecutive records of one generation, evenly spaced in time.
+// A page: consecutive records of one table generation, evenly spaced in time.
 struct TracePage {
   std::uint32_t first_record = 0;
   std::uint32_t first_tick = 0;
@@ -37,32 +36,37 @@ struct TracePage {
   std::uint16_t generation = 0;
 };
 
-// Producer (tick or background) and reader (background) are one context each and never wait for one another. When the
-// ring is full the NEW record is refused and counted. A page stays as it is until the reader names the next record it
-// wants, so a lost reply can be read again.
+// One context produces (tick or background) and one reads (background). Neither waits for the other. When the ring is
+// full, the new record is refused and counted. A page stays as it is until the reader names the next record it wants,
+// so a reader that lost a reply can read it again.
 class Trace {
  public:
-  // How many words a record of these channels has; 0: not served.
+  // Answers how many words a record of these channels has, or 0 if they are not served.
   using RecordWords = std::uint16_t (*)(void* context, std::uint32_t channels);
 
-  // `tick_step`: ticks from one offered sample to the next. Storage is the caller's (TraceRing below).
+  // `tick_step`: ticks from one offered sample to the next. `storage` outlives this (see TraceRing below).
   Trace(std::uint16_t* storage, std::uint32_t storage_words, std::uint32_t tick_step, RecordWords record_words,
         void* context);
   Trace(const Trace&) = delete;
 
   // Reader ------------------------------------------------------------------------------------------------------------
-  // Drops what is there and starts anew. kOutOfRange: mode, decimation 0, channels not served or a record too long.
-  core::Status Arm(TraceArm arm);
-  const TraceArm& requested() const { return requested_; }
+  // Drops all records and starts a new recording. kOutOfRange: no such mode, decimation 0, channels that are not
+  // served, or a record that is too long.
+  core::Status Start(Recording recording);
+  const Recording& requested() const { return requested_; }
 
-  // Releases all records before `next`. kOutOfRange: beyond the page. One already released: kOk, nothing happens.
+  // Releases all records before `next`. kOutOfRange: `next` lies beyond the page. If it is released already: kOk.
   core::Status Acknowledge(std::uint32_t next);
   std::uint32_t acknowledged() const { return tail_.load(std::memory_order_relaxed); }
 
-  // The present page; forms one if there is none and records wait. Count 0: nothing there.
+  // The present page. If there is none and records wait, it forms one. Count 0: there is no record.
   const TracePage& Page();
-  // Words of the present page. kBadAddress: beyond it.
+  // Copies words of the present page. kBadAddress: they lie beyond it.
   core::Status ReadPage(std::uint32_t offset, std::uint16_t count, std::uint16_t* words) const;
+
+  // Serves this as trace `number`: 0 (raw samples) or 1 (processed samples). kOutOfRange: no such number. Else what
+  // RegisterMap::Add answers.
+  core::Status Serve(RegisterMap& map, int number);
 
   std::uint32_t record_ticks() const { return tick_step_ * requested_.decimation; }
   std::uint32_t waiting() const;  // records behind the present page
@@ -70,12 +74,14 @@ class Trace {
   TraceState state() const;
 
   // Producer ----------------------------------------------------------------------------------------------------------
-  // Offer every sample; takes over a new arm. A missing tick starts the averaging window anew.
+  // Call it with every sample. It takes over a recording that a client has started meanwhile. If a tick is missing, the
+  // averaging window starts anew.
   TraceTurn Offer(std::uint32_t tick);
-  // After `last`: `record` [armed().record_words]. kFull: refused, counted (one-shot: the recording ends instead).
+  // Call it when Offer answered `last`. record: [recording().record_words]. kFull: the record was refused and counted;
+  // a one-shot recording ends instead.
   core::Status Push(const std::uint16_t* record, std::uint32_t generation);
-  const TraceArm& armed() const { return armed_; }
-  // Records that still fit: a simulation may wait for room, a real tick never does.
+  const Recording& recording() const { return recording_; }
+  // How many records still fit. A simulation may wait for room; a real tick never does.
   std::uint32_t room() const {
     return slots_ - (head_.load(std::memory_order_relaxed) - tail_.load(std::memory_order_acquire));
   }
@@ -84,9 +90,15 @@ class Trace {
   static constexpr std::uint32_t kStampWords = 3;  // tick and generation before each record
 
   struct Request {
-    TraceArm arm;
+    Recording recording;
     std::uint32_t serial;
   };
+
+  void FillPageHeader(Words<reg::kTracePageBlock>& w);
+  void FillStart(Words<reg::kTraceStartBlock>& w);
+  core::Status TakeStart(const Words<reg::kTraceStartBlock>& w);
+  void FillAcknowledge(Words<reg::kTraceAcknowledge>& w);
+  core::Status TakeAcknowledge(const Words<reg::kTraceAcknowledge>& w);
 
   void Begin();
   bool Ready() const { return started_.load(std::memory_order_acquire) == serial_; }
@@ -100,25 +112,25 @@ class Trace {
   RecordWords record_words_;
   void* context_;
 
-  // Reader's.
-  TraceArm requested_;
+  // Of the reader.
+  Recording requested_;
   std::uint32_t serial_ = 0;
   TracePage page_;
   std::uint32_t tail_slot_ = 0;
 
-  // Shared. head_ and tail_ count records since the arm and wrap.
+  // Of both. head_ and tail_ count the records of this recording and wrap.
   core::Mailbox<Request> mailbox_;
-  std::atomic<std::uint32_t> started_{0};  // serial of the arm that the producer works on
+  std::atomic<std::uint32_t> started_{0};  // serial_ of the request that the producer has taken over
   std::atomic<std::uint32_t> head_{0};
   std::atomic<std::uint32_t> tail_{0};
   std::atomic<std::uint32_t> lost_{0};
   std::atomic<std::uint32_t> state_{0};
 
-  // Producer's.
-  TraceArm armed_;
+  // Of the producer.
+  Recording recording_;
   std::uint32_t slots_ = 0;
   std::uint32_t head_slot_ = 0;
-  std::uint32_t taken_ = 0;  // records accepted since the arm, stops at the limit
+  std::uint32_t taken_ = 0;  // accepted records of this recording; counts up to the limit
   std::uint16_t phase_ = 0;
   std::uint32_t window_tick_ = 0;
   std::uint32_t expected_tick_ = 0;

@@ -1,13 +1,40 @@
-// table - the two-slot store: inspection at power-up and the stepped save; knows no meaning of the words.
+// table - how the store looks at its two slots at power-up, and how it saves a table step by step.
 #include "armcal/table/table_store.hpp"
 
+#include <cstring>
+
 #include "armcal/core/crc.hpp"
+#include "armcal/core/words.hpp"
 
 namespace armcal::table {
 
 using core::Status;
 
-TableStore::TableStore(const port::Storage& storage, std::uint32_t schema, std::uint32_t words)
+namespace {
+
+struct Header {
+  std::uint16_t format;
+  std::uint32_t schema;
+  std::uint32_t words;
+  std::uint32_t sequence;
+};
+
+void PutHeader(std::uint8_t* b, const Header& h) {
+  core::PutBytes32(b, kRecordMagic);
+  core::PutBytes16(b + 4, h.format);
+  core::PutBytes16(b + 6, 0);
+  core::PutBytes32(b + 8, h.schema);
+  core::PutBytes32(b + 12, h.words);
+  core::PutBytes32(b + 16, h.sequence);
+}
+
+Header GetHeader(const std::uint8_t* b) {
+  return {core::GetBytes16(b + 4), core::GetBytes32(b + 8), core::GetBytes32(b + 12), core::GetBytes32(b + 16)};
+}
+
+}  // namespace
+
+TableStore::TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words)
     : storage_(storage), schema_(schema), words_(words) {}
 
 bool TableStore::Fits() const {
@@ -49,7 +76,8 @@ SlotState TableStore::Inspect(int slot) {
   return ours ? SlotState::kGood : SlotState::kOtherSchema;
 }
 
-// Reads the payload once more together with its checksum: what is handed out is what was checked.
+// Reads the payload once more and checks it again, so that the words that are handed out are the words that were
+// checked.
 Status TableStore::CopyOut(int slot, std::uint16_t* out) const {
   const std::uint32_t base = AddressOf(slot);
   std::uint8_t bytes[kChunkBytes];
@@ -66,7 +94,8 @@ Status TableStore::CopyOut(int slot, std::uint16_t* out) const {
   return core::Crc32Words(out, words_, header_crc) == core::GetBytes32(bytes) ? Status::kOk : Status::kCorrupt;
 }
 
-// The slot in `wanted` state with the highest sequence (difference as a signed number, so that it may wrap); -1: none.
+// The slot in `wanted` state that has the highest sequence; -1: none. The sequence may wrap, so the sign of the
+// difference decides.
 int TableStore::Newest(SlotState wanted) const {
   if (state_[0] == wanted && state_[1] == wanted)
     return static_cast<std::int32_t>(sequence_[1] - sequence_[0]) > 0 ? 1 : 0;
@@ -93,7 +122,7 @@ Status TableStore::Load(std::uint16_t* out) {
 Status TableStore::Save(const std::uint16_t* words) {
   if (busy()) return Status::kBusy;
   if (!Fits()) return Status::kWrongSize;
-  // Keep the table in force; without one, the newest record of another schema.
+  // Keep the slot of the table in force. If there is none, keep the newest record of another schema.
   const int keep = current_ >= 0 ? current_ : Newest(SlotState::kOtherSchema);
   target_ = keep == 0 ? 1 : 0;
   const bool whole[kSlots] = {state_[0] == SlotState::kGood || state_[0] == SlotState::kOtherSchema,
@@ -141,7 +170,7 @@ Status TableStore::Step() {
   return Status::kOk;
 }
 
-// The record's bytes [first, first + count); beyond its end the erased value.
+// Bytes [first, first + count) of the record. Bytes beyond its end have the erased value.
 void TableStore::FillBody(std::uint32_t first, std::uint8_t* bytes, std::uint32_t count) const {
   const std::uint32_t payload_end = kHeaderBytes + 2 * words_;
   std::uint8_t crc[kCrcBytes];
@@ -223,14 +252,14 @@ Status TableStore::VerifyCommit() {
   return Status::kOk;
 }
 
-// A failed record must not come to life at the next power-up, even if only its commit word could not be read back.
+// A record that failed must not be taken at the next power-up, even if only its commit word could not be read back.
 Status TableStore::Abandon() {
   result_ = Status::kStorageFault;
   stage_ = Stage::kRevoke;
   return Status::kBusy;
 }
 
-// The header's sector is enough: a record without its header is no record.
+// It is enough to erase the sector of the header, because a record without a header is not taken.
 Status TableStore::EraseTarget() {
   const bool erased = IsOk(storage_.Erase(BaseOf(target_)));
   state_[target_] = erased ? SlotState::kBlank : SlotState::kCorrupt;

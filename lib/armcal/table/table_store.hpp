@@ -1,46 +1,75 @@
-// table - keeps one table of opaque words in two slots; old or new after a power cut, never mixed. Knows no meaning.
+// table - keeps one table in two slots of the storage, so that a power cut leaves the old table or the new one.
+//
+// A slot holds one record. Bytes, high byte first:
+//    0 magic u32 "ARMT"      4 format u16      6 reserved u16, 0      8 schema u32     12 payload length in words u32
+//   16 sequence u32         20 payload, 2 bytes a word               then CRC-32 over all bytes before it
+// The commit word follows at the next multiple of the program unit, in a unit of its own. Bytes between keep the erased
+// value. The frame is the same in every format version, so a firmware can check and keep a record that it cannot read.
 #pragma once
 
 #include <cstdint>
 
 #include "armcal/core/status.hpp"
-#include "armcal/port/storage.hpp"
-#include "armcal/table/record.hpp"
+#include "armcal/hardware/storage.hpp"
 
 namespace armcal::table {
 
-// What lies in a slot. The numbers are readable as registers (SPEC.md).
+inline constexpr std::uint32_t kRecordMagic = 0x41524D54;  // "ARMT"
+inline constexpr std::uint32_t kCommitWord =
+    0x434D4954;  // "CMIT"; it differs in many bits from erased bytes, 0x00 or 0xFF
+inline constexpr std::uint16_t kFormat = 1;
+inline constexpr std::uint32_t kHeaderBytes = 20;
+inline constexpr std::uint32_t kCrcBytes = 4;
+// The longest piece of one storage operation, and therefore the largest program unit. A power of two.
+inline constexpr std::uint32_t kChunkBytes = 64;
+inline constexpr std::uint32_t kMaxPayloadWords = 0x10000;  // so that no size comes near 2^32
+
+constexpr std::uint32_t BodyBytes(std::uint32_t words) { return kHeaderBytes + 2 * words + kCrcBytes; }
+
+constexpr std::uint32_t RoundUp(std::uint32_t bytes, std::uint32_t unit) { return (bytes + unit - 1) / unit * unit; }
+
+constexpr std::uint32_t CommitOffset(std::uint32_t words, std::uint32_t unit) {
+  return RoundUp(BodyBytes(words), unit);
+}
+
+// The whole record with its commit word.
+constexpr std::uint32_t RecordBytes(std::uint32_t words, std::uint32_t unit) {
+  return CommitOffset(words, unit) + RoundUp(4, unit);
+}
+
+// What lies in a slot. A client can read the numbers (register slot_state).
 enum class SlotState : std::uint8_t {
   kBlank = 0,
   kGood = 1,
-  kOtherSchema = 2,  // whole, but of another schema, length or format: kept as long as there is another place to write
+  kOtherSchema = 2,  // whole, but of another schema, length or format; it is kept as long as the other slot is free
   kCorrupt = 3,
 };
 
-// Save: erase the other slot, program it, read it back, then program the commit word; one storage operation a Step.
-// The slot that holds the table in force is never touched. All calls: background context.
+// A save erases the other slot, programs it, reads it back and then programs the commit word. Each Step does one
+// storage operation. The slot of the table in force is never touched. Context of every call: background.
 class TableStore {
  public:
   static constexpr int kSlots = 2;
 
-  // The words of a table of this schema are always `words` long.
-  TableStore(const port::Storage& storage, std::uint32_t schema, std::uint32_t words);
+  // `words`: the length of every table of this schema.
+  TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words);
 
-  // Reads both slots and copies the good one of highest sequence to `out` [words]. At power-up only: reads everything
-  // at once. kOk; without a good record: kWrongSchema (another one is kept), kCorrupt, kBlank; kWrongSize: a record
-  // does not fit this storage. `out` may hold a rejected record's words unless kOk.
+  // Reads both slots and copies the good record with the highest sequence to `out` [words]. It reads everything at
+  // once, so call it at power-up only. kOk. Without a good record: kWrongSchema (another one is kept), kCorrupt or
+  // kBlank. kWrongSize: a record does not fit this storage. Unless kOk, `out` may hold words of a record that was
+  // rejected.
   core::Status Load(std::uint16_t* out);
 
   // Starts a save. `words` [words] must stay unchanged until Step no longer answers kBusy.
   // kBusy: a save is running. kWrongSize: a record does not fit this storage.
   core::Status Save(const std::uint16_t* words);
 
-  // Takes the last completed save back by erasing its slot: the table before it is in force again.
+  // Takes the last completed save back: erases its slot, so that the table before it is in force again.
   // kWrongOrder: no completed save to take back. kBusy: a save is running.
   core::Status Revoke();
 
-  // One storage operation. kBusy: call again. kOk: nothing left to do. kStorageFault: the save failed; its slot has
-  // been erased and the table before it is still in force.
+  // Does one storage operation. kBusy: call again. kOk: nothing is left to do. kStorageFault: the save failed; its slot
+  // has been erased, and the table before it is still in force.
   core::Status Step();
 
   bool busy() const { return stage_ != Stage::kIdle; }
@@ -67,13 +96,13 @@ class TableStore {
   core::Status EraseTarget();
   core::Status Abandon();
 
-  port::Storage storage_;
+  hardware::Storage storage_;
   std::uint32_t schema_;
   std::uint32_t words_;
   SlotState state_[kSlots] = {SlotState::kBlank, SlotState::kBlank};
   std::uint32_t sequence_[kSlots] = {0, 0};
   int current_ = -1;   // slot of the table in force
-  int previous_ = -1;  // what Revoke returns to
+  int previous_ = -1;  // the slot that Revoke puts in force again
 
   Stage stage_ = Stage::kIdle;
   bool revocable_ = false;
@@ -82,7 +111,7 @@ class TableStore {
   const std::uint16_t* source_ = nullptr;
   std::uint8_t header_[kHeaderBytes] = {};
   std::uint32_t crc_ = 0;
-  core::Status result_ = core::Status::kOk;  // what kRevoke ends with
+  core::Status result_ = core::Status::kOk;  // what Step answers when kRevoke has ended
 };
 
 }  // namespace armcal::table

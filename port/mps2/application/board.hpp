@@ -1,4 +1,4 @@
-// application - the emulated board as the example firmware asks for it: axes that it only pretends to have.
+// application - the emulated board, as the example firmware asks for it. It only pretends to have axes.
 #pragma once
 
 #include "selected_model.hpp"
@@ -13,12 +13,12 @@ namespace board {
 
 namespace mps2 = armcal::port::mps2;
 
-inline constexpr std::uint32_t kSilence_ms = 200;  // an emulated line delivers in portions; 2 ms on a real one
+inline constexpr std::uint32_t kSilence_ms = 200;  // because an emulated line delivers in portions; 2 ms on a real line
 inline armcal::application::PretendAxes<armcal::generated::SelectedModel> axes;
 
-inline armcal::port::Storage Storage() { return mps2::PsramStorage(); }
-inline armcal::port::Clock Clock() { return mps2::TickClock(); }
-inline armcal::port::Serial Serial() { return mps2::Uart1(); }
+inline armcal::hardware::Storage Storage() { return mps2::PsramStorage(); }
+inline armcal::hardware::Clock Clock() { return mps2::TickClock(); }
+inline armcal::hardware::Serial Serial() { return mps2::Uart1(); }
 inline void OnSerial() { mps2::OnUart1(); }
 inline void Sleep() { mps2::Sleep(); }
 

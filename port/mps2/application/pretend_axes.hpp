@@ -1,12 +1,12 @@
-// application - stands in for encoders and current sensors, which the board does not have; knows no filter.
+// application - pretends to be encoders and current sensors, which the board does not have.
 #pragma once
 
 #include "armcal/controller/controller.hpp"
 
 namespace armcal::application {
 
-// Every axis swings in a sine of its own period, and the current is what the model's default parameters demand: an arm
-// that is exactly as the robot file says. A drive reads its hardware here instead.
+// Every axis swings in a sine of its own period. The current is what the model with its default parameters demands, so
+// the arm is exactly as the robot file says. A real drive reads its hardware here.
 template <class Model>
 class PretendAxes {
  public:

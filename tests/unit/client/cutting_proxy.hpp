@@ -1,4 +1,4 @@
-// client - a TCP proxy that cuts one connection after so many reply bytes; knows no protocol.
+// client - a TCP proxy that cuts one connection after a given number of reply bytes.
 #pragma once
 
 #include <arpa/inet.h>
@@ -35,8 +35,8 @@ class CuttingProxy {
   }
 
   int port() const { return port_; }
-  std::size_t forwarded() const { return forwarded_; }  // reply bytes so far, all connections
-  // The connection that carries the reply byte after these many more ends there; later ones pass.
+  std::size_t forwarded() const { return forwarded_; }  // reply bytes so far, of all connections
+  // After this many more reply bytes the connection ends. Later connections pass.
   void CutAfter(std::size_t bytes) { cut_at_ = forwarded_ + bytes; }
 
  private:
@@ -75,7 +75,7 @@ class CuttingProxy {
     }
   }
 
-  // Moves what is there; false at the end of the stream or at the cut.
+  // Moves the bytes that are there. False: the stream has ended or was cut.
   bool Pass(int from, int to, bool replies) {
     char bytes[512];
     const ssize_t count = ::recv(from, bytes, sizeof bytes, MSG_DONTWAIT);

@@ -1,4 +1,4 @@
-// client - libmodbus' independent client code against our server: every function, every refusal with its reason.
+// client - our client with libmodbus against our server: every function, and every refusal with its reason.
 #include "host_sim/client/drive_client.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using core::Status;
 namespace reg = link::reg;
 using Words = std::vector<std::uint16_t>;
 
-// The status a call is refused with; kOk if it is not.
+// The status with which a call is refused; kOk if it is not refused.
 Status RefusalOf(const std::function<void()>& call, int exception) {
   try {
     call();
@@ -41,31 +41,31 @@ TEST(DriveClient, Identity_IsReadAndItsProbesChecked) {
   EXPECT_EQ(id.serial_number, 77u);
   EXPECT_EQ(id.tick_rate_Hz, 1000u);
   EXPECT_EQ(id.sample_ticks, 8);
-  EXPECT_EQ(drive.ReadInputFloats(12, 1)[0], 123456.789f);
-  EXPECT_EQ(drive.ReadInputU32(14), 0x12345678u);
+  EXPECT_EQ(drive.ReadValue<reg::kProbeFloat>(), 123456.789f);
+  EXPECT_EQ(drive.ReadValue<reg::kProbeU32>(), 0x12345678u);
 }
 
 TEST(DriveClient, Registers_LongerThanARequest_AreSplit) {
   test::TestServer server;
   auto drive = server.Connect();
-  const std::vector<float> estimate = drive.ReadInputFloats(reg::kEstimateA, test::kColumns);
+  const std::vector<float> estimate = drive.ReadFloats(reg::kEstimateA, test::kColumns);
   for (int i = 0; i < test::kColumns; ++i)
     EXPECT_EQ(estimate[static_cast<std::size_t>(i)], 0.5f * static_cast<float>(i));
-  EXPECT_TRUE(std::isnan(drive.ReadInputFloats(reg::kDeviationB, 1)[0]));
-  EXPECT_EQ(drive.ReadHolding(reg::kActive, test::kTableWords), Words(test::kTableWords));
+  EXPECT_TRUE(std::isnan(drive.ReadFloats(reg::kDeviationB, 1)[0]));
+  EXPECT_EQ(drive.ReadHolding(reg::kActiveTable.address, test::kTableWords), Words(test::kTableWords));
 }
 
 TEST(DriveClient, Scratch_WrittenByEveryFunction_ReadsBack) {
   test::TestServer server;
   auto drive = server.Connect();
-  Words words(reg::kScratchCount);
+  Words words(reg::kScratchWords);
   for (std::size_t i = 0; i < words.size(); ++i) words[i] = static_cast<std::uint16_t>(0xF000 + i);
-  drive.Write(reg::kScratch, words);
+  drive.Write(reg::kScratch.address, words);
   drive.WriteSingle(reg::kScratch + 3, 0x1234);
   words[3] = 0x1234;
-  EXPECT_EQ(drive.ReadHolding(reg::kScratch, reg::kScratchCount), words);
-  drive.WriteU32(reg::kScratchU32, 0xDEADBEEF);
-  EXPECT_EQ(drive.ReadHolding(reg::kScratchU32, 2), (Words{0xDEAD, 0xBEEF}));
+  EXPECT_EQ(drive.Read(SpanOf(reg::kScratch)), words);
+  drive.Write(reg::kScratchU32.address, Words{0xDEAD, 0xBEEF});
+  EXPECT_EQ(drive.ReadHolding(reg::kScratchU32.address, 2), (Words{0xDEAD, 0xBEEF}));
 }
 
 TEST(DriveClient, Refusals_CarryTheExceptionAndTheDrivesOwnReason) {
@@ -73,13 +73,13 @@ TEST(DriveClient, Refusals_CarryTheExceptionAndTheDrivesOwnReason) {
   auto drive = server.Connect();
   const Words two(2, 1), nan = {0x7FC0, 0};
   EXPECT_EQ(RefusalOf([&] { drive.ReadInput(0x30, 1); }, 2), Status::kBadAddress);
-  EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kActive, two); }, 4), Status::kReadOnly);
-  EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kStaged, two); }, 4), Status::kLocked);
-  EXPECT_EQ(RefusalOf([&] { drive.WriteSingle(reg::kScratchFloat, 1); }, 3), Status::kWrongSize);
+  EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kActiveTable.address, two); }, 4), Status::kReadOnly);
+  EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kStagedTable.address, two); }, 4), Status::kLocked);
+  EXPECT_EQ(RefusalOf([&] { drive.WriteSingle(reg::kScratchFloat.address, 1); }, 3), Status::kWrongSize);
   EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kScratchU32 + 1, two); }, 3), Status::kWrongSize);
-  EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kScratchFloat, nan); }, 3), Status::kNotFinite);
-  EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kCommand, two); }, 3), Status::kWrongSize);
-  EXPECT_EQ(RefusalOf([&] { drive.WriteU32(reg::kUnlock, 1234); }, 4), Status::kLocked);
+  EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kScratchFloat.address, nan); }, 3), Status::kNotFinite);
+  EXPECT_EQ(RefusalOf([&] { drive.Write(reg::kCommandBlock.first, two); }, 3), Status::kWrongSize);
+  EXPECT_EQ(RefusalOf([&] { drive.WriteValue<reg::kUnlock>(1234); }, 4), Status::kLocked);
   try {
     drive.ReadInput(0x30, 1);
     FAIL();
@@ -91,9 +91,9 @@ TEST(DriveClient, Refusals_CarryTheExceptionAndTheDrivesOwnReason) {
 TEST(DriveClient, Unlock_HoldsForAMinuteAfterTheLastUse) {
   test::TestServer server;
   auto drive = server.Connect();
-  drive.WriteU32(reg::kUnlock, reg::kUnlockKey);
+  drive.WriteValue<reg::kUnlock>(reg::kUnlockKey);
   EXPECT_TRUE(drive.ReadStatus().unlocked);
-  EXPECT_EQ(drive.ReadHolding(reg::kUnlock, 2), (Words{0, 1})) << "the key itself is never read back";
+  EXPECT_EQ(drive.ReadValue<reg::kUnlock>(), 1u) << "the key itself is never read back";
   server.Jump(link::Device::kUnlock_ms);
   auto again = server.Connect();  // the idle connection is closed at that time, too
   EXPECT_FALSE(again.ReadStatus().unlocked);
@@ -111,15 +111,15 @@ TEST(DriveClient, WithoutAServer_SaysSo) {
 TEST(DriveClient, AfterTheServerClosedTheConnection_ConnectsAnew) {
   test::TestServer server;
   auto drive = server.Connect();
-  EXPECT_EQ(drive.ReadInputU32(14), 0x12345678u);
+  EXPECT_EQ(drive.ReadValue<reg::kProbeU32>(), 0x12345678u);
   ASSERT_TRUE(test::Await([&] {
     server.Jump(1000);
     return server.connections() == 0;
   }));
-  EXPECT_EQ(drive.ReadInputU32(14), 0x12345678u);
+  EXPECT_EQ(drive.ReadValue<reg::kProbeU32>(), 0x12345678u);
 }
 
-// The line that README and SPEC show, run by the independent program they name.
+// Runs the line that README and SPEC show, with the program that they name.
 TEST(Mbpoll, FloatProbe_ReadsAsDocumented) {
   if (std::system("command -v mbpoll > /dev/null 2>&1") != 0) GTEST_SKIP() << "mbpoll is not installed";
   test::TestServer server;

@@ -1,4 +1,4 @@
-// client - raw sockets that break the rules: bad headers, halves, floods, clients that do not read; others are served.
+// client - raw sockets that break the rules: bad headers, half frames, floods, clients that do not read.
 #include <gtest/gtest.h>
 
 #include <arpa/inet.h>
@@ -99,10 +99,10 @@ TEST(TcpServer, MalformedHeader_ClosesThatConnectionOnly) {
 TEST(TcpServer, DeclaredLength_DecidesWhereAFrameEnds) {
   test::TestServer server;
   RawClient client(server.port());
-  // function 4 with one byte too many: exception 03, and the stream stays in step
+  // function 4 with one byte too many: exception 03, and the next request is understood
   client.Send({0, 9, 0, 0, 0, 7, 1, 4, 0, 14, 0, 2, 0xEE});
   EXPECT_EQ(client.Receive(9), (Bytes{0, 9, 0, 0, 0, 3, 1, 0x84, 3}));
-  // function 7 has no data; servers that guess lengths stumble over it
+  // function 7 has no data, so a server that guesses lengths would go wrong
   client.Send({0, 10, 0, 0, 0, 2, 1, 7});
   EXPECT_EQ(client.Receive(9), (Bytes{0, 10, 0, 0, 0, 3, 1, 0x87, 1}));
   client.Send(kProbe);
@@ -138,21 +138,21 @@ Bytes Flood(int requests) {
 }
 
 // The late client sends portions that the server takes whole, until the replies to one of them no longer fit into the
-// sockets: from then on only room to send can wake the server up.
+// sockets. From then on the server goes on only when there is room to send.
 TEST(TcpServer, ClientThatReadsLate_GetsEveryReply) {
   constexpr std::uint32_t kPortion = 80;
   test::TestServer server;
   RawClient late(server.port());
   auto good = server.Connect();
   const Bytes portion = Flood(kPortion);
-  std::uint32_t before = good.ReadInputU32(link::reg::kStatus + 22), sent = 0;
+  std::uint32_t before = good.ReadValue<link::reg::kRequestCount>(), sent = 0;
   for (bool stuck = false; !stuck && sent < 200 * 1000;) {
     late.Send(portion);
     sent += kPortion;
     stuck = true;
     for (std::uint32_t asked = 1; asked <= 20 && stuck; ++asked)
-      stuck = good.ReadInputU32(link::reg::kStatus + 22) - before - asked < kPortion;
-    before = good.ReadInputU32(link::reg::kStatus + 22);
+      stuck = good.ReadValue<link::reg::kRequestCount>() - before - asked < kPortion;
+    before = good.ReadValue<link::reg::kRequestCount>();
   }
   const std::size_t reply_bytes = std::size_t{sent} * (9 + 250);
   EXPECT_EQ(late.Receive(reply_bytes).size(), reply_bytes);

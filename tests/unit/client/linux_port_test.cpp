@@ -1,4 +1,4 @@
-// client - the table store on the file that plays flash on Linux: survives, and clears bits only.
+// client - the table store on the file that plays flash on Linux.
 #include <gtest/gtest.h>
 
 #include <unistd.h>
@@ -45,7 +45,7 @@ TEST_F(FileStorage, TableSavedByOneProcess_IsLoadedByTheNext) {
 TEST_F(FileStorage, Programming_ClearsBitsOnly_AndEraseSetsThem) {
   port_linux::FileStorage file(2, 256, 4);
   ASSERT_EQ(file.Open(path_), Status::kOk);
-  const port::Storage storage = file.storage();
+  const hardware::Storage storage = file.storage();
   std::uint8_t bytes[4] = {0xF0, 0x0F, 0xFF, 0x00};
   ASSERT_EQ(storage.Program(4, bytes, 4), Status::kOk);
   const std::uint8_t more[4] = {0xFF, 0xFF, 0x55, 0xFF};

@@ -1,4 +1,4 @@
-// client - residual statistics over the wire: each number in its place, and never two snapshots in one.
+// client - residual statistics over the wire: each number is in its place, and all are of one snapshot.
 #include "host_sim/client/residual_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ TEST(ResidualReader, AJointThatIsNotThere_IsRefused) {
 }
 
 TEST(ResidualReader, WhenAnotherClientSelectsMeanwhile_ReadsAgainAndNeverMixes) {
-  // A page takes a dozen requests; the other client selects joint 1 in their midst, as often as `others` says.
+  // A page takes a dozen requests. Between them the other client selects joint 1, as often as `others` says.
   std::atomic<int> others{1};
   std::uint32_t seen = 0;
   test::TestServer server([&](test::TestDevice& drive) {
@@ -47,12 +47,13 @@ TEST(ResidualReader, WhenAnotherClientSelectsMeanwhile_ReadsAgainAndNeverMixes) 
     seen = requests;
     --others;
     const std::uint16_t joint = 1;
-    EXPECT_EQ(drive.device.map().Write(reg::kResidualSelect, 1, &joint), core::Status::kOk);
+    EXPECT_EQ(drive.device.map().Write(reg::kResidualSelect.address, 1, &joint), core::Status::kOk);
   });
   client::DriveClient drive = server.Connect();
   const client::JointResiduals r = client::ReadResiduals(drive, 4);
   EXPECT_EQ(others, 0);
-  EXPECT_EQ(r.reference.bin[0][0][0].count, 33000);  // the third snapshot: ours, the other's, ours again
+  EXPECT_EQ(r.reference.bin[0][0][0].count,
+            33000);  // the third snapshot: this client's, the other's, this client's again
   EXPECT_EQ(r.slices[31].square, 33000 + 512 + 95);
   others = 1000;
   EXPECT_THROW(client::ReadResiduals(drive, 4), client::LinkError);

@@ -1,4 +1,4 @@
-// client - RTU over two pseudo-terminals joined back to back, spoken by libmodbus.
+// client - libmodbus speaks RTU over two pseudo-terminals that a thread connects.
 #include <gtest/gtest.h>
 
 #include <fcntl.h>
@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "armcal/link/rtu_service.hpp"
+#include "armcal/link/rtu.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "port/linux/steady_clock.hpp"
 #include "port/linux/tty_serial.hpp"
@@ -41,7 +41,7 @@ void Move(int from, int to) {
   }
 }
 
-// A drive with address 9 at the far end of a line that a thread carries.
+// A drive with address 9 at the far end of the line.
 class RtuLine : public testing::Test {
  protected:
   void SetUp() override {
@@ -69,7 +69,7 @@ class RtuLine : public testing::Test {
   Terminal drive_side_;
   port_linux::TtySerial serial_;
   std::atomic<std::uint32_t> ticks_{0};
-  const port::Clock clock_ = port_linux::SteadyClock(ticks_);
+  const hardware::Clock clock_ = port_linux::SteadyClock(ticks_);
   link::RtuService service_{drive_.device.engine(), serial_.serial(), clock_, 9, 20};
   std::atomic<bool> stop_{false};
   std::thread line_;
@@ -87,8 +87,8 @@ TEST_F(RtuLine, Libmodbus_ReadsWritesAndIsRefused) {
   EXPECT_EQ(words[0], 0x1234);
   EXPECT_EQ(words[1], 0x5678);
   const std::uint16_t out[2] = {0xAAAA, 0x5555};
-  EXPECT_EQ(modbus_write_registers(modbus, link::reg::kScratch, 2, out), 2);
-  EXPECT_EQ(modbus_read_registers(modbus, link::reg::kScratch, 2, words), 2);
+  EXPECT_EQ(modbus_write_registers(modbus, link::reg::kScratch.address, 2, out), 2);
+  EXPECT_EQ(modbus_read_registers(modbus, link::reg::kScratch.address, 2, words), 2);
   EXPECT_EQ(words[0], 0xAAAA);
   EXPECT_EQ(modbus_read_input_registers(modbus, 0x30, 1, words), -1);
   EXPECT_EQ(errno, EMBXILADD);

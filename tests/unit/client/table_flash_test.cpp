@@ -28,6 +28,15 @@ Status RefusalOf(client::DriveClient& drive, const Words& words) {
   return Status::kOk;
 }
 
+link::Words<reg::kCommandBlock> Open() {
+  link::Words<reg::kCommandBlock> w;
+  w.Set<reg::kSequence>(std::uint32_t{1});
+  w.Set<reg::kCommand>(reg::kOpen);
+  w.Set<reg::kCommandSchema>(test::kSchema);
+  w.Set<reg::kCommandWords>(test::kTableWords);
+  return w;
+}
+
 TEST(Flash, OfAGoodTable_IsActiveStoredAndReadBack) {
   test::TestServer server;
   auto drive = server.Connect();
@@ -65,7 +74,7 @@ TEST(Flash, Refused_SaysWhyAndLeavesTheOldTable) {
 TEST(Flash, WithAnAxisEnabledDuringTheSave_FailsAndIsTakenBack) {
   std::atomic<test::TestServer*> running{nullptr};
   test::TestServer server([&](test::TestDevice& drive) {
-    // the drive's own patience is over as soon as everything is stored
+    // as soon as everything is stored, the time runs out in which the drive waits
     if (running != nullptr && drive.store.sequence() == 2) running.load()->Jump(1000);
   });
   auto drive = server.Connect();
@@ -80,21 +89,17 @@ TEST(Flash, WithAnAxisEnabledDuringTheSave_FailsAndIsTakenBack) {
 TEST(Flash, WithAWrongChecksum_IsRefusedAtTheCheck) {
   test::TestServer server;
   auto drive = server.Connect();
-  drive.WriteU32(reg::kUnlock, reg::kUnlockKey);
-  Words command(reg::kCommandCount);
-  core::PutU32(command.data(), 1);
-  core::PutU32(command.data() + 2, reg::kOpen);
-  core::PutU32(command.data() + 4, test::kSchema);
-  command[6] = test::kTableWords;
-  drive.Write(reg::kCommand, command);
+  drive.WriteValue<reg::kUnlock>(reg::kUnlockKey);
+  link::Words<reg::kCommandBlock> command = Open();
+  drive.Write(command);
   const Words part(10, 3);
-  drive.Write(reg::kStaged + 50, part);
-  EXPECT_EQ(drive.ReadHolding(reg::kStaged + 50, 10), part);
-  core::PutU32(command.data(), 2);
-  core::PutU32(command.data() + 2, reg::kCheck);
-  core::PutU32(command.data() + 8, 0x12345678);
+  drive.Write(reg::kStagedTable + 50, part);
+  EXPECT_EQ(drive.ReadHolding(reg::kStagedTable + 50, 10), part);
+  command.Set<reg::kSequence>(std::uint32_t{2});
+  command.Set<reg::kCommand>(reg::kCheck);
+  command.Set<reg::kCommandCrc>(std::uint32_t{0x12345678});
   try {
-    drive.Write(reg::kCommand, command);
+    drive.Write(command);
     FAIL();
   } catch (const RefusedError& error) {
     EXPECT_EQ(error.status, Status::kBadCrc);
@@ -105,16 +110,12 @@ TEST(Flash, WithAWrongChecksum_IsRefusedAtTheCheck) {
 TEST(Flash, AbandonedHalfWay_TimesOut) {
   test::TestServer server;
   auto drive = server.Connect();
-  drive.WriteU32(reg::kUnlock, reg::kUnlockKey);
-  Words command(reg::kCommandCount);
-  core::PutU32(command.data(), 1);
-  core::PutU32(command.data() + 2, reg::kOpen);
-  core::PutU32(command.data() + 4, test::kSchema);
-  command[6] = test::kTableWords;
-  drive.Write(reg::kCommand, command);
-  EXPECT_EQ(drive.ReadStatus().transaction_state, 1);
+  drive.WriteValue<reg::kUnlock>(reg::kUnlockKey);
+  link::Words<reg::kCommandBlock> command = Open();
+  drive.Write(command);
+  EXPECT_EQ(drive.ReadStatus().transaction_state, link::TransactionState::kOpen);
   server.Jump(link::TableTransaction::kStageTimeout_ms);
-  EXPECT_TRUE(test::Await([&] { return drive.ReadStatus().transaction_state == 0; }));
+  EXPECT_TRUE(test::Await([&] { return drive.ReadStatus().transaction_state == link::TransactionState::kIdle; }));
   EXPECT_EQ(drive.ReadStatus().transaction_status, Status::kTimeout);
 }
 
@@ -126,8 +127,8 @@ TEST(Flash, WhenTheDriveReadsBackSomethingElse_IsAVerifyError) {
   EXPECT_THROW(FlashTable(drive, MakeTable(1)), client::VerifyError);
 }
 
-// The connection is cut once, after every possible number of reply bytes: the client comes back and finishes, and each
-// table is adopted exactly once.
+// The connection is cut once, after every possible number of reply bytes. The client connects again and finishes, and
+// each table is adopted exactly once.
 TEST(Flash, WithTheConnectionCutAtAnyByte_EndsWithTheNewTable) {
   test::TestServer server;
   test::CuttingProxy proxy(server.port());

@@ -1,4 +1,4 @@
-// client - the test drive behind a real socket, in a thread of its own, with a clock that can jump.
+// client - serves the test drive at a real socket, in a thread of its own, with a clock that can jump.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "armcal/link/tcp_service.hpp"
+#include "armcal/link/tcp.hpp"
 #include "host_sim/client/drive_client.hpp"
 #include "port/linux/tcp_server.hpp"
 #include "tests/unit/link/test_device.hpp"
@@ -18,7 +18,7 @@ namespace armcal::test {
 
 class TestServer {
  public:
-  // `every_turn` runs in the server's thread, once a turn of its loop.
+  // `every_turn` runs in the server's thread, once in each turn of its loop.
   explicit TestServer(std::function<void(TestDevice&)> every_turn = {}) : every_turn_(std::move(every_turn)) {
     const core::Status listening = server_.Listen("127.0.0.1", 0);
     EXPECT_EQ(listening, core::Status::kOk) << server_.error();
@@ -66,7 +66,7 @@ class TestServer {
   std::thread thread_;
 };
 
-// Waits for a condition that another thread brings about; false if it does not within ten seconds.
+// Waits for a condition that another thread brings about. False: it did not become true within ten seconds.
 inline bool Await(const std::function<bool()>& condition) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
   while (!condition()) {

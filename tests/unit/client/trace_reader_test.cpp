@@ -1,4 +1,4 @@
-// client - traces over the wire: complete, with losses, re-read, armed anew by somebody else.
+// client - traces over the wire: complete, with losses, read twice, and started anew by another client.
 #include "host_sim/client/trace_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@
 namespace {
 
 using namespace armcal;
-using client::ArmTrace;
 using client::Gaps;
+using client::StartTrace;
 using client::TraceMode;
 using client::TraceReader;
 using client::TraceRecords;
@@ -22,7 +22,7 @@ constexpr std::uint32_t kMask = 0x0F;  // four words a record
 
 std::uint16_t WordOf(std::uint32_t tick, std::size_t word) { return static_cast<std::uint16_t>(31 * tick + word); }
 
-// A drive that ticks `per_turn` times in each turn of its loop, up to tick `until`.
+// Makes the drive tick up to 50 times in each turn of its loop, up to tick `until`.
 struct Ticking {
   std::atomic<std::uint32_t> until{0};
   std::uint32_t tick = 0;
@@ -51,7 +51,7 @@ TEST(TraceReader, StreamWithALimit_ArrivesCompleteAndInOrder) {
     if (drive.raw.waiting() < 50) ticking(drive);  // a simulated drive may wait for room
   });
   auto drive = server.Connect();
-  ArmTrace(drive, 0, {TraceMode::kStreaming, 1, 5, 1000, kMask});
+  StartTrace(drive, 0, {TraceMode::kStreaming, 1, 5, 1000, kMask});
   ticking.until = 5000;
   TraceReader reader(drive, 0, Gaps::kRefuse);
   const TraceRecords records = reader.TakeAll();
@@ -68,12 +68,12 @@ TEST(TraceReader, StreamThatOverran_ReportsLossAndGap) {
   Ticking ticking;
   test::TestServer server([&](test::TestDevice& drive) { ticking(drive); });
   auto drive = server.Connect();
-  ArmTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, kMask});
+  StartTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, kMask});
   const std::uint32_t capacity = 1024 / (4 + 3);
   TraceReader reader(drive, 0);
   TraceRecords records;
   ticking.until = 2 * capacity;
-  ASSERT_TRUE(test::Await([&] { return drive.ReadInputU32(reg::kTracePage[0] + 8) == capacity; }));
+  ASSERT_TRUE(test::Await([&] { return drive.ReadValue<reg::kTraceLost>() == capacity; }));
   while (reader.TakePage(records) != 0) {
   }
   ASSERT_EQ(records.count(), capacity);
@@ -88,11 +88,11 @@ TEST(TraceReader, GapInTime_IsRefusedIfAsked) {
   Ticking ticking;
   test::TestServer server([&](test::TestDevice& drive) { ticking(drive); });
   auto drive = server.Connect();
-  ArmTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, kMask});
+  StartTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, kMask});
   TraceReader strict(drive, 0, Gaps::kRefuse);
   TraceRecords records;
   ticking.until = 400;  // overruns the ring of 146
-  ASSERT_TRUE(test::Await([&] { return drive.ReadInputU32(reg::kTracePage[0] + 8) == 400 - 146; }));
+  ASSERT_TRUE(test::Await([&] { return drive.ReadValue<reg::kTraceLost>() == 400 - 146; }));
   while (strict.TakePage(records) != 0) {
   }
   EXPECT_EQ(records.count(), 146u);
@@ -104,23 +104,26 @@ TEST(TraceReader, PageReadTwice_IsTheSame) {
   Ticking ticking;
   test::TestServer server([&](test::TestDevice& drive) { ticking(drive); });
   auto drive = server.Connect();
-  ArmTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, kMask});
+  StartTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, kMask});
   ticking.until = 20;
-  ASSERT_TRUE(test::Await([&] { return drive.ReadInput(reg::kTracePage[0] + 6, 1)[0] != 0; }));
-  const auto header = drive.ReadInput(reg::kTracePage[0], 8);
-  const int words = header[6] * header[7];
-  const auto data = drive.ReadInput(reg::kTracePage[0] + reg::kPageData, words);
+  ASSERT_TRUE(test::Await([&] { return drive.ReadValue<reg::kTraceCount>() != 0; }));
+  // The header from `lost` on changes while records arrive.
+  const link::Span fixed = Between(reg::kTraceFirstRecord, reg::kTraceRecordWords);
+  const auto header = drive.Read(fixed);
+  const link::Span data_words =
+      SpanOf(reg::kTraceData, drive.ReadValue<reg::kTraceCount>() * drive.ReadValue<reg::kTraceRecordWords>());
+  const auto data = drive.Read(data_words);
   ticking.until = 60;  // more arrives meanwhile
-  ASSERT_TRUE(test::Await([&] { return drive.ReadInput(reg::kTracePage[0] + 13, 1)[0] >= 40; }));
-  EXPECT_EQ(drive.ReadInput(reg::kTracePage[0], 8), header);
-  EXPECT_EQ(drive.ReadInput(reg::kTracePage[0] + reg::kPageData, words), data);
+  ASSERT_TRUE(test::Await([&] { return drive.ReadValue<reg::kTraceWaiting>() >= 40; }));
+  EXPECT_EQ(drive.Read(fixed), header);
+  EXPECT_EQ(drive.Read(data_words), data);
 }
 
 TEST(TraceReader, OneShotWithDecimation_IsStampedByWindow) {
   Ticking ticking;
   test::TestServer server([&](test::TestDevice& drive) { ticking(drive); });
   auto drive = server.Connect();
-  ArmTrace(drive, 0, {TraceMode::kOneShot, 10, 100, 12, kMask});
+  StartTrace(drive, 0, {TraceMode::kOneShot, 10, 100, 12, kMask});
   ticking.until = 500;
   const TraceRecords records = TraceReader(drive, 0).TakeAll();
   ASSERT_EQ(records.count(), 12u);
@@ -128,21 +131,21 @@ TEST(TraceReader, OneShotWithDecimation_IsStampedByWindow) {
   for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(records.ticks[i], 100 + 10 * i);
 }
 
-TEST(TraceReader, ArmedAnewByAnotherClient_IsNoticed) {
+TEST(TraceReader, StartedAnewByAnotherClient_IsNoticed) {
   test::TestServer server;
   auto drive = server.Connect(), other = server.Connect();
-  ArmTrace(drive, 1, {TraceMode::kStreaming, 1, 0, 0, kMask});
+  StartTrace(drive, 1, {TraceMode::kStreaming, 1, 0, 0, kMask});
   TraceReader reader(drive, 1);
   TraceRecords records;
   EXPECT_EQ(reader.TakePage(records), 0u);
-  ArmTrace(other, 1, {TraceMode::kStreaming, 1, 0, 0, kMask});
+  StartTrace(other, 1, {TraceMode::kStreaming, 1, 0, 0, kMask});
   EXPECT_THROW(reader.TakePage(records), client::LinkError);
 }
 
 TEST(TraceReader, ChannelsThatTheDriveLacks_AreRefused) {
   test::TestServer server;
   auto drive = server.Connect();
-  EXPECT_THROW(ArmTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, 0x100}), client::RefusedError);
+  EXPECT_THROW(StartTrace(drive, 0, {TraceMode::kStreaming, 1, 0, 0, 0x100}), client::RefusedError);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// controller - a whole controller without a bus: what a drive does, it does; what it must not, it refuses.
+// controller - a whole controller without a bus: it does what a drive does and refuses what a drive must refuse.
 #include "armcal/controller/controller.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ namespace reg = link::reg;
 constexpr int n = Model::kJoints;
 constexpr std::uint32_t kAllAxes = (1u << n) - 1;
 
-// A controller in front of axes that are as its model says, and a client without a wire.
+// A controller with axes that are as its model says, and a client that needs no wire.
 template <class... Filters>
 struct Bench {
   Bench() { booted = controller.Boot(); }
@@ -33,58 +33,67 @@ struct Bench {
       model::RawSample<n> raw;
       controller::SetPoint<n> set;
       (void)axes.Read(now, raw, set);
-      const int sign = now / Model::kSampleTicks % 2 == 0 ? 1 : -1;  // from sample to sample
+      const int sign = now / Model::kSampleTicks % 2 == 0 ? 1 : -1;  // changes from sample to sample
       for (std::int16_t& current : raw.current) current = static_cast<std::int16_t>(current + sign * disturbance_LSB);
       torque = controller.FeedForward(set, raw.temperature_degC, tau_Nm);
       ASSERT_EQ(controller.Push(raw), Status::kOk);
       Idle();
     }
   }
-  void Idle() {  // an adoption that stays refused would keep it busy until a time-out
+  void Idle() {  // the limit is for an adoption that stays refused, which would keep it busy until a time-out
     for (int k = 0; k < 100000 && controller.Step(); ++k) {
     }
   }
 
-  Status Write(std::uint16_t first, std::vector<std::uint16_t> words) {
-    return controller.map().Write(first, static_cast<std::uint16_t>(words.size()), words.data());
+  template <const auto& kBlock>
+  Status Write(const link::Words<kBlock>& words) {
+    return controller.map().Write(words.span().first, words.size(), words.data());
   }
-  std::vector<std::uint16_t> Read(link::RegisterKind kind, std::uint16_t first, std::uint16_t count) {
-    std::vector<std::uint16_t> words(count);
-    EXPECT_EQ(controller.map().Read(kind, first, count, words.data()), Status::kOk);
+  template <const link::Register& kRegister>
+  Status WriteValue(link::ValueOf<kRegister> value) {
+    link::Words<kRegister> words;
+    words.template Set<kRegister>(value);
+    return Write(words);
+  }
+  std::vector<std::uint16_t> Read(const link::Span& span) {
+    std::vector<std::uint16_t> words(span.count);
+    EXPECT_EQ(controller.map().Read(span.kind, span.first, span.count, words.data()), Status::kOk);
     return words;
   }
-  std::uint16_t Of(std::uint16_t status_register) { return Read(link::RegisterKind::kInput, status_register, 1)[0]; }
-  std::uint32_t RowsUsed() { return core::GetU32(Read(link::RegisterKind::kInput, 0x0060, 2).data()); }
-  void Unlock() { ASSERT_EQ(Write(reg::kUnlock, Halves({reg::kUnlockKey})), Status::kOk); }
+  template <const auto& kBlock>
+  link::Words<kBlock> Read() {
+    return link::Words<kBlock>(Read(link::SpanOf(kBlock)).data());
+  }
+  template <const link::Register& kRegister>
+  link::ValueOf<kRegister> Value() {
+    return Read<kRegister>().template Get<kRegister>();
+  }
+  void Unlock() { ASSERT_EQ(WriteValue<reg::kUnlock>(reg::kUnlockKey), Status::kOk); }
 
-  static std::vector<std::uint16_t> Halves(std::initializer_list<std::uint32_t> numbers) {
-    std::vector<std::uint16_t> words;
-    for (const std::uint32_t x : numbers) {
-      words.push_back(static_cast<std::uint16_t>(x >> 16));
-      words.push_back(static_cast<std::uint16_t>(x));
-    }
-    return words;
-  }
   Status Command(std::uint32_t command, std::uint32_t crc) {
-    std::vector<std::uint16_t> words = Halves({++sequence, command, Model::kSchema});
-    for (const std::uint16_t w : {kWords, std::uint16_t{0}}) words.push_back(w);
-    for (const std::uint16_t w : Halves({crc})) words.push_back(w);
-    return Write(reg::kCommand, words);
+    link::Words<reg::kCommandBlock> w;
+    w.template Set<reg::kSequence>(++sequence);
+    w.template Set<reg::kCommand>(command);
+    w.template Set<reg::kCommandSchema>(Model::kSchema);
+    w.template Set<reg::kCommandWords>(kWords);
+    w.template Set<reg::kCommandCrc>(crc);
+    return Write(w);
   }
-  // Status of the first step that is refused; kOk: stored, and adopted as far as the status registers say.
-  Status Flash(const estimator::Table<Model>& table) {
+  // Stages a table and checks it. Answers the status of the first step that is refused.
+  Status Check(const estimator::Table<Model>& table, std::uint32_t& crc) {
     std::vector<std::uint16_t> words(kWords);
     model::Encode(table, words.data());
     Unlock();
     if (const Status opened = Command(reg::kOpen, 0); !core::IsOk(opened)) return opened;
     for (std::uint16_t i = 0; i < kWords; ++i)
-      if (const Status s = Write(static_cast<std::uint16_t>(reg::kStaged + i), {words[i]}); !core::IsOk(s)) return s;
+      if (const Status s = controller.map().Write(reg::kStagedTable + i, 1, &words[i]); !core::IsOk(s)) return s;
+    crc = core::Crc32Words(words.data(), words.size());
+    return Command(reg::kCheck, crc);
+  }
+  // Also saves it. kOk: it is stored, and adopted as far as the status registers say.
+  Status Flash(const estimator::Table<Model>& table) {
     std::uint32_t crc = 0;
-    for (const std::uint16_t w : words) {
-      const std::uint8_t bytes[2] = {static_cast<std::uint8_t>(w >> 8), static_cast<std::uint8_t>(w)};
-      crc = core::Crc32(bytes, 2, crc);
-    }
-    if (const Status checked = Command(reg::kCheck, crc); !core::IsOk(checked)) return checked;
+    if (const Status checked = Check(table, crc); !core::IsOk(checked)) return checked;
     const Status saved = Command(reg::kSave, crc);
     Idle();
     return saved;
@@ -93,8 +102,8 @@ struct Bench {
   static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
   test::NorFlash flash{{2, 16384, 8, 0xFF}};
   std::uint32_t now = 0, sequence = 0;
-  port::Clock clock{&now, [](void* t) { return *static_cast<std::uint32_t*>(t); },
-                    [](void* t) { return *static_cast<std::uint32_t*>(t); }};
+  hardware::Clock clock{&now, [](void* t) { return *static_cast<std::uint32_t*>(t); },
+                        [](void* t) { return *static_cast<std::uint32_t*>(t); }};
   Axes axes;
   controller::Controller<Model, Filters...> controller{flash.storage(), clock};
   Status booted = Status::kOk, torque = Status::kOk;
@@ -104,15 +113,14 @@ struct Bench {
 
 using Forgetting = filter::ForgettingFilter<Model>;
 using Block = filter::KalmanFilter<Model, filter::Form::kBlock>;
-constexpr std::uint16_t kFeedForwardState = 0x0043, kGeneration = 0x0045, kHealth = 0x005F;
 
 TEST(Controller, WithoutAStoredTable_LearnsFromTheDefaultsAndFeedsNothingForward) {
   const auto bench = std::make_unique<Bench<Forgetting>>();
   EXPECT_EQ(bench->booted, Status::kBlank);
   bench->Run(2000);
   EXPECT_EQ(bench->torque, Status::kEmpty);
-  EXPECT_EQ(bench->Of(kFeedForwardState), 0);
-  EXPECT_GT(bench->RowsUsed(), 0u);
+  EXPECT_EQ((bench->Value<reg::kFeedForwardState>()), 0);
+  EXPECT_GT(bench->Value<reg::kRowsUsedA>(), 0u);
 }
 
 TEST(Controller, ATableFlashed_IsInForceAndStaysSoAfterPowerUp) {
@@ -120,13 +128,43 @@ TEST(Controller, ATableFlashed_IsInForceAndStaysSoAfterPowerUp) {
   ASSERT_EQ(bench->Flash(estimator::DefaultTable<Model>()), Status::kOk);
   bench->Run(1);
   EXPECT_EQ(bench->torque, Status::kOk);
-  EXPECT_EQ(bench->Of(kFeedForwardState), 1);
-  EXPECT_EQ(bench->Of(kGeneration), 2);
+  EXPECT_EQ((bench->Value<reg::kFeedForwardState>()), 1);
+  EXPECT_EQ((bench->Value<reg::kGeneration>()), 2u);
   EXPECT_EQ(bench->controller.in_force().committed.generation, 2u);
 
   controller::Controller<Model, Forgetting> again(bench->flash.storage(), bench->clock);
   EXPECT_EQ(again.Boot(), Status::kOk);
   EXPECT_EQ(again.generation(), 1u);
+}
+
+// What check has built waits for save. A table that was checked and left, or refused, must not be adopted in its place.
+TEST(Controller, OfTablesCheckedOneAfterTheOther_TheOneThatIsSavedComesIntoForce) {
+  const auto bench = std::make_unique<Bench<Forgetting>>();
+  const auto table = [](float sigma_Nm) {
+    auto t = estimator::DefaultTable<Model>();
+    t.joint[0].sigma_Nm = sigma_Nm;
+    return t;
+  };
+  ASSERT_EQ(bench->Flash(table(1.0f)), Status::kOk);
+  std::uint32_t crc = 0;
+  ASSERT_EQ(bench->Check(table(2.0f), crc), Status::kOk);
+  EXPECT_EQ(bench->controller.in_force().sigma_Nm[0], 1.0f) << "checked is not adopted";
+  auto unphysical = table(3.0f);
+  unphysical.parameter[0].mean = -1.0f;
+  EXPECT_EQ(bench->Check(unphysical, crc), Status::kUnphysical);
+  EXPECT_EQ(bench->Command(reg::kSave, crc), Status::kWrongOrder);
+  ASSERT_EQ(bench->Check(table(4.0f), crc), Status::kOk);
+  ASSERT_EQ(bench->Check(table(5.0f), crc), Status::kOk);
+  ASSERT_EQ(bench->Command(reg::kSave, crc), Status::kOk);
+  bench->Idle();
+  EXPECT_EQ(bench->controller.in_force().sigma_Nm[0], 5.0f);
+  EXPECT_EQ(bench->controller.generation(), 3u);  // the defaults, and two tables
+  EXPECT_EQ(core::GetF32(&bench->Read(SpanOf(reg::kActiveTable, Bench<Forgetting>::kWords))[model::kHeaderWords]),
+            5.0f);
+
+  controller::Controller<Model, Forgetting> again(bench->flash.storage(), bench->clock);
+  ASSERT_EQ(again.Boot(), Status::kOk);
+  EXPECT_EQ(again.in_force().sigma_Nm[0], 5.0f);
 }
 
 TEST(Controller, WhileAxesAreEnabled_AdoptsABumplessTableOnly) {
@@ -143,7 +181,7 @@ TEST(Controller, WhileAxesAreEnabled_AdoptsABumplessTableOnly) {
 TEST(Controller, ATableThatAFilterCannotHold_IsRefusedAndNothingChanges) {
   const auto bench = std::make_unique<Bench<Forgetting, Block>>();
   auto table = estimator::DefaultTable<Model>();
-  for (int k = 0; k < Model::kBodyParameters; ++k)  // links that are not to be learnt, only allowed for
+  for (int k = 0; k < Model::kBodyParameters; ++k)  // the links are not learnt, only considered
     table.parameter[k].state = model::ParameterState::kConsidered;
   EXPECT_EQ(bench->Flash(table), Status::kOutOfRange);
   EXPECT_EQ(bench->controller.generation(), 1u);
@@ -151,14 +189,14 @@ TEST(Controller, ATableThatAFilterCannotHold_IsRefusedAndNothingChanges) {
 
 TEST(Controller, OnHold_UsesNoRowUntilReleased) {
   const auto bench = std::make_unique<Bench<Forgetting>>();
-  EXPECT_EQ(bench->Write(reg::kLearningHold, {1}), Status::kLocked);
+  EXPECT_EQ(bench->WriteValue<reg::kLearningHold>(1), Status::kLocked);
   bench->Unlock();
-  ASSERT_EQ(bench->Write(reg::kLearningHold, {1}), Status::kOk);
+  ASSERT_EQ(bench->WriteValue<reg::kLearningHold>(1), Status::kOk);
   bench->Run(3000);
-  EXPECT_EQ(bench->RowsUsed(), 0u);
-  ASSERT_EQ(bench->Write(reg::kLearningHold, {0}), Status::kOk);
+  EXPECT_EQ(bench->Value<reg::kRowsUsedA>(), 0u);
+  ASSERT_EQ(bench->WriteValue<reg::kLearningHold>(0), Status::kOk);
   bench->Run(3000);
-  EXPECT_GT(bench->RowsUsed(), 0u);
+  EXPECT_GT(bench->Value<reg::kRowsUsedA>(), 0u);
 }
 
 TEST(Controller, AJointReset_IsAsUncertainAsBeforeIt) {
@@ -167,7 +205,7 @@ TEST(Controller, AJointReset_IsAsUncertainAsBeforeIt) {
     bench->controller.filter<0>().RequestReadOut();
     bench->Idle();
     std::vector<float> sd;
-    const auto words = bench->Read(link::RegisterKind::kInput, reg::kDeviationA, 2 * Model::kFrontBegin[3]);
+    const auto words = bench->Read(SpanOf(reg::kDeviationA, Model::kFrontBegin[3]));
     for (std::size_t k = 0; k < words.size(); k += 2) sd.push_back(core::GetF32(&words[k]));
     return sd;
   };
@@ -175,7 +213,7 @@ TEST(Controller, AJointReset_IsAsUncertainAsBeforeIt) {
   bench->Run(8000);
   const auto learnt = deviations();
   bench->Unlock();
-  ASSERT_EQ(bench->Write(reg::kLearningReset, {2}), Status::kOk);
+  ASSERT_EQ(bench->WriteValue<reg::kLearningReset>(2), Status::kOk);
   const auto after = deviations();
   for (int k = 0; k < Model::kFrontBegin[3]; ++k) {
     if (!(before[k] > 0.0f)) continue;  // not estimated
@@ -185,30 +223,31 @@ TEST(Controller, AJointReset_IsAsUncertainAsBeforeIt) {
   }
 }
 
-TEST(Controller, ATraceThatAClientArms_HoldsWhatTheTickWasGiven) {
+TEST(Controller, ATraceThatAClientStarts_HoldsWhatTheTickWasGiven) {
   const auto bench = std::make_unique<Bench<Forgetting>>();
   const auto trace = std::make_unique<controller::RawTrace<Model, 8192>>();
-  const auto capabilities = [&] {
-    return core::GetU32(bench->Read(link::RegisterKind::kInput, reg::kIdentity + 20, 2).data());
-  };
-  EXPECT_EQ(capabilities() & reg::kHasRawTrace, 0u);
+  EXPECT_EQ(bench->Value<reg::kCapabilities>() & reg::kHasRawTrace, 0u);
   ASSERT_EQ(bench->controller.Record(*trace), Status::kOk);
-  EXPECT_EQ(capabilities() & reg::kHasRawTrace, reg::kHasRawTrace);
+  EXPECT_EQ(bench->Value<reg::kCapabilities>() & reg::kHasRawTrace, reg::kHasRawTrace);
   EXPECT_EQ(bench->controller.Record(*trace), Status::kBadAddress);  // once
-  bench->Run(50);                                                    // nobody has asked
-  EXPECT_EQ(bench->Read(link::RegisterKind::kInput, reg::kTracePage[0] + 6, 1)[0], 0);
+  bench->Run(50);                                                    // no client has started a recording
+  EXPECT_EQ(bench->Value<reg::kTraceCount>(), 0);
 
-  const std::uint32_t channels = estimator::kRawAll, start = bench->now + 10;
-  constexpr std::uint16_t kTicks = 3;               // a record, so that a mean has to be rounded
-  std::vector<std::uint16_t> arm{7, 2, kTicks, 0};  // streaming
-  for (const std::uint16_t half : bench->Halves({start, 0, channels})) arm.push_back(half);
-  ASSERT_EQ(bench->Write(reg::kTraceArm[0], arm), Status::kOk);
+  const std::uint32_t start = bench->now + 10;
+  constexpr std::uint16_t kTicks = 3;  // a record, so that a mean has to be rounded
+  link::Words<reg::kTraceStartBlock> w;
+  w.Set<reg::kTraceRecording>(std::uint16_t{7});
+  w.Set<reg::kTraceMode>(link::TraceMode::kStreaming);
+  w.Set<reg::kTraceDecimation>(kTicks);
+  w.Set<reg::kTraceStartTick>(start);
+  w.Set<reg::kTraceChannelMask>(estimator::kRawAll);
+  ASSERT_EQ(bench->Write(w), Status::kOk);
   bench->Run(10 + 3 * kTicks);
-  const auto header = bench->Read(link::RegisterKind::kInput, reg::kTracePage[0], reg::kPageHeaderCount);
-  EXPECT_EQ(core::GetU32(&header[2]), start);
-  EXPECT_EQ(header[6], 3);
-  ASSERT_EQ(header[7], 11 * n);
-  const auto words = bench->Read(link::RegisterKind::kInput, reg::kTracePage[0] + reg::kPageData, 3 * 11 * n);
+  const auto page = bench->Read<reg::kTracePageBlock>();
+  EXPECT_EQ(page.Get<reg::kTraceFirstTick>(), start);
+  EXPECT_EQ(page.Get<reg::kTraceCount>(), 3);
+  ASSERT_EQ(page.Get<reg::kTraceRecordWords>(), 11 * n);
+  const auto words = bench->Read(SpanOf(reg::kTraceData, 3 * 11 * n));
   for (int record = 0; record < 3; ++record)
     for (int j = 0; j < n; ++j) {
       double counts = 0, current = 0, told = 0;
@@ -218,22 +257,22 @@ TEST(Controller, ATraceThatAClientArms_HoldsWhatTheTickWasGiven) {
         (void)bench->axes.Read(start + kTicks * record + k, raw, set);
         counts += raw.counts[j], current += raw.current[j], told += static_cast<double>(set.q[j]);
       }
-      const std::uint16_t* w = &words[11 * (n * record + j)];
-      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(w)) / 16.0, counts / kTicks, 1.0 / 32);
-      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(w + 2)) / 16.0, current / kTicks, 1.0 / 32);
-      EXPECT_EQ(w[6], model::kEnabled);
-      EXPECT_NEAR(core::GetF32(w + 7), told / kTicks, 1e-6);
-      EXPECT_EQ(core::GetF32(w + 9), 0.0f);  // no table: no feed-forward
+      const std::uint16_t* r = &words[11 * (n * record + j)];
+      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(r)) / 16.0, counts / kTicks, 1.0 / 32);
+      EXPECT_NEAR(static_cast<std::int32_t>(core::GetU32(r + 2)) / 16.0, current / kTicks, 1.0 / 32);
+      EXPECT_EQ(r[6], model::kEnabled);
+      EXPECT_NEAR(core::GetF32(r + 7), told / kTicks, 1e-6);
+      EXPECT_EQ(core::GetF32(r + 9), 0.0f);  // no table: no feed-forward
     }
 }
 
 TEST(Controller, NoiseFarBeyondTheTables_IsServedAsTheFiltersHealth) {
   const auto bench = std::make_unique<Bench<Forgetting, Block>>();
   bench->Run(9000);
-  EXPECT_EQ(bench->Of(kHealth), 0);
+  EXPECT_EQ((bench->Value<reg::kHealth>()), 0);
   bench->disturbance_LSB = 3000;
   bench->Run(9000);
-  EXPECT_EQ(bench->Of(kHealth), 3);
+  EXPECT_EQ((bench->Value<reg::kHealth>()), 3);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// core - checksums against published check values and a bit-by-bit oracle; words in bytes.
+// core - checksums against published values and a bit-by-bit oracle, and words in bytes.
 #include "armcal/core/crc.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// core - ring and mailbox between two threads: nothing torn, nothing out of order, every loss counted.
+// core - ring and mailbox between two threads: nothing is torn or out of order, and every loss is counted.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -14,7 +14,7 @@ using armcal::core::Mailbox;
 using armcal::core::SampleRing;
 using armcal::core::Status;
 
-// Wide enough to be torn if anything could tear it.
+// So wide that it would be torn if anything could tear it.
 struct Wide {
   std::uint32_t copy[16];
 };

@@ -1,4 +1,4 @@
-// link - framers fed whole, byte by byte, garbled and with other devices' traffic.
+// link - what the framers find in whole frames, single bytes, garbled bytes and the traffic of other devices.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "armcal/core/crc.hpp"
-#include "armcal/link/rtu_framer.hpp"
-#include "armcal/link/tcp_framer.hpp"
+#include "armcal/link/rtu.hpp"
+#include "armcal/link/tcp.hpp"
 
 namespace {
 
@@ -25,7 +25,7 @@ Bytes Tcp(const Bytes& pdu, std::uint8_t transaction) {
   return frame;
 }
 
-// Everything the framer finds in a stream; stops at a broken one.
+// Everything that the framer finds in a stream, up to the first frame that is broken.
 std::vector<Bytes> TakeTcp(TcpFramer& framer, const Bytes& stream, bool* broken = nullptr) {
   std::vector<Bytes> found;
   for (std::size_t at = 0, used = 0; at < stream.size(); at += used) {

@@ -64,8 +64,8 @@ TEST_F(Engine, Quantity_OutOfRange_Gets03_EvenWhereTheAddressIsWrongToo) {
 }
 
 TEST_F(Engine, Address_InAGapOrPastTheEnd_Gets02) {
-  EXPECT_EQ(Ask({4, 0, reg::kIdentityCount, 0, 1}), (Bytes{0x84, 2}));
-  EXPECT_EQ(Ask({4, 0, reg::kIdentityCount - 1, 0, 2}), (Bytes{0x84, 2})) << "runs into a gap";
+  EXPECT_EQ(Ask({4, 0, reg::kIdentityBlock.count, 0, 1}), (Bytes{0x84, 2}));
+  EXPECT_EQ(Ask({4, 0, reg::kIdentityBlock.count - 1, 0, 2}), (Bytes{0x84, 2})) << "runs into a gap";
   EXPECT_EQ(Ask({3, 0xFF, 0xFF, 0, 2}), (Bytes{0x83, 2})) << "wraps";
   EXPECT_EQ(Ask({16, 0xFF, 0xFF, 0, 2, 4, 0, 0, 0, 0}), (Bytes{0x90, 2}));
   EXPECT_EQ(Ask({6, 0x07, 0, 0, 1}), (Bytes{0x86, 2}));
@@ -78,7 +78,7 @@ TEST_F(Engine, Write_OfHalfA32BitValueOrNaN_Gets03_AndChangesNothing) {
   EXPECT_EQ(Ask({16, 0, 0x59, 0, 2, 4, 0, 1, 0, 1}), (Bytes{0x90, 3})) << "two halves";
   EXPECT_EQ(Ask({16, 0, 0x50, 0, 1, 2, 0, 1}), (Bytes{0x90, 3}));
   EXPECT_EQ(LastStatus(), core::Status::kWrongSize);
-  // the first float is fine, the second is NaN (then infinity): neither may be applied
+  // The first float is good, the second is NaN (then infinity). Neither may be applied.
   EXPECT_EQ(Ask({16, 0, 0x50, 0, 4, 8, 0x3F, 0x80, 0, 0, 0x7F, 0xC0, 0, 0}), (Bytes{0x90, 3}));
   EXPECT_EQ(Ask({16, 0, 0x50, 0, 4, 8, 0x3F, 0x80, 0, 0, 0xFF, 0x80, 0, 0}), (Bytes{0x90, 3}));
   EXPECT_EQ(LastStatus(), core::Status::kNotFinite);

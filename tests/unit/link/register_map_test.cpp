@@ -1,4 +1,4 @@
-// link - the list of registers against what the device serves, and the map's own rules.
+// link - the declared registers against what the device serves, and the rules of the map.
 #include "armcal/link/register_map.hpp"
 
 #include <gtest/gtest.h>
@@ -12,20 +12,20 @@ namespace {
 
 using namespace armcal;
 using core::Status;
-using link::Item;
+using link::Register;
 using link::RegisterKind;
 
-std::uint32_t EndOf(const Item& item) { return item.address + std::uint32_t{item.count} * WordsOf(item.type); }
+std::uint32_t EndOf(const Register& item) { return item.address + std::uint32_t{item.count} * WordsOf(item.type); }
 
 TEST(Registers, Items_DoNotOverlap_AndPairsLieOnEvenAddresses) {
-  for (int a = 0; a < link::kItemCount; ++a) {
-    const Item& item = link::kItems[a];
+  for (int a = 0; a < static_cast<int>(link::kRegisters.size()); ++a) {
+    const Register& item = link::kRegisters[a];
     if (item.type != link::RegisterType::kU16) {
       EXPECT_EQ(item.address % 2, 0) << item.name;
     }
     EXPECT_LE(EndOf(item), link::reg::kVendor) << item.name;
     for (int b = 0; b < a; ++b) {
-      const Item& other = link::kItems[b];
+      const Register& other = link::kRegisters[b];
       const bool apart = other.kind != item.kind || EndOf(other) <= item.address || EndOf(item) <= other.address;
       EXPECT_TRUE(apart) << item.name << " and " << other.name;
       EXPECT_STRNE(item.name, other.name);
@@ -33,14 +33,14 @@ TEST(Registers, Items_DoNotOverlap_AndPairsLieOnEvenAddresses) {
   }
 }
 
-// Items and device are written apart; here they meet: the first register of every item is served, nothing else is.
+// What is declared and what the device serves meet here: the first word of every register is served, and nothing else.
 TEST(Registers, Device_ServesEveryItem_AndNothingBetween) {
   test::TestDevice drive;
   ASSERT_TRUE(drive.all_served);
   for (const RegisterKind kind : {RegisterKind::kInput, RegisterKind::kHolding}) {
     for (std::uint32_t address = 0; address < 0x10000; ++address) {
-      const Item* item = nullptr;
-      for (const Item& i : link::kItems)
+      const Register* item = nullptr;
+      for (const Register& i : link::kRegisters)
         if (i.kind == kind && address >= i.address && address < EndOf(i)) item = &i;
       std::uint16_t word;
       const Status status = drive.device.map().Read(kind, static_cast<std::uint16_t>(address), 1, &word);
@@ -56,7 +56,7 @@ TEST(Registers, Device_ServesEveryItem_AndNothingBetween) {
 TEST(Registers, Access_IsWhatTheListSays) {
   test::TestDevice drive;
   const std::uint16_t zeros[64] = {};
-  for (const Item& item : link::kItems) {
+  for (const Register& item : link::kRegisters) {
     if (item.kind != RegisterKind::kHolding) continue;
     const Status status = drive.device.map().Write(item.address, WordsOf(item.type), zeros);
     if (item.access == link::Access::kRead) {
@@ -70,14 +70,37 @@ TEST(Registers, Access_IsWhatTheListSays) {
   }
 }
 
+// The compiler makes this checksum out of the declarations. Another one would mean a map that old clients cannot read.
+TEST(Registers, LayoutCrc_IsThatOfMapVersion1_2) {
+  EXPECT_EQ(link::reg::kMapMajorValue, 1);
+  EXPECT_EQ(link::reg::kMapMinorValue, 2);
+  EXPECT_EQ(link::kLayoutCrc, 0x41383644u);
+}
+
+// Every word of the block has a value of its own, so a wrong place would show.
+TEST(Words, ValuesLieWhereTheRegisterIsDeclared) {
+  namespace reg = link::reg;
+  std::uint16_t raw[reg::kStatusBlock.count];
+  for (std::uint16_t i = 0; i < reg::kStatusBlock.count; ++i) raw[i] = static_cast<std::uint16_t>(0x4000 + i);
+  const link::Words<reg::kStatusBlock> status(raw);
+  EXPECT_EQ(status.Get<reg::kTableStatus>(), 0x4002);
+  EXPECT_EQ(status.Get<reg::kTick>(), 0x40064007u);
+  EXPECT_EQ((status.Get<reg::kSlotState, 1>()), 0x400F);
+  link::Words<reg::kIdentityBlock> identity;
+  identity.Set<reg::kProbeFloat>(reg::kProbeFloatValue);
+  EXPECT_EQ(core::GetF32(identity.data() + 12), reg::kProbeFloatValue);
+  EXPECT_EQ(reg::kTracePageBlock.Of(1).first, 0x6000);
+  EXPECT_EQ(SpanOf(reg::kTraceAcknowledge).Of(1).first, 0x011C);
+}
+
 TEST(Registers, FloatsBeyondTheDevicesColumns_AreNotThere) {
   test::TestDevice drive;
   std::uint16_t words[4];
-  const auto last = static_cast<std::uint16_t>(link::reg::kEstimateA + 2 * (test::kColumns - 1));
+  const std::uint16_t last = link::reg::kEstimateA + 2 * (test::kColumns - 1);
   ASSERT_EQ(drive.device.map().Read(RegisterKind::kInput, last, 2, words), Status::kOk);
   EXPECT_EQ(core::GetF32(words), 0.5f * (test::kColumns - 1));
   EXPECT_EQ(drive.device.map().Read(RegisterKind::kInput, last, 3, words), Status::kBadAddress);
-  ASSERT_EQ(drive.device.map().Read(RegisterKind::kInput, link::reg::kDeviationA, 2, words), Status::kOk);
+  ASSERT_EQ(drive.device.map().Read(RegisterKind::kInput, link::reg::kDeviationA.address, 2, words), Status::kOk);
   EXPECT_TRUE(std::isnan(core::GetF32(words))) << "no estimate yet";
 }
 

@@ -1,5 +1,4 @@
-// link - flashing step by step: order, retries, refusals, time-outs, power cuts; the old table or the new, never
-// another.
+// link - flashing step by step: order, retries, refusals, time-outs and power cuts.
 #include "armcal/link/table_transaction.hpp"
 
 #include <gtest/gtest.h>
@@ -45,7 +44,7 @@ class Transaction : public testing::Test {
     Run();
     ASSERT_EQ(t().state(), TransactionState::kActive);
   }
-  // Stored, adopted and served are one table.
+  // The stored, the adopted and the served table are this one.
   void ExpectInForce(int number) {
     EXPECT_EQ(drive_.active, MakeTable(number));
     EXPECT_EQ(drive_.application.adopted, MakeTable(number));
@@ -71,6 +70,31 @@ TEST_F(Transaction, Flash_OfAGoodTable_IsStoredAdoptedAndServed) {
   EXPECT_EQ(t().active_crc(), core::Crc32Words(MakeTable(1).data(), kTableWords));
   Flash(2);
   ExpectInForce(2);
+}
+
+// The check builds what is adopted later. So each table is checked once, and what is adopted is what was checked last.
+TEST_F(Transaction, EachTable_IsCheckedOnce_AndWhatWasCheckedIsAdopted) {
+  Flash(1);
+  EXPECT_EQ(drive_.application.checks, 1);
+  ASSERT_EQ(Do(reg::kOpen, MakeTable(2)), Status::kOk);
+  Stage(MakeTable(2));
+  ASSERT_EQ(Do(reg::kCheck, MakeTable(2)), Status::kOk) << "and left there";
+  Flash(3);
+  EXPECT_EQ(drive_.application.checks, 3);
+  ExpectInForce(3);
+}
+
+TEST_F(Transaction, SecondCheckThatIsRefused_LeavesNothingToSave) {
+  Flash(1);
+  const Words words = MakeTable(2);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+  drive_.application.refuse_check = true;
+  EXPECT_EQ(Do(reg::kCheck, words), Status::kUnphysical);
+  EXPECT_EQ(Do(reg::kSave, words), Status::kWrongOrder);
+  Run();
+  ExpectInForce(1);
 }
 
 TEST_F(Transaction, Commands_OutOfOrder_AreRefused) {

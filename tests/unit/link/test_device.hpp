@@ -1,20 +1,17 @@
-// link - a drive without an arm: a table application with switches, flash, traces and the whole map; knows no
-// transport.
+// link - a drive without a robot arm: an application with switches, a flash memory, traces and the whole register map.
 #pragma once
 
 #include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
 #include "armcal/link/device.hpp"
-#include "armcal/link/learning_registers.hpp"
-#include "armcal/link/residual_registers.hpp"
-#include "armcal/link/trace_registers.hpp"
+#include "armcal/link/trace.hpp"
 #include "tests/unit/table/nor_flash.hpp"
 
 namespace armcal::test {
@@ -31,54 +28,71 @@ inline std::vector<std::uint16_t> MakeTable(int number, std::uint32_t schema = k
   return words;
 }
 
-// What the drive's application does with a table. Switches may be turned from another thread.
+// What the application of the drive does with a table. Another thread may turn the switches.
 struct FakeApplication {
   std::atomic<bool> enabled{false};         // an axis is enabled
   std::atomic<bool> enable_on_save{false};  // becomes enabled between permission and adoption
-  std::atomic<int> busy{0};                 // answers kBusy so many times before it adopts
-  std::atomic<int> adoptions{0};
-  std::vector<std::uint16_t> adopted;
+  std::atomic<int> busy{0};                 // answers kBusy this many times before it adopts
+  std::atomic<bool> refuse_check{false};    // every check refuses
+  std::atomic<int> checks{0}, adoptions{0};
+  std::vector<std::uint16_t> built, adopted;  // by the last check; by the last adoption
 
   link::TableApplication Functions() { return {this, &Check, &Permit, &Adopt}; }
 
-  static core::Status Check(void*, const std::uint16_t* words, std::uint32_t) {
-    return words[5] == kBadPhysics ? core::Status::kUnphysical : core::Status::kOk;
+  static core::Status Check(void* self, const std::uint16_t* words) {
+    auto& a = *static_cast<FakeApplication*>(self);
+    ++a.checks;
+    a.built.clear();
+    if (a.refuse_check || words[5] == kBadPhysics) return core::Status::kUnphysical;
+    a.built.assign(words, words + kTableWords);
+    return core::Status::kOk;
   }
-  static core::Status Permit(void* self, const std::uint16_t*, std::uint32_t) {
+  static core::Status Permit(void* self) {
     auto& a = *static_cast<FakeApplication*>(self);
     if (a.enabled) return core::Status::kAxisEnabled;
     if (a.enable_on_save) a.enabled = true;
     return core::Status::kOk;
   }
-  static core::Status Adopt(void* self, const std::uint16_t* words, std::uint32_t count) {
+  static core::Status Adopt(void* self) {
     auto& a = *static_cast<FakeApplication*>(self);
     if (a.enabled) return core::Status::kAxisEnabled;
     if (a.busy > 0 && a.busy-- > 0) return core::Status::kBusy;
-    a.adopted.assign(words, words + count);
+    a.adopted = a.built;
     ++a.adoptions;
     return core::Status::kOk;
   }
 };
 
-// What the drive's application does about learning.
-struct FakeLearning {
+// What the application of the drive does about learning and about residual statistics.
+struct FakeEstimator {
   core::Status answer = core::Status::kOk;
   std::vector<bool> holds;
   std::vector<int> resets;
+  int snapshots_taken = 0;
 
-  link::LearningApplication Functions() { return {this, &Hold, &Reset}; }
+  link::ClientRequests Functions() { return {this, &Hold, &Reset, &TakeResiduals}; }
 
   static core::Status Hold(void* self, bool hold) {
-    static_cast<FakeLearning*>(self)->holds.push_back(hold);
-    return static_cast<FakeLearning*>(self)->answer;
+    static_cast<FakeEstimator*>(self)->holds.push_back(hold);
+    return static_cast<FakeEstimator*>(self)->answer;
   }
   static core::Status Reset(void* self, int block) {
-    static_cast<FakeLearning*>(self)->resets.push_back(block);
-    return static_cast<FakeLearning*>(self)->answer;
+    static_cast<FakeEstimator*>(self)->resets.push_back(block);
+    return static_cast<FakeEstimator*>(self)->answer;
+  }
+  // The statistics of a joint are recognisable figures that change with every snapshot.
+  static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
+    auto& e = *static_cast<FakeEstimator*>(self);
+    page.generation = 3;
+    page.elapsed_s = 4000;
+    page.sigma_Nm = 0.5f;
+    ++e.snapshots_taken;
+    for (int k = 0; k < link::reg::kResidualValues; ++k)
+      page.values[k] = static_cast<float>(10000 * e.snapshots_taken + 1000 * joint + k);
   }
 };
 
-// Records of channel mask m have as many words as m has bits; masks beyond 8 bits are not served.
+// A record has as many words as its channel mask has bits. Masks of more than 8 bits are not served.
 inline std::uint16_t RecordWords(void*, std::uint32_t channels) {
   if (channels > 0xFF) return 0;
   std::uint16_t words = 0;
@@ -93,31 +107,18 @@ struct TestDevice {
       estimate[i] = 0.5f * static_cast<float>(i);
       deviation[i] = NAN;
     }
+    namespace reg = link::reg;
     bool served = true;
-    for (const auto& [first, values, count] : std::initializer_list<std::tuple<std::uint16_t, const float*, int>>{
-             {link::reg::kEstimateA, estimate, kColumns},
-             {link::reg::kDeviationA, deviation, kColumns},
-             {link::reg::kEstimateB, estimate, kColumns},
-             {link::reg::kDeviationB, deviation, kColumns},
-             {link::reg::kResidualRms, estimate, kAxes},
-             {link::reg::kConsistency, estimate, kAxes}})
-      served = served && core::IsOk(device.AddFloats(first, values, static_cast<std::uint16_t>(count)));
-    served = served && core::IsOk(link::ServeTrace(device.map(), 0, raw));
-    served = served && core::IsOk(link::ServeTrace(device.map(), 1, samples));
-    served = served && core::IsOk(residuals.Serve(device.map()));
-    served = served && core::IsOk(learning.Serve());
-    all_served = served;
-  }
-
-  // The statistics of a joint: recognisable figures that change with every snapshot.
-  static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
-    auto& t = *static_cast<TestDevice*>(self);
-    page.generation = 3;
-    page.elapsed_s = 4000;
-    page.sigma_Nm = 0.5f;
-    ++t.snapshots_taken;
-    for (int k = 0; k < link::reg::kResidualValueCount; ++k)
-      page.values[k] = static_cast<float>(10000 * t.snapshots_taken + 1000 * joint + k);
+    for (const auto& [list, values] :
+         std::initializer_list<std::pair<link::Span, const float*>>{{SpanOf(reg::kEstimateA, kColumns), estimate},
+                                                                    {SpanOf(reg::kDeviationA, kColumns), deviation},
+                                                                    {SpanOf(reg::kEstimateB, kColumns), estimate},
+                                                                    {SpanOf(reg::kDeviationB, kColumns), deviation},
+                                                                    {SpanOf(reg::kResidualRms, kAxes), estimate},
+                                                                    {SpanOf(reg::kConsistency, kAxes), estimate}})
+      served = served && core::IsOk(device.Serve(list, values));
+    served = served && core::IsOk(raw.Serve(device.map(), 0));
+    all_served = served && core::IsOk(samples.Serve(device.map(), 1));
   }
 
   NorFlash flash{{2, 2048, 8, 0xFF}};
@@ -133,11 +134,8 @@ struct TestDevice {
   float estimate[kColumns], deviation[kColumns];
   link::TraceRing<1024> raw{1, &RecordWords, nullptr};
   link::TraceRing<1024> samples{8, &RecordWords, nullptr};
-  link::Device device{identity, live, transaction};
-  link::ResidualPages residuals{&TakeResiduals, this, kAxes};
-  FakeLearning learner;
-  link::LearningRegisters learning{learner.Functions(), device, kAxes};
-  int snapshots_taken = 0;
+  FakeEstimator estimator;
+  link::Device device{identity, live, transaction, estimator.Functions()};
   core::Status boot_status = core::Status::kOk;
   bool all_served = false;
 };

@@ -1,4 +1,4 @@
-// link - the trace ring: pages, re-reads, losses, gaps, new arms; and producer and reader as two threads.
+// link - the trace ring: pages read twice, losses, gaps, new recordings, and producer and reader as two threads.
 #include "armcal/link/trace.hpp"
 
 #include <gtest/gtest.h>
@@ -13,8 +13,8 @@ namespace {
 
 using namespace armcal;
 using core::Status;
+using link::Recording;
 using link::Trace;
-using link::TraceArm;
 using link::TraceMode;
 using link::TraceState;
 
@@ -23,9 +23,9 @@ constexpr std::uint32_t kMask = 0x1F;  // five channels
 using Ring = link::TraceRing<160>;     // 160 / (5 + 3) = 20 records
 constexpr std::uint32_t kRecords = 20;
 
-TraceArm Streaming(std::uint16_t number = 1) { return {number, TraceMode::kStreaming, 1, 0, 0, kMask, 0}; }
+Recording Streaming(std::uint16_t number = 1) { return {number, TraceMode::kStreaming, 1, 0, 0, kMask, 0}; }
 
-// The record of a tick, so that a reader can tell every word's place.
+// Each word of a record says which tick and which place it belongs to.
 std::uint16_t WordOf(std::uint32_t tick, std::uint32_t word) { return static_cast<std::uint16_t>(17 * tick + word); }
 
 Status Produce(Trace& trace, std::uint32_t tick, std::uint32_t generation = 1) {
@@ -36,7 +36,7 @@ Status Produce(Trace& trace, std::uint32_t tick, std::uint32_t generation = 1) {
   return trace.Push(record, generation);
 }
 
-// Reads the page word by word in odd portions and checks each.
+// Reads the page in portions that do not fit the records, and checks every word.
 void ExpectPage(Trace& trace, std::uint32_t first_record, std::uint32_t first_tick, std::uint32_t count) {
   const link::TracePage page = trace.Page();
   EXPECT_EQ(page.first_record, first_record);
@@ -58,7 +58,7 @@ void ExpectPage(Trace& trace, std::uint32_t first_record, std::uint32_t first_ti
 
 TEST(Trace, Page_StaysAsItIsUntilAcknowledged) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm(Streaming()), Status::kOk);
+  ASSERT_EQ(trace.Start(Streaming()), Status::kOk);
   EXPECT_EQ(trace.state(), TraceState::kWaiting);
   for (std::uint32_t tick = 100; tick < 105; ++tick) EXPECT_EQ(Produce(trace, tick), Status::kOk);
   ExpectPage(trace, 0, 100, 5);
@@ -76,7 +76,7 @@ TEST(Trace, Page_StaysAsItIsUntilAcknowledged) {
 
 TEST(Trace, WhenFull_RefusesTheNewRecord_CountsIt_AndThePageEndsAtTheGap) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm(Streaming()), Status::kOk);
+  ASSERT_EQ(trace.Start(Streaming()), Status::kOk);
   for (std::uint32_t tick = 0; tick < kRecords; ++tick) ASSERT_EQ(Produce(trace, tick), Status::kOk);
   for (std::uint32_t tick = kRecords; tick < kRecords + 6; ++tick) ASSERT_EQ(Produce(trace, tick), Status::kFull);
   EXPECT_EQ(trace.lost(), 6u);
@@ -91,7 +91,7 @@ TEST(Trace, WhenFull_RefusesTheNewRecord_CountsIt_AndThePageEndsAtTheGap) {
 
 TEST(Trace, OneShot_EndsWhenFull_AndLosesNothing) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm({1, TraceMode::kOneShot, 1, 0, 0, kMask, 0}), Status::kOk);
+  ASSERT_EQ(trace.Start({1, TraceMode::kOneShot, 1, 0, 0, kMask, 0}), Status::kOk);
   for (std::uint32_t tick = 0; tick < 3 * kRecords; ++tick) static_cast<void>(Produce(trace, tick));
   EXPECT_EQ(trace.state(), TraceState::kDone);
   EXPECT_EQ(trace.lost(), 0u);
@@ -100,7 +100,7 @@ TEST(Trace, OneShot_EndsWhenFull_AndLosesNothing) {
 
 TEST(Trace, StartTickAndLimit_BoundTheRecording) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm({1, TraceMode::kStreaming, 1, 50, 7, kMask, 0}), Status::kOk);
+  ASSERT_EQ(trace.Start({1, TraceMode::kStreaming, 1, 50, 7, kMask, 0}), Status::kOk);
   for (std::uint32_t tick = 40; tick < 50; ++tick) EXPECT_FALSE(trace.Offer(tick).recording);
   EXPECT_EQ(trace.state(), TraceState::kWaiting);
   for (std::uint32_t tick = 50; tick < 70; ++tick) static_cast<void>(Produce(trace, tick));
@@ -110,7 +110,7 @@ TEST(Trace, StartTickAndLimit_BoundTheRecording) {
 
 TEST(Trace, Decimation_TellsFirstAndLastOfEachWindow_AndStampsItsFirstTick) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm({1, TraceMode::kStreaming, 4, 8, 0, kMask, 0}), Status::kOk);
+  ASSERT_EQ(trace.Start({1, TraceMode::kStreaming, 4, 8, 0, kMask, 0}), Status::kOk);
   const std::uint16_t record[kWordsPerRecord] = {};
   for (std::uint32_t tick = 8; tick < 24; ++tick) {
     const link::TraceTurn turn = trace.Offer(tick);
@@ -127,7 +127,7 @@ TEST(Trace, Decimation_TellsFirstAndLastOfEachWindow_AndStampsItsFirstTick) {
 
 TEST(Trace, MissingTick_EndsThePage) {
   Ring trace(8, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm(Streaming()), Status::kOk);
+  ASSERT_EQ(trace.Start(Streaming()), Status::kOk);
   for (const std::uint32_t tick : {0u, 8u, 16u, 32u, 40u}) ASSERT_EQ(Produce(trace, tick), Status::kOk);
   EXPECT_EQ(trace.Page().count, 3u);
   ASSERT_EQ(trace.Acknowledge(3), Status::kOk);
@@ -137,7 +137,7 @@ TEST(Trace, MissingTick_EndsThePage) {
 
 TEST(Trace, MissingTickInsideAWindow_BeginsTheWindowAnew) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm({1, TraceMode::kStreaming, 4, 0, 0, kMask, 0}), Status::kOk);
+  ASSERT_EQ(trace.Start({1, TraceMode::kStreaming, 4, 0, 0, kMask, 0}), Status::kOk);
   static_cast<void>(trace.Offer(0));
   static_cast<void>(trace.Offer(1));
   EXPECT_TRUE(trace.Offer(3).first) << "ticks 0, 1, 3, 4 must never be averaged into one record";
@@ -151,7 +151,7 @@ TEST(Trace, MissingTickInsideAWindow_BeginsTheWindowAnew) {
 
 TEST(Trace, NewGeneration_EndsThePage) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm(Streaming()), Status::kOk);
+  ASSERT_EQ(trace.Start(Streaming()), Status::kOk);
   for (std::uint32_t tick = 0; tick < 6; ++tick) ASSERT_EQ(Produce(trace, tick, tick < 4 ? 7 : 8), Status::kOk);
   EXPECT_EQ(trace.Page().count, 4u);
   EXPECT_EQ(trace.Page().generation, 7u);
@@ -159,17 +159,17 @@ TEST(Trace, NewGeneration_EndsThePage) {
   EXPECT_EQ(trace.Page().generation, 8u);
 }
 
-TEST(Trace, NewArm_DropsTheOldRecords_AndOffStops) {
+TEST(Trace, NewRecording_DropsTheOldRecords_AndOffStops) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm(Streaming(1)), Status::kOk);
+  ASSERT_EQ(trace.Start(Streaming(1)), Status::kOk);
   for (std::uint32_t tick = 0; tick < 9; ++tick) ASSERT_EQ(Produce(trace, tick), Status::kOk);
   ASSERT_EQ(trace.Page().count, 9u);
-  ASSERT_EQ(trace.Arm(Streaming(2)), Status::kOk);
-  EXPECT_EQ(trace.Page().count, 0u) << "the producer has not taken the arm yet";
+  ASSERT_EQ(trace.Start(Streaming(2)), Status::kOk);
+  EXPECT_EQ(trace.Page().count, 0u) << "the producer has not taken it over yet";
   for (std::uint32_t tick = 20; tick < 23; ++tick) ASSERT_EQ(Produce(trace, tick), Status::kOk);
   ExpectPage(trace, 0, 20, 3);
-  TraceArm off;
-  ASSERT_EQ(trace.Arm(off), Status::kOk);
+  Recording off;
+  ASSERT_EQ(trace.Start(off), Status::kOk);
   EXPECT_FALSE(trace.Offer(23).recording);
   EXPECT_EQ(trace.state(), TraceState::kOff);
   EXPECT_EQ(trace.Page().count, 0u);
@@ -177,18 +177,18 @@ TEST(Trace, NewArm_DropsTheOldRecords_AndOffStops) {
   EXPECT_EQ(trace.ReadPage(0, 1, &word), Status::kBadAddress);
 }
 
-TEST(Trace, Arm_ThatCannotBe_IsRefusedAndLeavesTheOldOne) {
+TEST(Trace, Recording_ThatCannotBe_IsRefusedAndLeavesTheOldOne) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm(Streaming(5)), Status::kOk);
-  EXPECT_EQ(trace.Arm({6, TraceMode::kStreaming, 0, 0, 0, kMask, 0}), Status::kOutOfRange);
-  EXPECT_EQ(trace.Arm({6, static_cast<TraceMode>(9), 1, 0, 0, kMask, 0}), Status::kOutOfRange);
-  EXPECT_EQ(trace.Arm({6, TraceMode::kStreaming, 1, 0, 0, 0x100, 0}), Status::kOutOfRange);
+  ASSERT_EQ(trace.Start(Streaming(5)), Status::kOk);
+  EXPECT_EQ(trace.Start({6, TraceMode::kStreaming, 0, 0, 0, kMask, 0}), Status::kOutOfRange);
+  EXPECT_EQ(trace.Start({6, static_cast<TraceMode>(9), 1, 0, 0, kMask, 0}), Status::kOutOfRange);
+  EXPECT_EQ(trace.Start({6, TraceMode::kStreaming, 1, 0, 0, 0x100, 0}), Status::kOutOfRange);
   EXPECT_EQ(trace.requested().number, 5);
 }
 
 TEST(Trace, TickNearItsWrap_IsNoGap) {
   Ring trace(1, &test::RecordWords, nullptr);
-  ASSERT_EQ(trace.Arm({1, TraceMode::kStreaming, 1, 0xFFFFFFFCu, 0, kMask, 0}), Status::kOk);
+  ASSERT_EQ(trace.Start({1, TraceMode::kStreaming, 1, 0xFFFFFFFCu, 0, kMask, 0}), Status::kOk);
   for (std::uint32_t i = 0; i < 8; ++i) ASSERT_EQ(Produce(trace, 0xFFFFFFFCu + i), Status::kOk);
   ExpectPage(trace, 0, 0xFFFFFFFCu, 8);
 }
@@ -196,7 +196,7 @@ TEST(Trace, TickNearItsWrap_IsNoGap) {
 TEST(Trace, BetweenTwoThreads_EveryRecordIsRightOrCounted) {
   static Ring trace(1, &test::RecordWords, nullptr);
   constexpr std::uint32_t kTicks = 200000;
-  ASSERT_EQ(trace.Arm(Streaming()), Status::kOk);
+  ASSERT_EQ(trace.Start(Streaming()), Status::kOk);
   std::atomic<bool> done{false};
   std::thread producer([&] {
     for (std::uint32_t tick = 0; tick < kTicks; ++tick)

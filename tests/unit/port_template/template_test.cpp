@@ -1,4 +1,4 @@
-// port_template tests - what a porter copies works as it is: with lib's table store, and byte by byte.
+// port_template tests - the template works as it is: with lib's table store, and byte by byte.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -14,7 +14,7 @@ namespace {
 using core::Status;
 
 TEST(Template, Storage_KeepsTheRulesOfFlash) {
-  const Storage storage = TargetStorage();
+  const hardware::Storage storage = TargetStorage();
   const std::array<std::uint8_t, 8> bytes = {1, 2, 3, 4, 5, 6, 7, 8};
   ASSERT_EQ(storage.Erase(0), Status::kOk);
   EXPECT_EQ(storage.Program(8, bytes.data(), 8), Status::kOk);
@@ -28,7 +28,7 @@ TEST(Template, Storage_KeepsTheRulesOfFlash) {
 }
 
 TEST(Template, Storage_CarriesATable) {
-  const Storage storage = TargetStorage();
+  const hardware::Storage storage = TargetStorage();
   ASSERT_EQ(storage.Erase(0), Status::kOk);
   ASSERT_EQ(storage.Erase(1), Status::kOk);
   constexpr std::uint32_t kSchema = 0xC0FFEE, kWords = 500;
@@ -46,7 +46,7 @@ TEST(Template, Storage_CarriesATable) {
 }
 
 TEST(Template, Serial_PassesBytesInOrderAndTakesNoMoreThanItHolds) {
-  const Serial serial = TargetSerial();
+  const hardware::Serial serial = TargetSerial();
   for (int k = 0; k < 300; ++k) OnReceived(static_cast<std::uint8_t>(k));
   std::array<std::uint8_t, 300> bytes = {};
   EXPECT_EQ(serial.Read(bytes.data(), 100), 100u);
@@ -61,7 +61,7 @@ TEST(Template, Serial_PassesBytesInOrderAndTakesNoMoreThanItHolds) {
 }
 
 TEST(Template, Clock_CountsTicksAndMilliseconds) {
-  const Clock clock = TargetClock();
+  const hardware::Clock clock = TargetClock();
   const std::uint32_t tick = clock.Ticks(), ms = clock.Ms();
   for (std::uint32_t k = 1; k <= 5 * kTickRate_Hz; ++k) EXPECT_EQ(CountTick(), tick + k);
   EXPECT_EQ(clock.Ms() - ms, 5000u);

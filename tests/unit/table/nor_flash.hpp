@@ -1,11 +1,11 @@
-// table - a NOR flash that can be cut off at any instant; knows no record.
+// table - a NOR flash whose power can fail at any instant.
 #pragma once
 
 #include <cstdint>
 #include <random>
 #include <vector>
 
-#include "armcal/port/storage.hpp"
+#include "armcal/hardware/storage.hpp"
 
 namespace armcal::test {
 
@@ -14,8 +14,8 @@ struct Geometry {
   std::uint8_t erased;
 };
 
-// Where the power fails: in which operation (program or erase, counted from 0), and how many of its bytes are done by
-// then. The byte at the cut has some of its bits done.
+// Where the power fails: in which operation (program or erase, counted from 0) and after how many of its bytes. Of the
+// next byte, some bits are done.
 struct Cut {
   int operation;
   std::uint32_t bytes;
@@ -26,7 +26,7 @@ class NorFlash {
   explicit NorFlash(const Geometry& g)
       : geometry_(g), cells_(g.sectors * g.sector_bytes, g.erased), written_(cells_.size() / g.unit, false) {}
 
-  port::Storage storage() {
+  hardware::Storage storage() {
     return {this, geometry_.sectors, geometry_.sector_bytes, geometry_.unit, geometry_.erased, &Read, &Program, &Erase};
   }
 
@@ -44,7 +44,7 @@ class NorFlash {
   int operations() const { return operations_; }
   int erases(std::uint32_t sector) const { return sector < erases_.size() ? erases_[sector] : 0; }
   bool dead() const { return dead_; }
-  bool misused() const { return misused_; }                               // a unit programmed twice, or not aligned
+  bool misused() const { return misused_; }  // a unit was programmed twice, or was not aligned
   const std::vector<std::uint32_t>& lengths() const { return lengths_; }  // bytes of each operation
 
  private:

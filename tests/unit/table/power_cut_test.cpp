@@ -1,4 +1,4 @@
-// table - the power fails at every byte of every operation, and again during recovery: the table is old or new.
+// table - the power fails at every byte of every operation, and again during recovery. The table is the old or the new.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -20,7 +20,7 @@ using test::NorFlash;
 using test::Table;
 using test::Words;
 
-// Powers up, loads, and tries to save `number`. Returns what was loaded (empty if nothing).
+// Powers up, loads, and tries to save `number`. Returns what was loaded; empty if there was nothing.
 Words BootAndSave(NorFlash& flash, int number) {
   TableStore store(flash.storage(), kSchema, kWords);
   Words loaded(kWords);
@@ -40,8 +40,8 @@ Words PowerUpAndLoad(NorFlash& flash) {
   return loaded;
 }
 
-// Every place where one save of this geometry can be cut: before, inside at every byte, after every operation. Sectors
-// erase as a whole on most parts; a cut erase leaves a part erased, which a coarser grid of bytes covers.
+// Every place where a save of this geometry can be cut: before and after each operation, and at every byte of it. An
+// erase that is cut leaves a part of the sector erased. For erases a coarser grid of bytes is enough.
 std::vector<Cut> AllCuts(const Geometry& g) {
   NorFlash flash(g);
   BootAndSave(flash, 1);
@@ -57,7 +57,7 @@ std::vector<Cut> AllCuts(const Geometry& g) {
 
 class PowerCut : public testing::TestWithParam<Geometry> {};
 
-// `tables`: how many saves precede the one that is cut (0: the first one ever).
+// `tables`: how many saves come before the one that is cut. 0: it is the first one.
 void CutOnce(const Geometry& g, int tables) {
   for (const Cut& cut : AllCuts(g)) {
     NorFlash flash(g);
@@ -104,12 +104,12 @@ INSTANTIATE_TEST_SUITE_P(Geometries, PowerCut,
                                          Geometry{2, 256, 32, 0x00}, Geometry{6, 64, 8, 0xFF},
                                          Geometry{4, 128, 64, 0x00}));
 
-// The oracle must be able to fail: a store whose commit word came before its payload would hand out a mixture.
+// The oracle must be able to fail. A store that wrote the commit word before the payload would hand out a mixture.
 TEST(PowerCutOracle, OfARecordWhosePayloadWasTornAfterTheCommit_SeesIt) {
   NorFlash flash({2, 256, 4, 0xFF});
   BootAndSave(flash, 1);
   BootAndSave(flash, 2);
-  flash.cells()[256 + 40] ^= 0x10;  // what a torn byte under a valid commit word looks like
+  flash.cells()[256 + 40] ^= 0x10;  // a byte that is half written, with a valid commit word
   const Words found = PowerUpAndLoad(flash);
   EXPECT_EQ(found, Table(1)) << "the checksum, not the commit word alone, must decide";
 }

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "armcal/core/words.hpp"
 #include "tests/unit/table/nor_flash.hpp"
 #include "tests/unit/table/tables.hpp"
 
@@ -36,7 +37,7 @@ Status SaveAll(TableStore& store, const Words& words) {
   return core::IsOk(begun) ? Finish(store) : begun;
 }
 
-// A fresh power-up: what is loaded; empty unless kOk.
+// Powers up and loads. Empty unless kOk.
 Words Boot(NorFlash& flash, Status expected = Status::kOk, std::uint32_t schema = kSchema) {
   TableStore store(flash.storage(), schema, kWords);
   Words words(kWords);
@@ -178,7 +179,7 @@ TEST(Store, Revoked_IsAsBeforeTheSave) {
 TEST(Store, WithAWrappedSequence_TakesTheNewerOne) {
   NorFlash flash(kNor);
   Prepare(flash, 1);
-  // The record in slot 0 is made one of sequence 0xFFFFFFFF, checksum and all.
+  // Gives the record in slot 0 the sequence 0xFFFFFFFF and the checksum for it.
   std::uint8_t* record = flash.cells().data();
   core::PutBytes32(record + 16, 0xFFFFFFFFu);
   const std::uint32_t covered = table::kHeaderBytes + 2 * kWords;

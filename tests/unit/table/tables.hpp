@@ -1,4 +1,4 @@
-// table - tables whose words tell which one they are; the store's tests save and load them.
+// table - tables whose words say which table they belong to.
 #pragma once
 
 #include <cstdint>

@@ -1,19 +1,20 @@
-// port - what non-volatile memory a target supplies; knows no record and no driver.
+// hardware - the non-volatile memory that a target supplies.
 #pragma once
 
 #include <cstdint>
 
 #include "armcal/core/status.hpp"
 
-namespace armcal::port {
+namespace armcal::hardware {
 
-// Erasable memory of equal sectors. Every function is bounded, returns when the operation is complete, and answers kOk
-// or kStorageFault (a driver may report its ECC errors so). Context: background.
+// Erasable memory of equal sectors. Every function takes a bounded time, returns when the operation is complete, and
+// answers kOk or kStorageFault. A driver may report errors of its error correction as kStorageFault. Context:
+// background.
 struct Storage {
   void* context;
   std::uint32_t sector_count;  // at least 2; the lower half is slot 0, the upper half slot 1
   std::uint32_t sector_bytes;
-  std::uint32_t program_unit;  // bytes programmed at once, a power of two up to 64; a unit is written once per erase
+  std::uint32_t program_unit;  // bytes of one write, a power of two up to 64; a unit is written once after each erase
   std::uint8_t erased_value;   // what an erased byte reads as
 
   // `address` counts bytes from the start of sector 0.
@@ -31,4 +32,4 @@ struct Storage {
   core::Status Erase(std::uint32_t sector) const { return erase(context, sector); }
 };
 
-}  // namespace armcal::port
+}  // namespace armcal::hardware

@@ -1,5 +1,5 @@
-// link - where an RTU frame ends: by length and checksum, or by silence; knows no line and no register.
-#include "armcal/link/rtu_framer.hpp"
+// link - from the bytes of a serial line to a request and its reply. An RTU frame ends by its length or by silence.
+#include "armcal/link/rtu.hpp"
 
 #include "armcal/core/crc.hpp"
 
@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kNever = 0;
 
-// Length of a whole request frame by what is there of it; kNever while or because it cannot be told.
+// The length of a whole request, by the part of it that is there. kNever: it cannot be told, now or at all.
 std::size_t RequestBytes(const std::uint8_t* frame, std::size_t filled) {
   switch (frame[1]) {
     case 3:
@@ -73,7 +73,7 @@ RtuFramer::Result RtuFramer::OnBytes(const std::uint8_t* bytes, std::size_t coun
     filled_ = 0;
   }
   if ((filled_ != 0 || overrun_) && now_ms - last_byte_ms_ >= silence_ms_) {
-    // A whole frame of a function or length we did not expect still deserves its exception.
+    // A whole frame whose function or length was not expected gets an exception as its answer.
     const bool whole = !overrun_ && ChecksumHolds();
     overrun_ = false;
     if (whole) {
@@ -103,6 +103,24 @@ std::size_t RtuFramer::FinishReply(std::uint8_t* frame, std::size_t pdu_bytes) c
   frame[pdu_bytes + 1] = static_cast<std::uint8_t>(crc & 0xFFu);
   frame[pdu_bytes + 2] = static_cast<std::uint8_t>(crc >> 8);
   return pdu_bytes + 3;
+}
+
+void RtuService::Poll() {
+  if (sent_ < reply_bytes_) {
+    sent_ += serial_.Write(reply_ + sent_, reply_bytes_ - sent_);
+    return;
+  }
+  if (taken_ == there_) {
+    taken_ = 0;
+    there_ = serial_.Read(bytes_, sizeof bytes_);
+  }
+  std::size_t used = 0;
+  const RtuFramer::Result result = framer_.OnBytes(bytes_ + taken_, there_ - taken_, clock_.Ms(), used);
+  taken_ += used;
+  if (result == RtuFramer::Result::kNothing) return;
+  const std::size_t pdu = engine_.Handle(framer_.pdu(), framer_.pdu_bytes(), reply_ + 1);
+  sent_ = 0;
+  reply_bytes_ = result == RtuFramer::Result::kBroadcast || pdu == 0 ? 0 : framer_.FinishReply(reply_, pdu);
 }
 
 }  // namespace armcal::link

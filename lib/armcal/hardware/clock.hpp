@@ -1,11 +1,12 @@
-// port - what time a target supplies; integers only, because a float clock loses its ticks after hours.
+// hardware - the clock that a target supplies.
 #pragma once
 
 #include <cstdint>
 
-namespace armcal::port {
+namespace armcal::hardware {
 
-// Both counters wrap; only differences are used. Context: any.
+// Both counters are integers, because a float would lose ticks after some hours. They wrap, and only differences are
+// used. Context: any.
 struct Clock {
   void* context;
   std::uint32_t (*ticks)(void* context);  // control ticks since power-up
@@ -15,4 +16,4 @@ struct Clock {
   std::uint32_t Ms() const { return ms(context); }
 };
 
-}  // namespace armcal::port
+}  // namespace armcal::hardware

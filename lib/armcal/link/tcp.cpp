@@ -1,5 +1,5 @@
-// link - the MBAP header, byte by byte; knows no socket and no function code.
-#include "armcal/link/tcp_framer.hpp"
+// link - finds the end of a TCP frame by its header, byte by byte.
+#include "armcal/link/tcp.hpp"
 
 #include "armcal/core/words.hpp"
 

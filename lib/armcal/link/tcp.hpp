@@ -1,0 +1,76 @@
+// link - Modbus TCP: frames out of a byte stream, and the service that answers them for a few connections.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "armcal/link/pdu_engine.hpp"
+
+namespace armcal::link {
+
+inline constexpr std::size_t kMbapBytes = 7;
+inline constexpr std::size_t kMaxTcpFrame = kMbapBytes + kMaxPdu;
+
+// The receiver of one connection. A frame ends where its header says, whatever its function code is. After a header
+// with another protocol than 0 or a length outside 2..254 the beginning of the next frame is unknown, so the connection
+// has to be closed.
+class TcpFramer {
+ public:
+  enum class Result : std::uint8_t { kNeedMore, kFrame, kBroken };
+
+  // Takes bytes up to the end of one frame; `used` says how many. Call it again with the rest. Context: background.
+  Result OnBytes(const std::uint8_t* bytes, std::size_t count, std::size_t& used);
+
+  // Function code and data. Valid after kFrame, until the next OnBytes.
+  const std::uint8_t* pdu() const { return frame_ + kMbapBytes; }
+  std::size_t pdu_bytes() const { return filled_ - kMbapBytes; }
+
+  // Fills the header of an answer whose PDU has `pdu_bytes` bytes. header: [kMbapBytes].
+  void PutReplyHeader(std::size_t pdu_bytes, std::uint8_t* header) const;
+
+  bool mid_frame() const { return filled_ != 0 && !complete_; }
+  void Reset() { *this = TcpFramer(); }
+
+ private:
+  std::uint8_t frame_[kMaxTcpFrame] = {};
+  std::size_t filled_ = 0;
+  bool complete_ = false;
+};
+
+// One framer for each connection slot. A byte server calls the three functions; `context` is the TcpService.
+template <int kSlots>
+class TcpService {
+ public:
+  static constexpr std::size_t kMaxReply = kMaxTcpFrame;
+
+  explicit TcpService(PduEngine& engine) : engine_(engine) {}
+
+  // A new connection has taken the slot.
+  static void Open(void* context, int slot) { Self(context).framers_[slot].Reset(); }
+
+  // Takes at most one request out of `bytes` and puts its reply into `reply` [kMaxReply]. `used` says how many bytes it
+  // took; call it again with the rest. False: the stream cannot be understood any more, close the connection.
+  static bool Receive(void* context, int slot, const std::uint8_t* bytes, std::size_t count, std::size_t* used,
+                      std::uint8_t* reply, std::size_t* reply_bytes) {
+    TcpFramer& framer = Self(context).framers_[slot];
+    *reply_bytes = 0;
+    const TcpFramer::Result result = framer.OnBytes(bytes, count, *used);
+    if (result == TcpFramer::Result::kBroken) return false;
+    if (result == TcpFramer::Result::kNeedMore) return true;
+    const std::size_t pdu = Self(context).engine_.Handle(framer.pdu(), framer.pdu_bytes(), reply + kMbapBytes);
+    framer.PutReplyHeader(pdu, reply);
+    *reply_bytes = kMbapBytes + pdu;
+    return true;
+  }
+
+  // True if a part of a frame is there. The rest should follow soon.
+  static bool MidFrame(void* context, int slot) { return Self(context).framers_[slot].mid_frame(); }
+
+ private:
+  static TcpService& Self(void* context) { return *static_cast<TcpService*>(context); }
+
+  PduEngine& engine_;
+  TcpFramer framers_[kSlots];
+};
+
+}  // namespace armcal::link

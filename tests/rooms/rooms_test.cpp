@@ -15,18 +15,18 @@ const std::string kLib = "lib/armcal/";
 
 // clang-format off
 const Edges kEdges = {
-    // The firmware library: core <- math <- {signal, model, filter, physical} <- monitor <- estimator;
-    // core, model <- feedforward; core <- port <- table <- link. Model and filter meet in estimator only.
+    // The firmware library. Model and filter meet in estimator only. armcal.hpp is the entry of all.
+    {"lib/armcal",             {kLib}},
     {"lib/armcal/core",        {}},
-    {"lib/armcal/math",        {kLib + "core"}},
+    {"lib/armcal/math",        {}},
     {"lib/armcal/model",       {kLib + "core", kLib + "math"}},
-    {"lib/armcal/signal",      {kLib + "core", kLib + "math", kLib + "model"}},
+    {"lib/armcal/signal",      {kLib + "math", kLib + "model"}},
     {"lib/armcal/filter",      {kLib + "core", kLib + "math"}},
     {"lib/armcal/physical",    {kLib + "core", kLib + "math"}},
     {"lib/armcal/feedforward", {kLib + "core", kLib + "math", kLib + "model"}},
-    {"lib/armcal/monitor",     {kLib + "core", kLib + "math", kLib + "signal", kLib + "filter", kLib + "physical"}},
+    {"lib/armcal/monitor",     {kLib + "math"}},
     {"lib/armcal/estimator",   {kLib + "core", kLib + "math", kLib + "model", kLib + "signal", kLib + "filter",
-                                kLib + "physical", kLib + "monitor", kLib + "feedforward"}},
+                                kLib + "physical", kLib + "monitor"}},
     {"lib/armcal/port",        {kLib + "core"}},
     {"lib/armcal/table",       {kLib + "core", kLib + "port"}},
     {"lib/armcal/link",        {kLib + "core", kLib + "port", kLib + "table"}},

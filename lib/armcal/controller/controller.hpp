@@ -1,14 +1,12 @@
-// controller - introduces estimators, feed-forward, table and link to each other; knows no board and no bus.
+// controller - connects estimators, feed-forward, table and link to one motion controller without a board and a bus.
 #pragma once
 
 #include <atomic>
 #include <tuple>
 #include <utility>
 
-#include "armcal/controller/raw_trace.hpp"
-#include "armcal/controller/set_point.hpp"
+#include "armcal/controller/trace_records.hpp"
 #include "armcal/estimator/estimator.hpp"
-#include "armcal/estimator/image.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
 #include "armcal/link/device.hpp"
 #include "armcal/link/learning_registers.hpp"
@@ -20,8 +18,15 @@
 
 namespace armcal::controller {
 
-// One motion controller: lives as long as the power is on; some 80 KB for six joints. Filters: one or two of those
-// that estimator::Estimator takes; the first is served as filter A, the second as filter B.
+// Where the axes shall be. Shapes: [n], rad (m), rad/s, rad/s^2.
+template <int n>
+struct SetPoint {
+  float q[n], qd[n], qdd[n];
+};
+
+// One motion controller. It lives as long as the power is on, and takes some 80 KB for six joints. Filters: one or two
+// of those that estimator::Estimator takes. Registers call the first one filter A and the second one filter B. Both
+// work on the samples of one intake, so the signal path and the regressor run once.
 template <class Model, class... Filters>
 class Controller {
   static_assert(sizeof...(Filters) == 1 || sizeof...(Filters) == 2);
@@ -37,9 +42,10 @@ class Controller {
       : clock_(clock),
         store_(storage, Model::kSchema, kWords),
         transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords),
-        device_(Describe(identity), live_, transaction_) {
+        device_(Describe(identity), live_, transaction_),
+        estimators_(Shared<Filters>()...) {
     model::Encode(estimator::DefaultTable<Model>(), active_);
-    filter<0>().SetResiduals(&residuals_);
+    estimator<0>().SetResiduals(&residuals_);
   }
   Controller(const Controller&) = delete;
 
@@ -89,19 +95,15 @@ class Controller {
     return status;
   }
 
-  // One measured sample. Constant time. kFull: an estimator is late and lost one (counted). Context: tick.
+  // What was measured in one tick. Constant time. kFull: the estimators are late and lost a sample (counted).
+  // Context: tick.
   core::Status Push(const model::RawSample<n>& raw) {
-    core::Status status = core::Status::kOk;
-    const auto push = [&](auto& estimator) {
-      const core::Status pushed = estimator.Push(raw);
-      if (!core::IsOk(pushed)) status = pushed;
-    };
-    ForEach(push);
+    const core::Status status = intake_.Push(raw);
     if (trace_ != nullptr) RecordTick(raw);
     return status;
   }
 
-  // One bounded slice of everything that has time. False: nothing was left to do. Context: background.
+  // One bounded slice of all work that is not the tick's. False: nothing was left to do. Context: background.
   bool Step() {
     device_.Step(clock_.Ms());
     bool busy = store_.busy() || transaction_.state() == link::TransactionState::kCommitting;
@@ -113,14 +115,18 @@ class Controller {
   link::PduEngine& engine() { return device_.engine(); }  // for a link::RtuService or TcpService
   link::RegisterMap& map() { return device_.map(); }      // for blocks of the integrator's, before the first request
   template <int k>
-  auto& filter() {
+  auto& estimator() {
     return std::get<k>(estimators_);
   }
   const feedforward::FeedForward<Model>& feed_forward() const { return feed_forward_; }  // context: tick
-  const estimator::Image<Model>& in_force() const { return images_[in_force_.load(std::memory_order_relaxed)]; }
+  const estimator::AdoptedTable<Model>& adopted() const { return adopted_[in_force_.load(std::memory_order_relaxed)]; }
   std::uint32_t generation() const { return generation_; }  // adoptions since power-up; context: background
 
  private:
+  template <class Filter>
+  estimator::Intake<Model>& Shared() {
+    return intake_;
+  }
   template <class Call>
   void ForEach(Call call) {
     std::apply([&](auto&... estimator) { (call(estimator), ...); }, estimators_);
@@ -164,8 +170,8 @@ class Controller {
     live_.tick = clock_.Ticks();
     live_.enabled_axes = enabled_axes_.load(std::memory_order_relaxed);
     live_.clamp_count = clamp_count_.load(std::memory_order_relaxed);
-    live_.sample_gaps = filter<0>().refused_samples();
-    (Show(k, filter<k>()), ...);
+    live_.sample_gaps = intake_.refused();
+    (Show(k, estimator<k>()), ...);
   }
   template <class Estimator>
   void Show(std::size_t k, Estimator& estimator) {
@@ -187,7 +193,7 @@ class Controller {
     if (turn.first) record_.Clear();
     record_.Add(raw, told_q_, told_Nm_);
     if (!turn.last) return;
-    std::uint16_t words[estimator::RawRecordWords<n>(estimator::kRawAll)];
+    std::uint16_t words[RawRecordWords<n>(kRawAll)];
     record_.Write(trace_->armed().channels, words);
     (void)trace_->Push(words, feed_forward_.generation());
   }
@@ -199,7 +205,7 @@ class Controller {
     const auto& c = *static_cast<const Controller*>(self);
     page.generation = c.generation_;
     page.elapsed_s = c.residuals_.elapsed_s();
-    page.sigma_Nm = c.in_force().sigma_Nm[joint];
+    page.sigma_Nm = c.adopted().sigma_Nm[joint];
     c.residuals_.Write(joint, page.values);
   }
   static core::Status Hold(void* self, bool hold) {
@@ -236,11 +242,11 @@ class Controller {
   }
 
   bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
-  // The image that nobody reads: estimators hold the other one, feed-forward a copy.
-  estimator::Image<Model>& Spare() { return images_[1 - in_force_.load(std::memory_order_relaxed)]; }
+  // The adopted table that nobody reads: the estimators work with the other one, feed-forward with a copy.
+  estimator::AdoptedTable<Model>& Spare() { return adopted_[1 - in_force_.load(std::memory_order_relaxed)]; }
   // kOutOfRange, too: a filter's form cannot hold what the table asks for.
   core::Status BuildSpare() {
-    const core::Status built = estimator::BuildImage(table_, generation_ + 1, work_, Spare());
+    const core::Status built = estimator::BuildAdoptedTable(table_, generation_ + 1, rigid_, Spare());
     if (!core::IsOk(built)) return built;
     bool suits = true;
     ForEach([&](auto& estimator) { suits &= estimator.Suits(Spare()); });
@@ -249,7 +255,8 @@ class Controller {
   void PutInForce() {
     const std::uint32_t now = clock_.Ticks();
     adopted_tick_.store(now, std::memory_order_relaxed);
-    ForEach([&](auto& estimator) { estimator.Adopt(Spare(), now); });
+    ForEach([&](auto& estimator) { estimator.Restart(Spare(), now); });
+    intake_.Adopt(Spare(), now);
     generation_ = Spare().committed.generation;
     in_force_.store(1 - in_force_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }
@@ -263,16 +270,17 @@ class Controller {
 
   feedforward::FeedForward<Model> feed_forward_;
   link::Trace* trace_ = nullptr;
-  estimator::RawRecord<n> record_;          // the tick's, as the two below
+  RawRecord<n> record_;                     // the tick's, as the two below
   float told_q_[n] = {}, told_Nm_[n] = {};  // by the last FeedForward
-  std::tuple<estimator::Estimator<Model, Filters>...> estimators_;
+  estimator::Intake<Model> intake_;
+  std::tuple<estimator::Estimator<Model, Filters, estimator::Intake<Model>&>...> estimators_;
   estimator::Estimates<Model> estimates_[kFilters];
   monitor::ResidualStatistics<n> residuals_;
   link::ResidualPages residual_pages_{TakeResiduals, this, n};
   link::LearningRegisters learning_{{this, Hold, Reset}, device_, n};
   estimator::Table<Model> table_;
-  estimator::ImageWork<Model> work_;
-  estimator::Image<Model> images_[2];
+  estimator::RigidPrior<Model, float> rigid_;
+  estimator::AdoptedTable<Model> adopted_[2];
   std::uint32_t generation_ = 0;
   std::atomic<int> in_force_{0};
   std::atomic<std::uint32_t> adopted_tick_{0}, enabled_axes_{0}, feedforward_state_{0}, clamp_count_{0};

@@ -6,9 +6,9 @@
 // is phi0 + J S w~' D^-1 U^-1 (b - b0). T: float on the target, double on the host. Context: background.
 #pragma once
 
-#include "armcal/math/ud.hpp"
+#include "armcal/math/symmetric.hpp"
 #include "armcal/model/contract.hpp"
-#include "armcal/physical/physical.hpp"
+#include "armcal/physical/body.hpp"
 
 namespace armcal::estimator {
 

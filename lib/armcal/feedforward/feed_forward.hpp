@@ -3,7 +3,7 @@
 
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/status.hpp"
-#include "armcal/feedforward/committed.hpp"
+#include "armcal/model/evaluate.hpp"
 
 namespace armcal::feedforward {
 
@@ -14,7 +14,7 @@ class FeedForward {
 
   // Hands over the next committed set; it takes effect at the next tick. kAxisEnabled: an axis is enabled and the
   // set is not bumpless; nothing changed. Context: background.
-  core::Status Offer(const Committed<Model>& next, bool any_axis_enabled) {
+  core::Status Offer(const model::Committed<Model>& next, bool any_axis_enabled) {
     if (any_axis_enabled && !next.bumpless) return core::Status::kAxisEnabled;
     offered_.Post(next);
     return core::Status::kOk;
@@ -41,8 +41,8 @@ class FeedForward {
     const float share =
         math::Select(blending, static_cast<float>(blended_ticks_) / Positive(active_.blend_ticks), 1.0f);
     float before[n], now[n];
-    ModelTorque(previous_, state, previous_memory_, rows_, before);
-    ModelTorque(active_, state, active_memory_, rows_, now);
+    model::ModelTorque(previous_, state, previous_memory_, rows_, before);
+    model::ModelTorque(active_, state, active_memory_, rows_, now);
 
     core::Status status = active_.valid ? core::Status::kOk : core::Status::kEmpty;
     const std::uint32_t fading = math::MaskOf(blending && previous_.valid);
@@ -80,10 +80,10 @@ class FeedForward {
     return math::Max(-limit, math::Min(limit, tau));
   }
 
-  core::Mailbox<Committed<Model>> offered_;
-  Committed<Model> active_, previous_;
-  Memory<Model> active_memory_, previous_memory_;
-  Rows<Model> rows_ = {};
+  core::Mailbox<model::Committed<Model>> offered_;
+  model::Committed<Model> active_, previous_;
+  model::Memory<Model> active_memory_, previous_memory_;
+  model::Rows<Model> rows_ = {};
   std::uint32_t blended_ticks_ = 0;
   std::uint32_t clamp_count_ = 0;
 };

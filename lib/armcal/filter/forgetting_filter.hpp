@@ -1,11 +1,9 @@
 // filter - least squares of the data with exponential forgetting, as an information triangle; knows columns only.
 #pragma once
 
+#include "armcal/filter/factor.hpp"
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
-#include "armcal/filter/ud_estimate.hpp"
-#include "armcal/filter/whole_rows.hpp"
-#include "armcal/math/givens.hpp"
 
 namespace armcal::filter {
 

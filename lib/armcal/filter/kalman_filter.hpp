@@ -1,10 +1,9 @@
 // filter - the Kalman filter of a constant state with process noise; knows columns, not what they mean.
 #pragma once
 
+#include "armcal/filter/factor.hpp"
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
-#include "armcal/filter/ud_estimate.hpp"
-#include "armcal/filter/whole_rows.hpp"
 
 namespace armcal::filter {
 
@@ -167,5 +166,12 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   ColumnRange reset_ = {};  // what remains of a reset
   std::uint32_t floor_count_ = 0, clamp_count_ = 0;
 };
+
+// The Kalman filter over [front, dense, eta]. Rows are linearised at the estimate before the sample: y = tau - tau(x0)
+// + h x0, where h = [columns, d tau / d eta] at x0. Whoever makes the rows keeps to that (estimator/live_model.hpp). In
+// all else it is the same filter. The block form serves wherever process noise is on front columns only, because eta is
+// a dense column.
+template <class Layout, Form form = Form::kDense>
+using ExtendedKalmanFilter = KalmanFilter<Layout, form, Beside::kEta>;
 
 }  // namespace armcal::filter

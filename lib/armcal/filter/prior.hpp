@@ -11,7 +11,7 @@
 
 #include <cstdint>
 
-#include "armcal/math/ud.hpp"
+#include "armcal/math/symmetric.hpp"
 
 namespace armcal::filter {
 

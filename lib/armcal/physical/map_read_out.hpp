@@ -14,8 +14,8 @@
 #pragma once
 
 #include "armcal/core/status.hpp"
-#include "armcal/math/cholesky.hpp"
-#include "armcal/physical/map_arm.hpp"
+#include "armcal/math/symmetric.hpp"
+#include "armcal/physical/map_problem.hpp"
 
 namespace armcal::physical {
 

@@ -122,7 +122,7 @@ TEST(Controller, ATableFlashed_IsInForceAndStaysSoAfterPowerUp) {
   EXPECT_EQ(bench->torque, Status::kOk);
   EXPECT_EQ(bench->Of(kFeedForwardState), 1);
   EXPECT_EQ(bench->Of(kGeneration), 2);
-  EXPECT_EQ(bench->controller.in_force().committed.generation, 2u);
+  EXPECT_EQ(bench->controller.adopted().committed.generation, 2u);
 
   controller::Controller<Model, Forgetting> again(bench->flash.storage(), bench->clock);
   EXPECT_EQ(again.Boot(), Status::kOk);
@@ -164,7 +164,7 @@ TEST(Controller, OnHold_UsesNoRowUntilReleased) {
 TEST(Controller, AJointReset_IsAsUncertainAsBeforeIt) {
   const auto bench = std::make_unique<Bench<Forgetting>>();
   const auto deviations = [&] {
-    bench->controller.filter<0>().RequestReadOut();
+    bench->controller.estimator<0>().RequestReadOut();
     bench->Idle();
     std::vector<float> sd;
     const auto words = bench->Read(link::RegisterKind::kInput, reg::kDeviationA, 2 * Model::kFrontBegin[3]);
@@ -198,7 +198,7 @@ TEST(Controller, ATraceThatAClientArms_HoldsWhatTheTickWasGiven) {
   bench->Run(50);                                                    // nobody has asked
   EXPECT_EQ(bench->Read(link::RegisterKind::kInput, reg::kTracePage[0] + 6, 1)[0], 0);
 
-  const std::uint32_t channels = estimator::kRawAll, start = bench->now + 10;
+  const std::uint32_t channels = controller::kRawAll, start = bench->now + 10;
   constexpr std::uint16_t kTicks = 3;               // a record, so that a mean has to be rounded
   std::vector<std::uint16_t> arm{7, 2, kTicks, 0};  // streaming
   for (const std::uint16_t half : bench->Halves({start, 0, channels})) arm.push_back(half);

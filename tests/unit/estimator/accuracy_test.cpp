@@ -52,7 +52,7 @@ TEST(Accuracy, Forgetting_IsTheGatedQrRecursionWithinATenthOfSigma) {
   host->table.forgetting[0] = 0.9995f;
   host->table.forgetting[1] = 0.998f;
   ASSERT_EQ(host->Adopt(), core::Status::kOk);
-  std::vector<double> lambda(host->image.prior.lambda, host->image.prior.lambda + kColumns);
+  std::vector<double> lambda(host->adopted.prior.lambda, host->adopted.prior.lambda + kColumns);
   const std::vector<Sample> samples = Record(kFortySeconds);
   for (const Sample& s : samples) ASSERT_EQ(host->Feed(s), core::Status::kOk);
   const Oracle<TwoLink> oracle(host->table, host->b0(), samples, lambda);

@@ -236,4 +236,65 @@ TEST(Controller, NoiseFarBeyondTheTables_IsServedAsTheFiltersHealth) {
   EXPECT_EQ(bench->Of(kHealth), 3);
 }
 
+TEST(Controller, FiltersBesideEachOther_GiveBitForBitWhatEachGivesAlone) {
+  const auto both = std::make_unique<Bench<Forgetting, Block>>();
+  const auto first = std::make_unique<Bench<Forgetting>>();
+  const auto second = std::make_unique<Bench<Block>>();
+  const auto work = [](auto& bench) {
+    bench.Run(4000);
+    bench.controller.template estimator<0>().RequestReadOut();
+    bench.Idle();
+  };
+  work(*first);
+  work(*second);
+  both->Run(4000);
+  both->controller.estimator<0>().RequestReadOut();
+  both->controller.estimator<1>().RequestReadOut();
+  both->Idle();
+  const auto floats = [](auto& bench, std::uint16_t first_register) {
+    std::vector<std::uint16_t> words;
+    for (int k = 0; k < 2 * Model::kColumns; k += 2)
+      for (const std::uint16_t w :
+           bench.Read(link::RegisterKind::kInput, static_cast<std::uint16_t>(first_register + k), 2))
+        words.push_back(w);
+    return words;
+  };
+  EXPECT_EQ(floats(*both, reg::kEstimateA), floats(*first, reg::kEstimateA));
+  EXPECT_EQ(floats(*both, reg::kDeviationA), floats(*first, reg::kDeviationA));
+  EXPECT_EQ(floats(*both, reg::kEstimateB), floats(*second, reg::kEstimateA));
+  EXPECT_EQ(floats(*both, reg::kDeviationB), floats(*second, reg::kDeviationA));
+}
+
+// The example arm, which counts how often its regressor is asked for.
+struct CountedModel : Model {
+  static inline int calls = 0;
+  template <class T>
+  static void Regressor(const model::ModelInput<T, n>& x, const T* committed, const T* eta, const T* state, T* next,
+                        T* front, T* dense) {
+    ++calls;
+    Model::Regressor(x, committed, eta, state, next, front, dense);
+  }
+};
+
+TEST(Controller, WithTwoFilters_EvaluatesTheModelOnceASample) {
+  using Two = controller::Controller<CountedModel, filter::ForgettingFilter<CountedModel>,
+                                     filter::KalmanFilter<CountedModel, filter::Form::kBlock>>;
+  test::NorFlash flash{{2, 16384, 8, 0xFF}};
+  std::uint32_t now = 0;
+  const auto count = [](void* t) { return *static_cast<std::uint32_t*>(t); };
+  const auto two = std::make_unique<Two>(flash.storage(), port::Clock{&now, count, count});
+  EXPECT_EQ(two->Boot(), Status::kBlank);
+  Axes axes;
+  CountedModel::calls = 0;
+  for (; now < 800; ++now) {
+    model::RawSample<n> raw;
+    controller::SetPoint<n> set;
+    (void)axes.Read(now, raw, set);
+    ASSERT_EQ(two->Push(raw), Status::kOk);
+    while (two->Step()) {
+    }
+  }
+  EXPECT_EQ(CountedModel::calls, 800 / 8 - 4);  // a sample is the middle one of five averages
+}
+
 }  // namespace

@@ -36,8 +36,8 @@ class Controller {
   static constexpr int kFilters = sizeof...(Filters);
   static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
 
-  // What the model says of itself is filled in; what of `identity` remains is the integrator's: versions, texts,
-  // capabilities beyond those of this class.
+  // `identity`: versions, texts and further capabilities, which are the integrator's. This class fills in the rest from
+  // the model.
   Controller(const port::Storage& storage, const port::Clock& clock, const link::Identity& identity = {})
       : clock_(clock),
         store_(storage, Model::kSchema, kWords),
@@ -49,9 +49,9 @@ class Controller {
   }
   Controller(const Controller&) = delete;
 
-  // Once, before the first tick. Without a valid table in storage the estimators start from the model's defaults and
-  // the feed-forward stays off. Answers as table::TableStore::Load, which is served, too; a status of
-  // link::RegisterMap::Add is a wrong map. Context: background.
+  // Call it once, before the first tick. Without a valid table in storage, the estimators start from the model's
+  // defaults, and feed-forward stays off. Answers as table::TableStore::Load; a register serves that answer, too. A
+  // status of link::RegisterMap::Add means a wrong map. Context: background.
   core::Status Boot() {
     const core::Status served = Serve(std::make_index_sequence<kFilters>());
     if (!core::IsOk(served)) return served;
@@ -64,11 +64,11 @@ class Controller {
     return stored;
   }
 
-  // Which axes are under control, a bit each: a table is then adopted only if it is bumpless. Context: any.
+  // Which axes are under control, a bit each. While there is one, only a bumpless table is adopted. Context: any.
   void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
 
-  // From now on a client can record what Push and FeedForward were given; `ring` outlives this. Once, before the first
-  // tick. Answers as link::ServeTrace. Context: background.
+  // Lets a client record what Push and FeedForward were given. `ring` must live as long as this object. Call it once,
+  // before the first tick. Answers as link::ServeTrace. Context: background.
   template <std::uint32_t kRingWords>
   core::Status Record(RawTrace<Model, kRingWords>& ring) {
     const core::Status served = link::ServeTrace(device_.map(), 0, ring);
@@ -78,7 +78,7 @@ class Controller {
     return served;
   }
 
-  // Joint torque of the set-point by the table in force. tau_Nm: [n], zero without a table. Answers as
+  // Joint torque of the set-point by the adopted table. tau_Nm: [n], zero without a valid table. Answers as
   // feedforward::FeedForward::Evaluate. Context: tick.
   core::Status FeedForward(const SetPoint<n>& set, const float* temperature_degC, float* tau_Nm) {
     const std::uint32_t since = clock_.Ticks() - adopted_tick_.load(std::memory_order_relaxed);
@@ -186,7 +186,7 @@ class Controller {
     live_.health = static_cast<std::uint16_t>(e.inconsistent ? live_.health | bit : live_.health & ~bit);
   }
 
-  // Context: tick. A full ring counts what it refuses.
+  // Context: tick. A full ring refuses the record and counts that.
   void RecordTick(const model::RawSample<n>& raw) {
     const link::TraceTurn turn = trace_->Offer(raw.tick);
     if (!turn.recording) return;

@@ -255,7 +255,7 @@ class Estimator {
     stage_ = Stage::kIdle;
   }
 
-  // kUsed is this estimator's word alone, whatever the sample came with.
+  // Sets kUsed by this estimator's rows. The sample may have come with other flags.
   void Observe() {
     model::Sample<n> sample = intake_.sample();
     for (int i = 0; i < n; ++i) {

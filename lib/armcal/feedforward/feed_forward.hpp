@@ -1,4 +1,4 @@
-// feedforward - committed table and set-point to joint torque; knows no filter, no live estimate, no table layout.
+// feedforward - the torque of a set-point, by the committed parameters alone; an estimate has no part in it.
 #pragma once
 
 #include "armcal/core/mailbox.hpp"
@@ -12,18 +12,19 @@ class FeedForward {
  public:
   static constexpr int n = Model::kJoints;
 
-  // Hands over the next committed set; it takes effect at the next tick. kAxisEnabled: an axis is enabled and the
-  // set is not bumpless; nothing changed. Context: background.
+  // Hands over the next committed parameters. They take effect at the next tick. kAxisEnabled: an axis is enabled and
+  // they are not bumpless; nothing has changed. Context: background.
   core::Status Offer(const model::Committed<Model>& next, bool any_axis_enabled) {
     if (any_axis_enabled && !next.bumpless) return core::Status::kAxisEnabled;
     offered_.Post(next);
     return core::Status::kOk;
   }
 
-  // Torque of the set-point. Shapes: all [kJoints]; t_s: seconds since the table was adopted. A set-point speed below
-  // v_min counts as standing, so that friction does not chatter. kOk; kClamped (a joint was cut to its limit and
-  // counted); kEmpty (no valid table; torque zero); kNotFinite (set-point or model not finite; that joint zero).
-  // Always evaluates both sets of a cross-fade: constant time. Context: tick.
+  // Torque of the set-point. Shapes: all [kJoints]. t_s: seconds since the table was adopted. A set-point slower than
+  // v_min counts as standing, so that friction does not chatter. kOk; kClamped (a joint was cut to its limit, and that
+  // was counted); kEmpty (no valid table; torque zero); kNotFinite (set-point or model is not finite; that joint's
+  // torque is zero). Constant time, because the old and the new parameters of a cross-fade are always both evaluated.
+  // Context: tick.
   core::Status Evaluate(const float* q, const float* qd, const float* qdd, const float* temperature_degC, float t_s,
                         float* tau_Nm) {
     Adopt();
@@ -55,7 +56,7 @@ class FeedForward {
     return status;
   }
 
-  std::uint32_t clamp_count() const { return clamp_count_; }  // joint-ticks cut to the limit
+  std::uint32_t clamp_count() const { return clamp_count_; }  // how often a joint was cut to its limit
   std::uint32_t generation() const { return active_.generation; }
   bool valid() const { return active_.valid; }
   bool blending() const { return blended_ticks_ < active_.blend_ticks; }

@@ -300,8 +300,8 @@ class UdEstimate {
     return cost;
   }();
 
-  float& u(int i, int p) { return number_[kShape.Origin(p) + i]; }
-  float& d(int p) { return u(p, p); }
+  float& u(int i, int p) { return factor().column(p)[i]; }
+  float& d(int p) { return factor().d(p); }
   float d(int p) const { return number_[kShape.Origin(p) + p]; }
   float& x(int p) { return number_[p]; }
   float x(int p) const { return number_[p]; }

@@ -1,7 +1,7 @@
-// model - the parameter table as numbers, and its one byte layout; knows no storage and no register.
+// model - the parameter table as numbers, and its byte layout.
 //
-// The byte layout is the same on the wire (Modbus registers), in storage and in the host's files:
-// big-endian 16-bit words, 32-bit values with the high word first. Layout version 1, in 16-bit words:
+// The byte layout is the same on the wire (Modbus registers), in storage and in the files of the PC: big-endian 16-bit
+// words, and 32-bit values with the high word first. Layout version 1, in 16-bit words:
 //   header  (16 words): schema u32, layout version u16, joints u16, parameters u16, flags u16 (bit 0: bumpless),
 //                       blend_ms u32, forgetting[4] f32 (per estimator sample, group 0..3, in (0, 1])
 //   joint   (8 words each): sigma f32, v_min f32, torque_limit f32, torque_scale f32
@@ -79,9 +79,9 @@ void Encode(const ParameterTable<n, p>& t, std::uint16_t* w) {
   }
 }
 
-// kWrongSchema, kWrongSize (layout version, joints or parameters differ), kNotFinite, kOutOfRange (sigma, v_min,
-// limit, scale, forgetting not positive, sd or noise negative, unknown state or group). On refusal `t` is unchanged.
-// Bodies are judged by physical::IsPhysical, not here. Context: background.
+// kWrongSchema; kWrongSize (layout version, joints or parameters differ); kNotFinite; kOutOfRange (sigma, v_min, limit,
+// scale or forgetting is not positive, sd or noise is negative, state or group is unknown). On refusal `t` is
+// unchanged. This does not check whether bodies can exist; see physical::IsPhysical. Context: background.
 template <int n, int p>
 core::Status Decode(const std::uint16_t* w, std::uint32_t schema, ParameterTable<n, p>& t) {
   using core::Status;

@@ -1,4 +1,4 @@
-// monitor - have the innovations the size that the filter says: per joint, and one verdict for all joints.
+// monitor - are the innovations as large as the filter says: statistics for each joint, and one verdict for all.
 #pragma once
 
 #include <cstdint>
@@ -7,16 +7,22 @@
 
 namespace armcal::monitor {
 
-// Running statistics of one joint. Averages over the last kMemory rows or so (exactly over all, before that).
-// A consistent filter has nis near 1; above 2 over hundreds of rows the model or its noise is wrong.
+// 1 on average if the variance is right.
+inline float NormalisedSquare(float innovation, float variance) {
+  return math::Divide(innovation * innovation, variance);
+}
+
+// Running statistics of one joint: the mean over all rows at first, later over about the last kMemory rows. nis, the
+// mean normalised innovation squared, is near 1 if the filter's variances are right. If it stays above 2 for hundreds
+// of rows, the model or its noise is wrong.
 class JointMonitor {
  public:
-  static constexpr std::uint32_t kMemory = 4096;  // 33 s at 125 Hz: several periods of a usual excitation
+  static constexpr std::uint32_t kMemory = 4096;  // 33 s at 125 Hz, which is several periods of a usual excitation
 
-  // innovation, variance: whitened, of one accepted row. residual_Nm: measured minus committed model torque.
-  // Not finite: kept out. Context: background.
+  // One accepted row. innovation, variance: whitened. residual_Nm: measured minus committed model's torque. A row with
+  // a number that is not finite does not count. Context: background.
   void Add(float innovation, float variance, float residual_Nm) {
-    const float square = math::Divide(innovation * innovation, variance), residual = residual_Nm * residual_Nm;
+    const float square = NormalisedSquare(innovation, variance), residual = residual_Nm * residual_Nm;
     const bool good = math::IsFinite(square) && math::IsFinite(residual);
     const std::uint32_t mask = math::MaskOf(good);
     count_ += good;
@@ -35,25 +41,26 @@ class JointMonitor {
   float mean_square_ = 0.0f;
 };
 
-// What chi^2 of `freedom` degrees (> 0, need not be whole) passes as often as a normal number passes `sigmas`, less
-// often where there are only a few degrees: Wilson and Hilferty's cube root.
+// A limit for chi^2 of `freedom` degrees (> 0, not necessarily whole): chi^2 passes it as often as a normal number
+// passes `sigmas`, or less often if there are only a few degrees. After Wilson and Hilferty, by the cube root.
 inline float ChiSquareLimit(float freedom, float sigmas) {
   const float ninth = 2.0f / (9.0f * freedom), root = 1.0f - ninth + sigmas * math::Sqrt(ninth);
   return freedom * root * root * root;
 }
 
-// The innovations^2 / variance of a filter that knows its noise are independent and chi^2 of one degree. Their mean
-// over a block of rows of all joints passes the limit once in a million: at 125 samples a second with six rows each, a
-// consistent filter is called inconsistent once in two months. Noise that is larger than stated, or a torque that the
-// model lacks, raises it. A wrong prior hardly does; the physical read-out shows that (estimator::PriorIsTooNarrow).
+// May a filter's standard deviations be believed? If a filter knows its noise, its innovations^2 / variance are
+// independent, and each is chi^2 of one degree. The mean over a block of rows of all joints passes the limit once in a
+// million blocks. At 125 samples a second with six rows each, a filter that is right is called inconsistent once in two
+// months. The mean rises if the noise is larger than stated, or if the model lacks a torque. A wrong prior hardly
+// raises it; the physical read-out shows that (estimator::PriorIsTooNarrow).
 class InnovationTest {
  public:
   static constexpr int kBlockRows = 4096;
   static constexpr float kLimit = 1.1085f;  // of the mean: chi^2 quantile / rows
 
-  // whitened, of one accepted row. Not finite: kept out. Context: background.
+  // One accepted row, whitened. A row with a number that is not finite does not count. Context: background.
   void Add(float innovation, float variance) {
-    const float square = math::Divide(innovation * innovation, variance);
+    const float square = NormalisedSquare(innovation, variance);
     const bool good = math::IsFinite(square);
     sum_ += math::Masked(square, math::MaskOf(good));
     rows_ += good;

@@ -8,7 +8,7 @@
 
 namespace armcal::monitor {
 
-// One row: measured minus committed model's torque, and where the joint was. Joint side, SI.
+// One row: the residual (measured minus committed model's torque), and the state of the joint. Joint side, SI.
 struct ResidualRow {
   float residual_Nm;
   float speed_radps;
@@ -17,26 +17,27 @@ struct ResidualRow {
   float temperature_degC;  // NaN: no sensor
 };
 
-// Sums over the rows of a bin. Their quotients by kCount are means, so a host can regress them on any function that is
-// linear in them; `load_size` sums |load|.
+// The sums over the rows of a bin. A sum divided by kCount is a mean, so a PC can fit the means with any function that
+// is linear in the summed signals. kLoadSize sums |load|.
 enum ResidualSum : int { kCount, kResidual, kSquare, kSpeed, kPosition, kLoad, kLoadSize, kTemperature, kResidualSums };
 enum ResidualSignal : int { kBySpeed, kByPosition, kByLoad, kByTemperature, kResidualSignals };
 
-// A row is added to one bin of each signal: by the direction of motion (friction turns with it, other torques do not)
-// and by the quarter of the range that the signal (speed: its size) has covered since the restart. Ranges are learned,
-// so no limits have to be known; a bin whose borders move with them still tells by its means what lies inside.
+// The residual statistics of one joint. For each signal, a row is added to one bin. The direction of motion chooses the
+// bin, because friction changes its sign with it and other torques do not. The other choice is the quarter of the range
+// that the signal (of speed: its magnitude) has covered since the restart. Ranges are learned, so nobody has to
+// configure limits. When a range grows, the borders of its bins move; the means of a bin still tell what lies inside.
 //
-// Two sets of bins: the first kReferenceRows rows show how the model fitted when it was adopted, and stay. Later rows
-// go to the recent set, which forgets: one bin a row is faded, in turn, so all fade alike whether visited or not, the
-// sums stay bounded, and a row costs the same for ever: some 500 instructions on a Cortex-M4F, an eighth of the
-// filter's.
+// There are two sets of bins. The first kReferenceRows rows go to the reference set and stay there: they show how well
+// the model fitted when it was adopted. Later rows go to the recent set, which forgets: with every row one bin is
+// faded, in turn. So all bins fade alike whether they are visited or not, the sums stay bounded, and every row costs
+// the same: some 500 instructions on a Cortex-M4F, an eighth of the filter's.
 class ResidualBins {
  public:
   static constexpr int kDirections = 2;  // 0: qd < 0, 1: qd > 0
   static constexpr int kQuarters = 4;
   static constexpr int kBins = kResidualSignals * kDirections * kQuarters;
   static constexpr int kValues = kBins * kResidualSums;    // of one set, in the order [signal][direction][quarter][sum]
-  static constexpr std::uint32_t kReferenceRows = 16384;   // 131 s of motion at 125 Hz: several cycles of a program
+  static constexpr std::uint32_t kReferenceRows = 16384;   // 131 s of motion at 125 Hz, several cycles of a program
   static constexpr float kKeep = 1.0f - kBins / 16384.0f;  // of a faded bin: the recent set holds 16384 rows or so
 
   // Forgets everything. Context: background.
@@ -47,9 +48,9 @@ class ResidualBins {
     faded_ = 0;
   }
 
-  // use: the row may be judged (joint under control, moving in one direction). False, and no bit has changed: it may
-  // not, or a number is not finite; without a temperature only those bins stay. Same cost in every case. Context:
-  // background.
+  // use: the row may be judged, because the joint is under control and moves in one direction. False: it may not, or a
+  // number is not finite; then no bit has changed. Without a temperature only the bins by temperature stay as they are.
+  // The cost is the same in every case. Context: background.
   bool Add(const ResidualRow& row, bool use) {
     const bool good = (use & Usable(row.residual_Nm) & Usable(row.speed_radps) & Usable(row.position_rad) &
                        Usable(row.load_Nm)) != 0u;
@@ -81,21 +82,21 @@ class ResidualBins {
   const float* recent() const { return recent_; }        // [kValues]
 
  private:
-  // Beyond any arm's figures; sums of such squares stay far from float's end. False for NaN.
+  // Larger than any figure of an arm, and small enough that sums of its squares do not overflow. False for NaN.
   static constexpr float kLargest = 1e12f;
   static unsigned Usable(float x) { return math::Abs(x) < kLargest; }  // 1 or 0, to combine without a branch
 
-  // set: of one direction.
+  // set: the bins of one direction.
   static void AddTo(float* set, int quarter, int s, const float* value) {
     float* bin = set + (s * kDirections * kQuarters + quarter) * kResidualSums;
-    for (int k = 0; k < kResidualSums; k += 4) {  // by four: -O2 unrolls nothing
+    for (int k = 0; k < kResidualSums; k += 4) {  // by four, because -O2 does not unroll
       const float a = bin[k] + value[k], b = bin[k + 1] + value[k + 1];
       const float c = bin[k + 2] + value[k + 2], d = bin[k + 3] + value[k + 3];
       bin[k] = a, bin[k + 1] = b, bin[k + 2] = c, bin[k + 3] = d;
     }
   }
 
-  // Widens the range of a signal that counts; where in it x lies.
+  // Widens the range of signal s if x counts, and returns the quarter in which x lies.
   int QuarterOf(int s, float x, bool counts) {
     low_[s] = math::Min(low_[s], math::Select(counts, x, low_[s]));
     high_[s] = math::Max(high_[s], math::Select(counts, x, high_[s]));
@@ -110,16 +111,16 @@ class ResidualBins {
   int faded_ = 0;
 };
 
-// Slices of time, each with the number of rows and the sum of the squared residuals of every joint. When there is no
-// room for another, the two neighbours are joined that are shortest for their age. So the slices reach back to the
-// restart whatever the time since, and each is some share of its age long: a change of an hour ago is dated to
-// minutes, one of last month to days. Only time in which a joint moved fills a slice; a night at rest costs none.
+// When the residuals were how large: slices of time, each with the number of rows and the sum of squared residuals of
+// every joint. When there is no room for another slice, two neighbours are joined: those that together are shortest for
+// their age. So the slices always reach back to the restart, and the length of each is some share of its age: a change
+// of an hour ago is dated to minutes, one of last month to days. Only time in which a joint moved fills a slice; a
+// night at rest fills none.
 template <int n>
 class ResidualHistory {
  public:
   static constexpr int kSlices = 32;
-  static constexpr std::uint32_t kSliceSamples =
-      1024;  // with motion, of a slice that has not been joined: 8 s at 125 Hz
+  static constexpr std::uint32_t kSliceSamples = 1024;  // samples with motion in a new slice: 8 s at 125 Hz
 
   struct Slice {
     std::uint32_t start_s = 0;            // since the restart
@@ -133,7 +134,7 @@ class ResidualHistory {
     samples_ = 0;
   }
 
-  // A row that may be judged, finite. Context: background.
+  // A row that may be judged and is finite. Context: background.
   void Add(int joint, float residual_Nm) {
     slices_[size_ - 1].count[joint] += 1.0f;
     slices_[size_ - 1].square[joint] += residual_Nm * residual_Nm;
@@ -152,7 +153,7 @@ class ResidualHistory {
   const Slice& slice(int i) const { return slices_[i]; }
 
  private:
-  // The first of the two neighbours.
+  // Which two neighbours to join: returns the first.
   int ShortestForItsAge(std::uint32_t now_s) const {
     int best = 0;
     float least = 2.0f;  // no pair is longer than its age
@@ -179,16 +180,17 @@ class ResidualHistory {
   std::uint32_t samples_ = 0;
 };
 
-// 2.3 KB a joint. Give it to one estimator (Estimator::SetResiduals), which fills it and restarts it with each
-// adoption: what was seen with another table says nothing about this one. Context of every call: background.
+// The residual statistics of a whole arm: bins and history. 2.3 KB for each joint. Give it to one estimator
+// (Estimator::SetResiduals), which fills it. Each adoption restarts it, because residuals of another table say nothing
+// about this one. Context of every call: background.
 template <int n>
 class ResidualStatistics {
  public:
   static constexpr int kHistoryValues = 3 * ResidualHistory<n>::kSlices;
-  // What Write puts out for one joint: reference bins, recent bins, then start_s, count, square of each slice.
+  // What Write gives for one joint: reference bins, recent bins, then start_s, count and square of each slice.
   static constexpr int kValues = 2 * ResidualBins::kValues + kHistoryValues;
 
-  // tick: zero of the time that slices and elapsed_s count from.
+  // tick: where slices and elapsed_s start to count.
   void Restart(std::uint32_t tick) {
     for (ResidualBins& joint : bins_) joint.Restart();
     history_.Restart();
@@ -204,10 +206,10 @@ class ResidualStatistics {
     moved_ = true;
   }
 
-  // After the rows of a sample. Ticks may wrap between two calls once.
+  // After the rows of a sample. Between two calls the tick may wrap once.
   void EndSample(std::uint32_t tick, std::uint32_t tick_rate_Hz) {
     const std::uint32_t passed = tick - tick_;
-    if (passed < 0x80000000u) {  // else the sample began before the restart
+    if (passed < 0x80000000u) {  // otherwise the sample began before the restart
       tick_ = tick;
       ticks_ += passed;
       elapsed_s_ += ticks_ / tick_rate_Hz;
@@ -221,7 +223,7 @@ class ResidualStatistics {
   const ResidualBins& bins(int joint) const { return bins_[joint]; }
   const ResidualHistory<n>& history() const { return history_; }
 
-  // values [kValues]. A slice that is not there starts at NaN.
+  // values [kValues]. An unused slice starts at NaN.
   void Write(int joint, float* values) const {
     for (int k = 0; k < ResidualBins::kValues; ++k) values[k] = bins_[joint].reference()[k];
     values += ResidualBins::kValues;
@@ -239,7 +241,7 @@ class ResidualStatistics {
  private:
   ResidualBins bins_[n];
   ResidualHistory<n> history_;
-  std::uint32_t tick_ = 0, ticks_ = 0;  // of the last sample; beyond whole seconds
+  std::uint32_t tick_ = 0, ticks_ = 0;  // of the last sample; what is left beyond whole seconds
   std::uint32_t elapsed_s_ = 0;
   bool moved_ = false;
 };

@@ -9,7 +9,8 @@
 
 namespace armcal::physical {
 
-// A pivot of the pseudo-inertia below this share of its diagonal counts as zero: some hundred float32 roundings.
+// A pivot of the pseudo-inertia that is below this share of its diagonal counts as zero: some hundred float32
+// roundings.
 inline constexpr float kPivotMargin = 1e-5f;
 
 // True if the pseudo-inertia [[tr(I)/2 E - I, mc], [mc', m]] is positive definite: positive mass, and principal
@@ -18,7 +19,7 @@ inline constexpr float kPivotMargin = 1e-5f;
 template <class T>
 bool IsPhysical(const T* body) {
   const T half = (body[4] + body[7] + body[9]) * T(0.5f);
-  // Elimination starts at the mass, so that what remains is about the centre.
+  // Elimination starts at the mass, so that the remaining matrix is about the centre.
   T a[4][4] = {{body[0], body[1], body[2], body[3]},
                {body[1], half - body[4], -body[5], -body[6]},
                {body[2], -body[5], half - body[7], -body[8]},
@@ -34,13 +35,14 @@ bool IsPhysical(const T* body) {
   return good;
 }
 
-// The same of a link: a block of 11, its body and after it the rotor inertia of its motor, which is not negative.
+// The same for a link: a block of 11, which is a body and after it the rotor inertia of the motor. Both must be
+// possible; the rotor inertia may be zero.
 template <class T>
 bool CanExist(const T* link) {
   return IsPhysical(link) && link[10] >= T(0);  // also false for NaN
 }
 
-// I += m (c'c E - c c') with m = sign x mass. Shapes: c [3], inertia [6].
+// I += m (c'c E - c c'), with m = mass or m = -mass. Shapes: c [3], inertia [6].
 template <class T>
 void AddParallelAxis(T m, const T* c, T* inertia) {
   inertia[0] += m * (c[1] * c[1] + c[2] * c[2]);
@@ -51,7 +53,7 @@ void AddParallelAxis(T m, const T* c, T* inertia) {
   inertia[5] += m * (c[0] * c[0] + c[1] * c[1]);
 }
 
-// The centre of a body without mass is its origin.
+// Block -> central block. A body without mass has its centre at the origin.
 template <class T>
 void ToCentral(const T* body, T* central) {
   central[0] = body[0];
@@ -76,7 +78,7 @@ void BodyJacobian(T m, const T* c, T* jacobian) {
     jacobian[(1 + i) * 10] = c[i];
     jacobian[(1 + i) * 11] = m;
   }
-  // Inertia rows: against m the unit parallel axis term, against c_k its derivative.
+  // The rows of the inertia: the derivative by m is the parallel axis term of a unit mass, then follow those by c_k.
   T by_mass[6] = {};
   AddParallelAxis(T(1), c, by_mass);
   const T twice = T(2) * m;
@@ -93,8 +95,8 @@ void BodyJacobian(T m, const T* c, T* jacobian) {
 // second moments about the centre: -logdet needs neither the centre nor a 4 x 4 matrix. A margin keeps S that far
 // inside the cone of possible bodies.
 
-// g' I, with I = c'c E - c c' of a unit mass, is c' theta c. g: of the six moments of inertia; theta: xx xy xz yy yz
-// zz.
+// For a unit mass, g' I with I = c'c E - c c' is the quadratic form c' theta c. g belongs to the six moments of
+// inertia; theta is xx xy xz yy yz zz.
 template <class T>
 struct InertiaForm {
   T theta[6];
@@ -108,7 +110,8 @@ struct InertiaForm {
   }
 };
 
-// out [10] = J' g, J = d body / d central at m, c: the gradient in central coordinates of what has gradient g [10].
+// out [10] = J' g, with J = d body / d central at m, c. A function with gradient g [10] by the block has gradient `out`
+// by the central block.
 template <class T>
 void PullBack(T m, const T* c, const T* g, T* out) {
   T turned[3];
@@ -121,8 +124,9 @@ void PullBack(T m, const T* c, const T* g, T* out) {
   for (int i = 4; i < 10; ++i) out[i] = g[i];
 }
 
-// The body at central + J^-1 (a straight step of J move in m, m c, I about the origin). What is linear in those stays
-// linear along a Move: torques and the pseudo-inertia. Coordinates of the inertia where `held` stay. Shapes: [10].
+// Moves a body on a line that is straight in m, m c and I about the origin, by the step J move (J = d body / d
+// central). Torques and the pseudo-inertia are linear in those, so they are linear along the line. Coordinates of the
+// inertia for which `held` is true stay. Shapes: [10].
 template <class T>
 void Move(const T* central, const T* move, const bool* held, T* moved) {
   T bent[6] = {};
@@ -133,7 +137,7 @@ void Move(const T* central, const T* move, const bool* held, T* moved) {
   for (int k = 4; k < 10; ++k) moved[k] = central[k] + (held[k] ? T(0) : move[k] - bent[k - 4]);
 }
 
-// S - margin E of a central block as xx xy xz yy yz zz.
+// S - margin E of a central block, as xx xy xz yy yz zz.
 template <class T>
 void SecondMoments(const T* central, T margin, T* s) {
   const T half = (central[4] + central[7] + central[9]) * T(0.5f) - margin;
@@ -141,7 +145,7 @@ void SecondMoments(const T* central, T margin, T* s) {
   for (const int k : {0, 3, 5}) s[k] += half;
 }
 
-// m det(S - margin E), by its pivots; zero unless all of them are positive.
+// m det(S - margin E) by its pivots. Zero unless all pivots are positive.
 template <class T>
 T ConeDeterminant(const T* central, T margin) {
   T s[6];
@@ -153,8 +157,8 @@ T ConeDeterminant(const T* central, T margin) {
   return math::Select(inside, central[0] * s[0] * second * third, T(0));
 }
 
-// Derivatives of -log ConeDeterminant by coordinate k of a Move: returns the first, column [10] gets the second. The
-// body must be inside the cone.
+// Derivatives of -log ConeDeterminant by coordinate k of a Move. Returns the first, and fills in column [10] with the
+// second. The body must be inside the cone.
 template <class T>
 T BarrierDerivatives(const T* central, T margin, int k, T* column) {
   for (int i = 0; i < 10; ++i) column[i] = T(0);
@@ -176,11 +180,12 @@ T BarrierDerivatives(const T* central, T margin, int k, T* column) {
   for (int i = 0; i < 3; ++i)
     for (int j = i; j < 3; ++j) q[i][j] = q[j][i] = q[i][j] * inverse;
 
-  if (k <= 3) {  // m c moves, and what S loses by it is of second order
+  if (k <= 3) {  // m c moves, which changes S only to second order
     for (int i = 0; i < 3; ++i) column[1 + i] = T(2) * central[0] * q[k - 1][i];
     return T(0);
   }
-  // d S / d I_a is E/2 - e_a e_a' on the diagonal, -(e_a e_b' + e_b e_a') beside it. r = Q dS/dI_k Q.
+  // d S / d I_a is E/2 - e_a e_a' for a moment on the diagonal, and -(e_a e_b' + e_b e_a') for another one.
+  // r = Q dS/dI_k Q.
   constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
   const auto trace = [&](const T(&m)[3][3], int a) {  // of m dS/dI_a, m symmetric
     const int i = kRow[a], j = kColumn[a];

@@ -7,6 +7,7 @@
 
 #include "armcal/controller/trace_records.hpp"
 #include "armcal/estimator/estimator.hpp"
+#include "armcal/estimator/intake.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
 #include "armcal/link/device.hpp"
 #include "armcal/link/learning_registers.hpp"

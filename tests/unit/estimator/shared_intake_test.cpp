@@ -5,9 +5,9 @@
 #include "armcal/filter/kalman_filter.hpp"
 #include "tests/unit/estimator/motion.hpp"
 
-namespace armcal::estimator {
+namespace armcal::estimator::shared_intake {
 namespace {
-using namespace test;  // NOLINT: the bench of these tests
+using namespace estimator::test;  // NOLINT: the bench of these tests
 using core::Status;
 
 // The two-link arm, which counts how often its regressor is asked for.
@@ -156,4 +156,4 @@ TEST(SharedIntake, AnAdoption_StartsAllFiltersAsIfNothingHadBeen) {
 }
 
 }  // namespace
-}  // namespace armcal::estimator
+}  // namespace armcal::estimator::shared_intake

@@ -103,7 +103,7 @@ class Estimator {
   // the filter, so it is enough to give them to one of several estimators.
   void SetResiduals(monitor::ResidualStatistics<n>* residuals) { statistics_.SetResiduals(residuals); }
 
-  // Of the intake.
+  // Counts of the intake.
   std::uint32_t refused_samples() const { return intake_.refused(); }
   std::uint32_t pending() const { return intake_.pending(); }      // samples waiting for Step; context: any
   std::uint32_t tick_gaps() const { return intake_.tick_gaps(); }  // restarts of the signal path; context: tick

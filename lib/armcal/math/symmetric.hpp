@@ -1,4 +1,4 @@
-// math - symmetric matrices, packed, and their factors U D U' and R' R; knows no filter and no parameter.
+// math - symmetric matrices, packed, and their factors U D U' and R' R.
 //
 // Packed by columns: element (i, j) with i <= j is number j (j + 1) / 2 + i, and the size is n (n + 1) / 2. P = U D U'
 // with a unit upper triangular U; the diagonal of the packed factor holds D. Every kernel takes the same instructions

@@ -1,4 +1,4 @@
-// controller - a whole controller without a bus: what a drive does, it does; what it must not, it refuses.
+// controller - a whole controller without a bus: what it does, and what it refuses.
 #include "armcal/controller/controller.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// estimator - float32 estimates against dense double oracles over 40 s at 125 Hz; knows no filter's inside.
+// estimator - float32 estimates against dense double oracles over 40 s at 125 Hz.
 #include <gtest/gtest.h>
 
 #include "armcal/filter/forgetting_filter.hpp"

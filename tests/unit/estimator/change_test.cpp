@@ -1,4 +1,4 @@
-// estimator - rest, partial motion and a picked-up load, on a small and on a six-axis arm; knows no filter's inside.
+// estimator - rest, partial motion and a picked-up load, on a small and on a six-axis arm.
 #include <gtest/gtest.h>
 
 #include "armcal/filter/forgetting_filter.hpp"

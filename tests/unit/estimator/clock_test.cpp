@@ -1,4 +1,4 @@
-// estimator - clocks that pass 2^24, 2^31 and 2^32; knows no filter's inside.
+// estimator - clocks that pass 2^24, 2^31 and 2^32.
 #include <gtest/gtest.h>
 
 #include "armcal/filter/forgetting_filter.hpp"

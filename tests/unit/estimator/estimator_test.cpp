@@ -1,4 +1,4 @@
-// estimator - what enters, what is refused, what is told; knows no filter's inside.
+// estimator - what enters an estimator, what it refuses, and what it publishes.
 #include "armcal/estimator/estimator.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// estimator - both filters on a generated six-axis model, float32 against the dense double oracle; knows no effect.
+// estimator - both filters on a generated six-axis model, float32 against the dense double oracle.
 #include <gtest/gtest.h>
 
 #include <random>

@@ -1,4 +1,4 @@
-// feedforward - set-point torque against the same sum in double; knows no table.
+// feedforward - set-point torque against the same sum in double.
 #include "armcal/feedforward/feed_forward.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// feedforward - models with memory, and with a pair effect that may be no number; knows no table.
+// feedforward - models with memory, and with a pair effect that may be no number.
 #include <gtest/gtest.h>
 
 #include <limits>

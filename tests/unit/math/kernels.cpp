@@ -1,4 +1,4 @@
-// math - every float kernel of lib in one object, to see what it links; computes nothing.
+// math - every float kernel of lib in one object, to see what it links.
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
 #include "armcal/filter/forgetting_filter.hpp"

@@ -1,4 +1,4 @@
-// monitor - the consistency verdict on drawn innovations and against chi^2 itself; knows no filter.
+// monitor - the consistency verdict on drawn innovations and against chi^2 itself.
 #include "armcal/monitor/innovations.hpp"
 
 #include <gtest/gtest.h>

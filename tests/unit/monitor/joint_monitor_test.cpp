@@ -1,4 +1,4 @@
-// monitor - statistics of known sequences; knows no filter.
+// monitor - statistics of known sequences.
 #include "armcal/monitor/innovations.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// monitor - residual statistics of random rows against sums in double; knows no model.
+// monitor - residual statistics of random rows against sums in double.
 #include "armcal/monitor/residual_statistics.hpp"
 
 #include <gtest/gtest.h>

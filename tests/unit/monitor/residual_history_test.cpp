@@ -1,4 +1,4 @@
-// monitor - slices of time against plain sums, and the arm's clock; knows no model.
+// monitor - slices of time against plain sums, and the arm's clock.
 #include "armcal/monitor/residual_statistics.hpp"
 
 #include <gtest/gtest.h>

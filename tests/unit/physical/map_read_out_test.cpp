@@ -1,4 +1,4 @@
-// physical - the read-out against dense algebra, the linear read-out and its stated objective; knows no filter.
+// physical - the read-out against dense algebra, the linear read-out and its stated objective.
 #include "armcal/physical/map_read_out.hpp"
 
 #include <gtest/gtest.h>

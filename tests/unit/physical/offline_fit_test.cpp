@@ -1,4 +1,4 @@
-// physical - the read-out against the offline fit, and of many draws of data; knows no filter.
+// physical - the read-out against the offline fit, and of many draws of data.
 #include <gtest/gtest.h>
 
 #include "codegen/generated/er20_like/model.hpp"

@@ -1,4 +1,4 @@
-// physical - steps and barrier of one body against dense 4 x 4 algebra and differences; knows no robot.
+// physical - steps and barrier of one body against dense 4 x 4 algebra and differences.
 #include "armcal/physical/body.hpp"
 
 #include <gtest/gtest.h>

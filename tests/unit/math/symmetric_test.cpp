@@ -1,4 +1,4 @@
-// math - the packed kernels against dense Eigen algebra in double; knows no filter.
+// math - the packed kernels against dense Eigen algebra in double.
 #include "armcal/math/symmetric.hpp"
 
 #include <gtest/gtest.h>

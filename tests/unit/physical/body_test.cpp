@@ -1,4 +1,4 @@
-// physical - bodies against point masses and Eigen's eigenvalues; knows no robot.
+// physical - bodies against point masses and Eigen's eigenvalues.
 #include "armcal/physical/body.hpp"
 
 #include <gtest/gtest.h>

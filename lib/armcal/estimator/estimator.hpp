@@ -7,9 +7,41 @@
 #include "armcal/estimator/estimates.hpp"
 #include "armcal/estimator/intake.hpp"
 #include "armcal/estimator/live_model.hpp"
+#include "armcal/math/columns.hpp"
 
 namespace armcal::estimator {
 
+// One joint's row at one sample, whitened and in prior units.
+template <class Model>
+struct Row {
+  float front[Model::kFront > 0 ? Model::kFront : 1] = {};  // from the joint's first column on
+  float dense[Model::kDense] = {};
+  float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // extended filter only
+  float y = 0.0f;
+  float load_Nm = 0.0f, model_Nm = 0.0f;  // committed torque of the dense columns alone, and of all columns
+  float residual_Nm = 0.0f;               // measured minus committed
+};
+
+// Fills in all but eta. y = (tau - tau at b0) / sigma. committed, seen: the regressor at the committed parameters, and
+// the one that the filter sees. One copy serves all estimators of a model. Context: background.
+template <class Model>
+ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows<Model>& committed,
+                             const model::Rows<Model>& seen, int joint, float tau_Nm, Row<Model>& row) {
+  const int first = Model::kFrontBegin[joint], end = Model::kFrontBegin[joint + 1];
+  const float whiten = 1.0f / table.sigma_Nm[joint];
+  const auto scaled = [&](float value, int column) {
+    return math::Masked(value * (table.scale[column] * whiten), table.prior.active[column]);
+  };
+  for (int k = first; k < end; ++k) row.front[k - first] = scaled(seen.front[k], k);
+  for (int k = 0; k < Model::kDense; ++k)
+    row.dense[k] = scaled(seen.dense[joint * Model::kDense + k], Model::kFront + k);
+  row.load_Nm = model::LoadTorque(table.committed.p, committed, joint);
+  row.model_Nm = model::RowTorque(table.committed.p, committed, joint, row.load_Nm);
+  row.residual_Nm = tau_Nm - row.model_Nm;
+  row.y = row.residual_Nm * whiten;
+}
+
+// Works the samples of an intake into one filter.
 // Filter: filter::ForgettingFilter<Model>, filter::ModelBank<Model>, filter::KalmanFilter<Model> or
 // filter::ExtendedKalmanFilter<Model>; the last two in either form.
 // Source: Intake<Model>, if the estimator has an intake of its own; Intake<Model>&, if several estimators share one.
@@ -117,15 +149,6 @@ class Estimator {
   // Credit of a sample's regressor, and of a row's whitening and statistics: from counts of six-axis models.
   static constexpr int kSampleCost = Intake<Model>::kEvaluationCost, kRowCost = 3 * Model::kDense;
 
-  // One row, whitened and in prior units: y = (tau - tau at b0) / sigma. In the extended filter as LiveModel says.
-  struct Row {
-    float front[Model::kFront > 0 ? Model::kFront : 1] = {};  // from the joint's first column on
-    float dense[Model::kDense] = {};
-    float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
-    float y = 0.0f;
-    float load_Nm = 0.0f, model_Nm = 0.0f;  // committed torque of the dense columns alone, and of all columns
-    float residual_Nm = 0.0f;               // measured minus committed
-  };
   struct Nothing {};
 
   // The next piece of work that is not cut. False: there is none.
@@ -189,39 +212,30 @@ class Estimator {
   }
 
   void BeginRow() {
-    Whiten(joint_, intake_.sample().tau[joint_]);
+    const float tau_Nm = intake_.sample().tau[joint_];
     const bool use = ((updating_ >> joint_) & 1u) != 0u;
-    if constexpr (Filter::kExtended) filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use, row_.eta);
-    else filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use);
+    FillRow(*table_, intake_.rows(), FilterRows(), joint_, tau_Nm, row_);
+    if constexpr (Filter::kExtended) {
+      AddLinearisation(joint_, tau_Nm);
+      filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use, row_.eta);
+    } else {
+      filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use);
+    }
     tau_model_Nm_[joint_] = row_.model_Nm;
     credit_ -= kRowCost;
     stage_ = Stage::kUpdate;
   }
 
-  // Fills in row_ for one joint.
-  void Whiten(int joint, float tau_Nm) {
+  // The extended filter's row is linearised at the live estimate: y = (tau - tau(x0)) / sigma + h x0.
+  void AddLinearisation(int joint, float tau_Nm) {
     const int first = Model::kFrontBegin[joint], end = Model::kFrontBegin[joint + 1];
     const float whiten = 1.0f / table_->sigma_Nm[joint];
-    const auto scaled = [&](float value, int column) {
-      return math::Masked(value * (table_->scale[column] * whiten), table_->prior.active[column]);
-    };
-    const model::Rows<Model>& rows = FilterRows();
-    for (int k = first; k < end; ++k) row_.front[k - first] = scaled(rows.front[k], k);
-    for (int k = 0; k < Model::kDense; ++k)
-      row_.dense[k] = scaled(rows.dense[joint * Model::kDense + k], Model::kFront + k);
-    const float* committed = table_->committed.p;
-    row_.load_Nm = model::LoadTorque(committed, intake_.rows(), joint);
-    row_.model_Nm = model::RowTorque(committed, intake_.rows(), joint, row_.load_Nm);
-    row_.residual_Nm = tau_Nm - row_.model_Nm;
-    row_.y = row_.residual_Nm * whiten;
-    if constexpr (Filter::kExtended) {
-      live_.EtaRow(*table_, joint, row_.eta);
-      float y = (tau_Nm - live_.Torque(joint)) * whiten;
-      for (int k = first; k < end; ++k) y += row_.front[k - first] * live_.x0(k);
-      for (int k = 0; k < Model::kDense; ++k) y += row_.dense[k] * live_.x0(Model::kFront + k);
-      for (int e = 0; e < Model::kNonlinear; ++e) y += (row_.eta[e] *= whiten) * live_.x0(Model::kColumns + e);
-      row_.y = y;
-    }
+    live_.EtaRow(*table_, joint, row_.eta);
+    float y = (tau_Nm - live_.Torque(joint)) * whiten;
+    for (int k = first; k < end; ++k) y += row_.front[k - first] * live_.x0(k);
+    for (int k = 0; k < Model::kDense; ++k) y += row_.dense[k] * live_.x0(Model::kFront + k);
+    for (int e = 0; e < Model::kNonlinear; ++e) y += (row_.eta[e] *= whiten) * live_.x0(Model::kColumns + e);
+    row_.y = y;
   }
   const model::Rows<Model>& FilterRows() const {
     if constexpr (Filter::kExtended) return live_.rows();
@@ -283,7 +297,7 @@ class Estimator {
   Filter filter_;
   typename Filter::ReadOut read_out_;
   std::conditional_t<Filter::kExtended, LiveModel<Model>, Nothing> live_;
-  Row row_;
+  Row<Model> row_;
   RowStatistics<Model> statistics_;
   Estimates<Model> estimates_;
   float tau_model_Nm_[n] = {};

@@ -216,7 +216,7 @@ class Estimator {
     const bool use = ((updating_ >> joint_) & 1u) != 0u;
     FillRow(*table_, intake_.rows(), FilterRows(), joint_, tau_Nm, row_);
     if constexpr (Filter::kExtended) {
-      AddLinearisation(joint_, tau_Nm);
+      live_.CompleteRow(*table_, joint_, tau_Nm, row_);
       filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use, row_.eta);
     } else {
       filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use);
@@ -226,17 +226,6 @@ class Estimator {
     stage_ = Stage::kUpdate;
   }
 
-  // The extended filter's row is linearised at the live estimate: y = (tau - tau(x0)) / sigma + h x0.
-  void AddLinearisation(int joint, float tau_Nm) {
-    const int first = Model::kFrontBegin[joint], end = Model::kFrontBegin[joint + 1];
-    const float whiten = 1.0f / table_->sigma_Nm[joint];
-    live_.EtaRow(*table_, joint, row_.eta);
-    float y = (tau_Nm - live_.Torque(joint)) * whiten;
-    for (int k = first; k < end; ++k) y += row_.front[k - first] * live_.x0(k);
-    for (int k = 0; k < Model::kDense; ++k) y += row_.dense[k] * live_.x0(Model::kFront + k);
-    for (int e = 0; e < Model::kNonlinear; ++e) y += (row_.eta[e] *= whiten) * live_.x0(Model::kColumns + e);
-    row_.y = y;
-  }
   const model::Rows<Model>& FilterRows() const {
     if constexpr (Filter::kExtended) return live_.rows();
     else return intake_.rows();

@@ -39,14 +39,20 @@ class LiveModel {
   }
 
   const model::Rows<Model>& rows() const { return rows_; }
-  float Torque(int joint) const { return model::RowTorque(p_, rows_, joint); }
-  // d tau / d x of the eta columns in N m. Shape: slope [kNonlinear].
-  void EtaRow(const AdoptedTable<Model>& table, int joint, float* slope) const {
+  // Completes a row that FillRow has filled in: eta = d tau / d x, whitened, and y = (tau - tau(x0)) / sigma + h x0.
+  template <class Row>
+  void CompleteRow(const AdoptedTable<Model>& table, int joint, float tau_Nm, Row& row) const {
+    const int first = Model::kFrontBegin[joint], end = Model::kFrontBegin[joint + 1];
+    const float whiten = 1.0f / table.sigma_Nm[joint];
     for (int e = 0; e < kNonlinear; ++e)
-      slope[e] = math::Masked(jacobian_[joint * kNonlinear + e] * EtaSlope(table, e, eta_[e]),
-                              table.prior.active[Model::kColumns + e]);
+      row.eta[e] = math::Masked(jacobian_[joint * kNonlinear + e] * EtaSlope(table, e, eta_[e]),
+                                table.prior.active[Model::kColumns + e]);
+    float y = (tau_Nm - model::RowTorque(p_, rows_, joint)) * whiten;
+    for (int k = first; k < end; ++k) y += row.front[k - first] * x0_[k];
+    for (int k = 0; k < Model::kDense; ++k) y += row.dense[k] * x0_[Model::kFront + k];
+    for (int e = 0; e < kNonlinear; ++e) y += (row.eta[e] *= whiten) * x0_[Model::kColumns + e];
+    row.y = y;
   }
-  float x0(int column) const { return x0_[column]; }
 
  private:
   static constexpr int kCarried = Model::kStates + Model::kSensitivities;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <thread>
 
-#include "armcal/estimator/trace_records.hpp"
+#include "armcal/controller/trace_records.hpp"
 #include "armcal/link/registers.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/report/progress.hpp"
@@ -17,7 +17,6 @@
 namespace armcal::client {
 namespace {
 
-namespace words = model::words;
 namespace reg = link::reg;
 
 struct Player {
@@ -29,23 +28,23 @@ struct Player {
 
 Player ReadPlayer(DriveClient& drive) {
   const auto w = drive.ReadInput(drive::kPlayerStatus, drive::kPlayerStatusCount);
-  return {static_cast<drive::PlayerState>(w[0]), static_cast<drive::StopReason>(w[1]), words::GetU32(&w[2]),
-          words::GetU32(&w[4]), words::GetU32(&w[6])};
+  return {static_cast<drive::PlayerState>(w[0]), static_cast<drive::StopReason>(w[1]), core::GetU32(&w[2]),
+          core::GetU32(&w[4]), core::GetU32(&w[6])};
 }
 
 void Upload(DriveClient& drive, const trajectory::Trajectory& t) {
   const int n = t.joints(), points = static_cast<int>(t.q.rows()), chunk = (drive::kPlayerPointsCount - 2) / (2 * n);
   std::uint16_t setup[4];
-  words::PutU32(setup, points);
-  words::PutU32(setup + 2, static_cast<std::uint32_t>(std::lround(t.step_s * 1e6)));
+  core::PutU32(setup, points);
+  core::PutU32(setup + 2, static_cast<std::uint32_t>(std::lround(t.step_s * 1e6)));
   drive.Write(drive::kPlayerSetup, setup);
   report::Progress progress("load trajectory");
   std::vector<std::uint16_t> w;
   for (int first = 0; first < points; first += chunk) {
     const int count = std::min(chunk, points - first);
     w.assign(2 + 2 * n * count, 0);
-    words::PutU32(w.data(), first);
-    for (int k = 0; k < count * n; ++k) words::PutF32(&w[2 + 2 * k], static_cast<float>(t.q(first + k / n, k % n)));
+    core::PutU32(w.data(), first);
+    for (int k = 0; k < count * n; ++k) core::PutF32(&w[2 + 2 * k], static_cast<float>(t.q(first + k / n, k % n)));
     drive.Write(drive::kPlayerPoints, w);
     progress.Set(static_cast<double>(first + count) / points);
   }
@@ -83,12 +82,12 @@ class Traces {
     TraceRequest request;
     request.decimation = static_cast<std::uint16_t>(o.decimation > 0 ? o.decimation : sample_ticks);
     request.start_tick = (drive.ReadStatus().tick / sample_ticks + 2) * sample_ticks;
-    request.channels = o.lean ? estimator::kRawMotion | estimator::kRawFlags : estimator::kRawAll;
+    request.channels = o.lean ? controller::kRawMotion | controller::kRawFlags : controller::kRawAll;
     StartTrace(drive, 0, request);
     reader_.emplace(drive, 0);
     if (o.samples.empty()) return;
     TraceRequest all;
-    all.channels = estimator::kSampleAll;
+    all.channels = controller::kSampleAll;
     StartTrace(drive, 1, all);
     sample_reader_.emplace(drive, 1);
   }

@@ -4,11 +4,10 @@
 #include <Eigen/LU>
 #include <numbers>
 
-#include "armcal/estimator/trace_records.hpp"
+#include "armcal/controller/trace_records.hpp"
 
 namespace armcal::client {
 
-namespace words = model::words;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -57,7 +56,7 @@ logs::Log RawLog(const TraceRecords& r, const codegen::Robot& robot, const Playe
   log.joints = n;
   log.source = "trace";
   log.t.resize(N);
-  const bool warm = r.channels & estimator::kRawTemperature, told = r.channels & estimator::kRawSetPoint;
+  const bool warm = r.channels & controller::kRawTemperature, told = r.channels & controller::kRawSetPoint;
   for (MatrixXd* m : {&log.q, &log.tau}) m->resize(N, n);
   if (warm) log.temp.resize(N, n);
   if (told) log.qref.resize(N, n), log.tauff.resize(N, n);
@@ -68,12 +67,12 @@ logs::Log RawLog(const TraceRecords& r, const codegen::Robot& robot, const Playe
     log.t[i] = static_cast<double>(r.ticks[inside[i]] - first_tick) / robot.tick_rate_Hz;
     for (int j = 0; j < n; ++j) {
       // 1/16 counts wrap at 2^32: signed, they reach +- 2^27 counts about zero, far beyond any joint's range
-      motor[j] = scale.counts_to_rad[j] * (static_cast<std::int32_t>(words::GetU32(w)) / 16.0 - scale.zero[j]);
-      current[j] = scale.lsb_to_Nm[j] * static_cast<std::int32_t>(words::GetU32(w + 2)) / 16.0;
+      motor[j] = scale.counts_to_rad[j] * (static_cast<std::int32_t>(core::GetU32(w)) / 16.0 - scale.zero[j]);
+      current[j] = scale.lsb_to_Nm[j] * static_cast<std::int32_t>(core::GetU32(w + 2)) / 16.0;
       w += 4;
-      if (warm) log.temp(i, j) = words::GetF32(w), w += 2;
+      if (warm) log.temp(i, j) = core::GetF32(w), w += 2;
       log.flags(i, j) = *w++;
-      if (told) log.qref(i, j) = words::GetF32(w), log.tauff(i, j) = words::GetF32(w + 2), w += 4;
+      if (told) log.qref(i, j) = core::GetF32(w), log.tauff(i, j) = core::GetF32(w + 2), w += 4;
     }
     log.q.row(i) = scale.to_joint * motor;
     log.tau.row(i) = scale.torque_to_joint * current;
@@ -95,11 +94,11 @@ logs::Log SampleLog(const TraceRecords& r, const codegen::Robot& robot, const Pl
   for (Eigen::Index i = 0; i < N; ++i) {
     log.t[i] = static_cast<double>(r.ticks[inside[i]]) / robot.tick_rate_Hz;
     const std::uint16_t* w = &r.words[inside[i] * r.record_words];
-    for (int j = 0; j < n; ++j, w += estimator::kSampleWordsPerJoint) {
-      log.q(i, j) = words::GetF32(w), log.qd(i, j) = words::GetF32(w + 2), log.qdd(i, j) = words::GetF32(w + 4);
-      log.tau(i, j) = words::GetF32(w + 6), log.temp(i, j) = words::GetF32(w + 8);
+    for (int j = 0; j < n; ++j, w += controller::kSampleWordsPerJoint) {
+      log.q(i, j) = core::GetF32(w), log.qd(i, j) = core::GetF32(w + 2), log.qdd(i, j) = core::GetF32(w + 4);
+      log.tau(i, j) = core::GetF32(w + 6), log.temp(i, j) = core::GetF32(w + 8);
       log.flags(i, j) = w[10];
-      log.tauff(i, j) = words::GetF32(w + 11);
+      log.tauff(i, j) = core::GetF32(w + 11);
     }
   }
   return log;

@@ -1,5 +1,5 @@
 // end-to-end tests - the loop in which a table is enough, its control, and the drive's estimate against double algebra.
-#include "armcal/estimator/trace_records.hpp"
+#include "armcal/controller/trace_records.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "codegen/generated/er20_like/model.hpp"
 #include "tests/e2e/demo_run.hpp"
@@ -42,7 +42,7 @@ struct Records {
     float tau_model[Model::kJoints];
     for (std::size_t k = 0; k < samples.size(); ++k) {
       samples[k].tick = ticks[k];
-      estimator::ReadSampleRecord<Model::kJoints>(&words[k * head[1]], samples[k], tau_model);
+      controller::ReadSampleRecord<Model::kJoints>(&words[k * head[1]], samples[k], tau_model);
     }
   }
 };
@@ -52,7 +52,7 @@ double WorstDistance(const Records& r, const std::vector<Sample>& samples) {
   auto host = std::make_unique<estimator::test::Host<Model, filter::ForgettingFilter<Model>>>();
   host->table = r.table;
   EXPECT_EQ(host->Adopt(), core::Status::kOk);
-  const std::vector<double> lambda(host->image.prior.lambda, host->image.prior.lambda + Model::kColumns);
+  const std::vector<double> lambda(host->adopted.prior.lambda, host->adopted.prior.lambda + Model::kColumns);
   const estimator::test::Oracle<Model> oracle(r.table, host->b0(), samples, lambda);
   const estimator::test::Matrix prior = estimator::test::PriorCovariance<Model>(r.table);
   double worst = 0;
@@ -88,7 +88,7 @@ TEST(TablePath, Asymmetry_IsFoundAndSwitchedOnByATable_AndTheDrivesEstimateIsThe
   auto host = std::make_unique<estimator::test::Host<Model, filter::ForgettingFilter<Model>>>();
   host->table = records.table;
   ASSERT_EQ(host->Adopt(), core::Status::kOk);
-  const std::vector<double> lambda(host->image.prior.lambda, host->image.prior.lambda + Model::kColumns);
+  const std::vector<double> lambda(host->adopted.prior.lambda, host->adopted.prior.lambda + Model::kColumns);
   EXPECT_GT(estimator::test::Oracle<Model>(records.table, host->b0(), fewer, lambda).Distance(records.estimate.data()),
             0.1);
 }

@@ -12,15 +12,15 @@ namespace {
 
 using Model = generated::Er20Like;
 
-estimator::ImageWork<Model> work;
-estimator::Image<Model> image;
+estimator::RigidPrior<Model, float> rigid;
+estimator::AdoptedTable<Model> adopted;
 
 // Push: the tick's share, of a tick that completes a sample and of the others. Sample: all slices of one.
 template <class Filter>
 void Measure(const char* name) {
   static estimator::Estimator<Model, Filter> arm;
   arm.SetPublishEvery(1000000);
-  arm.Adopt(image, 0);
+  arm.Adopt(adopted, 0);
   while (arm.Step()) {
   }
   RawTicks<Model::kJoints> ticks;
@@ -53,7 +53,7 @@ void Measure(const char* name) {
 }  // namespace
 
 void MeasureEstimators() {
-  if (!core::IsOk(estimator::BuildImage(estimator::DefaultTable<Model>(), 1, work, image))) return;
+  if (!core::IsOk(estimator::BuildAdoptedTable(estimator::DefaultTable<Model>(), 1, rigid, adopted))) return;
   Measure<filter::ForgettingFilter<Model>>("forgetting");
   Measure<filter::KalmanFilter<Model, filter::Form::kBlock>>("kalman_block");
   Measure<filter::KalmanFilter<Model>>("kalman_dense");

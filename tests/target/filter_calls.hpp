@@ -1,4 +1,4 @@
-// tests - a filter behind plain functions, so that one program can run them all; knows layouts, no model.
+// tests - a filter behind plain functions, so that one program can run them all.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// tests - the cost of one call, and the extremes of many; knows no program.
+// tests - the cost of one call, and the extremes of many.
 #pragma once
 
 #include "port/runner/runner.hpp"

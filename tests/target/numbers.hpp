@@ -1,4 +1,4 @@
-// tests - numbers and results that are the same on every machine; knows no program.
+// tests - numbers and results that are the same on every machine.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// tests - control ticks as an arm's hardware gives them, in integers; knows no arm.
+// tests - control ticks as an arm's hardware gives them, in integers.
 #pragma once
 
 #include "armcal/model/sample.hpp"

@@ -13,8 +13,8 @@ class ReadOutArm {
   using Model = generated::Er20Like;
 
   bool Start() {
-    if (!core::IsOk(estimator::BuildImage(estimator::DefaultTable<Model>(), 1, work_, image_))) return false;
-    estimator_.Adopt(image_, 0);
+    if (!core::IsOk(estimator::BuildAdoptedTable(estimator::DefaultTable<Model>(), 1, rigid_, adopted_))) return false;
+    estimator_.Adopt(adopted_, 0);
     return true;
   }
 
@@ -30,8 +30,8 @@ class ReadOutArm {
         x.qdd[i] = s.qdd[i] = 8.0f * numbers_.Signed();
         s.flags[i] = model::kValid | model::kMoving;
       }
-      const float* p = image_.committed.p;
-      Model::Regressor<float>(x, p, image_.committed.eta, nullptr, nullptr, front_, dense_);
+      const float* p = adopted_.committed.p;
+      Model::Regressor<float>(x, p, adopted_.committed.eta, nullptr, nullptr, front_, dense_);
       for (int i = 0; i < 6; ++i) {
         for (int c = Model::kFrontBegin[i]; c < Model::kFrontBegin[i + 1]; ++c) s.tau[i] += 1.2f * front_[c] * p[c];
         for (int c = 0; c < Model::kDense; ++c)
@@ -45,9 +45,7 @@ class ReadOutArm {
     Work();
   }
 
-  bool Begin(bool warm) {
-    return core::IsOk(estimator::BeginPhysical(image_, work_.rigid, estimator_, warm, read_out));
-  }
+  bool Begin(bool warm) { return core::IsOk(estimator::BeginPhysical(adopted_, rigid_, estimator_, warm, read_out)); }
 
   physical::MapReadOut<Model, double> read_out;
 
@@ -57,8 +55,8 @@ class ReadOutArm {
     }
   }
 
-  estimator::ImageWork<Model> work_;
-  estimator::Image<Model> image_;
+  estimator::RigidPrior<Model, float> rigid_;
+  estimator::AdoptedTable<Model> adopted_;
   estimator::Estimator<Model, filter::KalmanFilter<Model>> estimator_;
   float front_[Model::kFront] = {}, dense_[6 * Model::kDense] = {};
   Numbers numbers_{23};

@@ -1,4 +1,4 @@
-// tests - a generated regressor behind plain functions, so that one program can run them all; knows no filter.
+// tests - a generated regressor behind plain functions, so that one program can run them all.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// tests - rows of a six-axis layout, good ones and such that a filter must keep out; knows no filter.
+// tests - rows of a six-axis layout, good ones and such that a filter must keep out.
 #pragma once
 
 #include <limits>

@@ -20,10 +20,10 @@ struct Run {
     run.rows.Add(tau_model_Nm, 6);
     for (const std::uint8_t flags : sample.flags) run.rows.Add(std::uint32_t{flags});
   }
-  void Start(const estimator::Image<Model>& image) {
+  void Start(const estimator::AdoptedTable<Model>& adopted) {
     estimator.SetObserver(See, this);
     estimator.SetPublishEvery(1250);
-    estimator.Adopt(image, 0);
+    estimator.Adopt(adopted, 0);
   }
   void Tick(const model::RawSample<6>& raw) {
     (void)estimator.Push(raw);  // the background keeps up, below
@@ -78,10 +78,10 @@ std::uint32_t ForEachTick(Each each) {
 // taught one of them nothing.
 template <class Model, class... Filters>
 int RunAlong(Run<Model, Filters>&... runs) {
-  static estimator::ImageWork<Model> work;
-  static estimator::Image<Model> image;
-  if (!core::IsOk(estimator::BuildImage(estimator::DefaultTable<Model>(), 1, work, image))) return 1;
-  (runs.Start(image), ...);
+  static estimator::RigidPrior<Model, float> rigid;
+  static estimator::AdoptedTable<Model> adopted;
+  if (!core::IsOk(estimator::BuildAdoptedTable(estimator::DefaultTable<Model>(), 1, rigid, adopted))) return 1;
+  (runs.Start(adopted), ...);
   const std::uint32_t ticks = ForEachTick([&](const model::RawSample<6>& raw) { (runs.Tick(raw), ...); });
   (runs.Finish(), ...);
   port::runner::Line("ticks").Decimal(ticks).End();

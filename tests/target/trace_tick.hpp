@@ -1,4 +1,4 @@
-// tests - one control tick in a recorded trace, as bytes in a file; knows no arm.
+// tests - one control tick in a recorded trace, as bytes in a file.
 #pragma once
 
 #include "armcal/model/sample.hpp"

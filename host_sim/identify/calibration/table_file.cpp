@@ -80,23 +80,23 @@ std::vector<std::uint16_t> EncodeTable(const TableFile& t) {
   using namespace model;
   std::vector<std::uint16_t> out(kHeaderWords + t.joint.size() * kJointWords + t.row.size() * kParameterWords, 0);
   std::uint16_t* w = out.data();
-  words::PutU32(w, t.schema);
+  core::PutU32(w, t.schema);
   w[2] = kLayoutVersion;
   w[3] = static_cast<std::uint16_t>(t.joint.size());
   w[4] = static_cast<std::uint16_t>(t.row.size());
   w[5] = t.bumpless ? kFlagBumpless : 0;
-  words::PutU32(w + 6, t.blend_ms);
-  for (int g = 0; g < 4; ++g) words::PutF32(w + 8 + 2 * g, static_cast<float>(t.forgetting[g]));
+  core::PutU32(w + 6, t.blend_ms);
+  for (int g = 0; g < 4; ++g) core::PutF32(w + 8 + 2 * g, static_cast<float>(t.forgetting[g]));
   w += kHeaderWords;
   for (const TableJoint& j : t.joint) {
     const double values[] = {j.sigma_Nm, j.v_min_radps, j.torque_limit_Nm, j.torque_scale};
-    for (int k = 0; k < 4; ++k) words::PutF32(w + 2 * k, static_cast<float>(values[k]));
+    for (int k = 0; k < 4; ++k) core::PutF32(w + 2 * k, static_cast<float>(values[k]));
     w += kJointWords;
   }
   for (const TableRow& r : t.row) {
-    words::PutF32(w, static_cast<float>(r.mean));
-    words::PutF32(w + 2, static_cast<float>(r.sd));
-    words::PutF32(w + 4, static_cast<float>(r.process_noise));
+    core::PutF32(w, static_cast<float>(r.mean));
+    core::PutF32(w + 2, static_cast<float>(r.sd));
+    core::PutF32(w + 4, static_cast<float>(r.process_noise));
     w[6] = static_cast<std::uint16_t>(StateNumber(r.state) << 8 | r.group);
     w += kParameterWords;
   }
@@ -107,22 +107,22 @@ TableFile DecodeTable(const std::vector<std::uint16_t>& words, const TableFile& 
   using namespace model;
   TableFile t = like;
   const std::size_t expected = kHeaderWords + t.joint.size() * kJointWords + t.row.size() * kParameterWords;
-  if (words.size() != expected || words::GetU32(words.data()) != like.schema)
+  if (words.size() != expected || core::GetU32(words.data()) != like.schema)
     throw io::InputError("table: " + std::to_string(words.size()) + " words, expected " + std::to_string(expected) +
                          " of schema " + fmt::format("{:08X}", like.schema));
   const std::uint16_t* w = words.data();
   t.bumpless = w[5] & kFlagBumpless;
-  t.blend_ms = words::GetU32(w + 6);
-  for (int g = 0; g < 4; ++g) t.forgetting[g] = words::GetF32(w + 8 + 2 * g);
+  t.blend_ms = core::GetU32(w + 6);
+  for (int g = 0; g < 4; ++g) t.forgetting[g] = core::GetF32(w + 8 + 2 * g);
   w += kHeaderWords;
   for (TableJoint& j : t.joint) {
-    j = {words::GetF32(w), words::GetF32(w + 2), words::GetF32(w + 4), words::GetF32(w + 6)};
+    j = {core::GetF32(w), core::GetF32(w + 2), core::GetF32(w + 4), core::GetF32(w + 6)};
     w += kJointWords;
   }
   for (TableRow& r : t.row) {
-    r.mean = r.free_mean = words::GetF32(w);
-    r.sd = words::GetF32(w + 2);
-    r.process_noise = words::GetF32(w + 4);
+    r.mean = r.free_mean = core::GetF32(w);
+    r.sd = core::GetF32(w + 2);
+    r.process_noise = core::GetF32(w + 4);
     r.state = kStates[std::min(3, w[6] >> 8)];
     r.group = w[6] & 0xFF;
     w += kParameterWords;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "armcal/controller/controller.hpp"
-#include "armcal/estimator/trace_records.hpp"
+#include "armcal/controller/trace_records.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
 #include "armcal/link/tcp.hpp"
@@ -50,7 +50,7 @@ class Drive {
     Require(controller_.Record(raw_trace_));
     Require(sample_trace_.Serve(controller_.map(), 1));
     Require(vendor_.Serve(controller_.map()));
-    controller_.template filter<0>().SetObserver(&OnSample, this);
+    controller_.template estimator<0>().SetObserver(&OnSample, this);
     (void)controller_.Boot();  // its answer is served as table_status
     if (!o.truth_log.empty() && !(truth_ = std::fopen(o.truth_log.c_str(), "wb")))
       throw io::InputError(o.truth_log + ": cannot be written");
@@ -117,8 +117,8 @@ class Drive {
     auto& d = *static_cast<Drive*>(self);
     ++d.samples_seen_;
     if (!d.sample_trace_.Offer(sample.tick).last) return;
-    std::uint16_t record[estimator::SampleRecordWords<n>(estimator::kSampleAll)];
-    estimator::WriteSampleRecord<n>(sample, tau_model_Nm, record);
+    std::uint16_t record[controller::SampleRecordWords<n>(controller::kSampleAll)];
+    controller::WriteSampleRecord<n>(sample, tau_model_Nm, record);
     (void)d.sample_trace_.Push(record, d.controller_.generation());  // a refusal is counted in the trace
   }
 
@@ -136,8 +136,8 @@ class Drive {
     if (!busy && !player_.moving() &&
         read_out_at_ != samples_seen_) {  // what a reader finds after a motion is its last word
       read_out_at_ = samples_seen_;
-      controller_.template filter<0>().RequestReadOut();
-      controller_.template filter<1>().RequestReadOut();
+      controller_.template estimator<0>().RequestReadOut();
+      controller_.template estimator<1>().RequestReadOut();
     }
     if (controller_.generation() != generation) grant_ = kSettleTicks;
     return busy;
@@ -161,8 +161,7 @@ class Drive {
   }
   bool MayAdvance() {
     if (raw_trace_.recording().mode == link::TraceMode::kStreaming && raw_trace_.room() < 2) return false;
-    if (controller_.template filter<0>().pending() > kBacklog || controller_.template filter<1>().pending() > kBacklog)
-      return false;
+    if (controller_.template estimator<0>().pending() > kBacklog) return false;
     return player_.moving() || player_.command_pending() || grant_.load() > 0;
   }
 
@@ -203,7 +202,7 @@ class Drive {
       const double tau = robot_.control.kp_Nmprad[j] * (reference.q[j] - q[j]) +
                          robot_.control.kd_Nmsprad[j] * (reference.qd[j] - qd[j]) + static_cast<double>(tau_ff[j]);
       const double scale = controller_.feed_forward().valid()
-                               ? static_cast<double>(controller_.in_force().committed.torque_scale[j])
+                               ? static_cast<double>(controller_.adopted().committed.torque_scale[j])
                                : 1.0;
       command[j] =
           tau / (scale * static_cast<double>(Model::kAxes[j].lsb_to_Nm)) * robot_.joint[j].motor.current_A_per_lsb;
@@ -234,7 +233,7 @@ class Drive {
     if (tick % 4096 == 0) std::fflush(truth_);
   }
 
-  static std::uint16_t SampleWords(void*, std::uint32_t channels) { return estimator::SampleRecordWords<n>(channels); }
+  static std::uint16_t SampleWords(void*, std::uint32_t channels) { return controller::SampleRecordWords<n>(channels); }
 
   DriveOptions options_;
   codegen::Robot robot_;

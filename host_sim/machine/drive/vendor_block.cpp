@@ -10,7 +10,6 @@
 namespace armcal::drive {
 
 using core::Status;
-namespace words = model::words;
 
 namespace {
 constexpr std::uint32_t kMaxPoints = 200000, kMinStep_us = 500, kMaxStep_us = 50000;
@@ -33,9 +32,9 @@ Status VendorBlock::ReadStatus(void* self, std::uint16_t offset, std::uint16_t c
   const auto& b = *static_cast<VendorBlock*>(self);
   std::uint16_t w[kPlayerStatusCount] = {static_cast<std::uint16_t>(b.player_.state()),
                                          static_cast<std::uint16_t>(b.player_.reason())};
-  words::PutU32(w + 2, static_cast<std::uint32_t>(std::count(b.loaded_.begin(), b.loaded_.end(), 1)));
-  words::PutU32(w + 4, b.player_.first_tick());
-  words::PutU32(w + 6, b.player_.last_tick());
+  core::PutU32(w + 2, static_cast<std::uint32_t>(std::count(b.loaded_.begin(), b.loaded_.end(), 1)));
+  core::PutU32(w + 4, b.player_.first_tick());
+  core::PutU32(w + 6, b.player_.last_tick());
   std::copy_n(w + offset, count, out);
   return Status::kOk;
 }
@@ -82,7 +81,7 @@ Status VendorBlock::Obey(PlayerCommand command) {
 
 Status VendorBlock::WriteSetup(void* self, std::uint16_t, std::uint16_t, const std::uint16_t* w) {
   auto& b = *static_cast<VendorBlock*>(self);
-  const std::uint32_t points = words::GetU32(w), step = words::GetU32(w + 2);
+  const std::uint32_t points = core::GetU32(w), step = core::GetU32(w + 2);
   if (points < 10 || points > kMaxPoints || step < kMinStep_us || step > kMaxStep_us) return Status::kOutOfRange;
   b.points_ = points;
   b.step_us_ = step;
@@ -94,12 +93,12 @@ Status VendorBlock::WriteSetup(void* self, std::uint16_t, std::uint16_t, const s
 Status VendorBlock::WritePoints(void* self, std::uint16_t offset, std::uint16_t count, const std::uint16_t* w) {
   auto& b = *static_cast<VendorBlock*>(self);
   if (offset != 0 || count < 2 || (count - 2) % (2 * b.joints_) != 0) return Status::kWrongSize;
-  const std::uint32_t first = words::GetU32(w), points = static_cast<std::uint32_t>((count - 2) / (2 * b.joints_));
+  const std::uint32_t first = core::GetU32(w), points = static_cast<std::uint32_t>((count - 2) / (2 * b.joints_));
   if (first + points > b.points_) return Status::kOutOfRange;
   for (int k = 2; k < count; k += 2)
-    if (!std::isfinite(words::GetF32(w + k))) return Status::kNotFinite;
+    if (!std::isfinite(core::GetF32(w + k))) return Status::kNotFinite;
   for (std::uint32_t k = 0; k < points * b.joints_; ++k)
-    b.position_[first * b.joints_ + k] = words::GetF32(w + 2 + 2 * k);
+    b.position_[first * b.joints_ + k] = core::GetF32(w + 2 + 2 * k);
   std::fill_n(b.loaded_.begin() + first, points, 1);
   return Status::kOk;
 }

@@ -27,11 +27,11 @@ class HostPort {
     const core::Status decoded = model::Decode(words.data(), Model::kSchema, table_);
     if (!core::IsOk(decoded))
       throw io::InputError("table: refused as on the drive, status " + std::to_string(static_cast<int>(decoded)));
-    const core::Status built = estimator::BuildImage<Model>(table_, 1, *work_, *image_);
+    const core::Status built = estimator::BuildAdoptedTable<Model>(table_, 1, *rigid_, *adopted_);
     if (!core::IsOk(built))
       throw io::InputError("table: refused as on the drive, status " + std::to_string(static_cast<int>(built)));
-    a_->Adopt(*image_, 0);
-    b_->Adopt(*image_, 0);
+    a_->Adopt(*adopted_, 0);
+    b_->Adopt(*adopted_, 0);
   }
   void Add(const Sample& s) {
     Run();
@@ -45,7 +45,7 @@ class HostPort {
     Run();
     (void)a_->Take(a);
     (void)b_->Take(b);
-    const core::Status begun = estimator::BeginPhysical(*image_, work_->rigid, *b_, false, *bodies_);
+    const core::Status begun = estimator::BeginPhysical(*adopted_, *rigid_, *b_, false, *bodies_);
     if (!core::IsOk(begun))
       throw io::InputError("physical read-out: refused, status " + std::to_string(static_cast<int>(begun)));
     while (!bodies_->Step()) {
@@ -65,8 +65,8 @@ class HostPort {
     }
   }
   estimator::Table<Model> table_;
-  std::unique_ptr<estimator::ImageWork<Model>> work_ = std::make_unique<estimator::ImageWork<Model>>();
-  std::unique_ptr<estimator::Image<Model>> image_ = std::make_unique<estimator::Image<Model>>();
+  std::unique_ptr<estimator::RigidPrior<Model, float>> rigid_ = std::make_unique<estimator::RigidPrior<Model, float>>();
+  std::unique_ptr<estimator::AdoptedTable<Model>> adopted_ = std::make_unique<estimator::AdoptedTable<Model>>();
   std::unique_ptr<estimator::Estimator<Model, filter::ForgettingFilter<Model>>> a_ =
       std::make_unique<estimator::Estimator<Model, filter::ForgettingFilter<Model>>>();
   std::unique_ptr<estimator::Estimator<Model, filter::KalmanFilter<Model>>> b_ =

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include <selected_model.hpp>
-#include "armcal/estimator/trace_records.hpp"
+#include "armcal/controller/trace_records.hpp"
 #include "armcal/link/registers.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/client/trace_reader.hpp"
@@ -78,7 +78,7 @@ int Live(const Options& o, const codegen::Model& m) {
   const std::vector<std::uint16_t> table = client::ReadActiveTable(drive);
   HostPort port(table);
   client::TraceRequest request;
-  request.channels = estimator::kSampleAll;
+  request.channels = controller::kSampleAll;
   client::StartTrace(drive, 1, request);
   client::TraceReader reader(drive, 1, client::Gaps::kRefuse);
   std::printf("estimate: listening to %s\n", drive.name().c_str());
@@ -101,7 +101,7 @@ int Live(const Options& o, const codegen::Model& m) {
       Sample s;
       float tau_model[n];
       s.tick = page.ticks[k];
-      estimator::ReadSampleRecord<n>(&page.words[k * page.record_words], s, tau_model);
+      controller::ReadSampleRecord<n>(&page.words[k * page.record_words], s, tau_model);
       for (int j = 0; j < n; ++j) used += (s.flags[j] & model::kUsed) != 0;
       port.Add(s);
     }

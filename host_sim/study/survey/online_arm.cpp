@@ -7,7 +7,7 @@
 #include <stribeck_arm/model.hpp>
 
 #include "armcal/estimator/physical_read_out.hpp"
-#include "armcal/filter/extended_kalman_filter.hpp"
+#include "armcal/filter/kalman_filter.hpp"
 #include "codegen/generated/er20_like/model.hpp"
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
@@ -55,19 +55,20 @@ model::Sample<Arm::kJoints> SampleOf(const calibration::Dataset& log, const code
 template <class Arm, class Filter>
 OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm) {
   struct Drive {
-    estimator::ImageWork<Arm> work;
-    estimator::Image<Arm> image;
+    estimator::RigidPrior<Arm, float> rigid;
+    estimator::AdoptedTable<Arm> adopted;
     estimator::Estimator<Arm, Filter> estimator;
     estimator::Estimates<Arm> estimates;
     physical::MapReadOut<Arm, double> read_out;
   };
   const auto began = std::chrono::steady_clock::now();
   const auto drive = std::make_unique<Drive>();
-  const core::Status built = estimator::BuildImage(TableOf<Arm>(prior, sigma_Nm), 1, drive->work, drive->image);
+  const core::Status built =
+      estimator::BuildAdoptedTable(TableOf<Arm>(prior, sigma_Nm), 1, drive->rigid, drive->adopted);
   if (!core::IsOk(built)) throw io::InputError(prior.robot().path + ": expected bodies that can exist");
   auto& arm = drive->estimator;
   arm.SetPublishEvery(1u << 30);
-  arm.Adopt(drive->image, 0);
+  arm.Adopt(drive->adopted, 0);
   const auto work = [&] {
     while (arm.Step()) {
     }
@@ -84,7 +85,7 @@ OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, c
   out.inconsistent = drive->estimates.inconsistent;
   out.filter = Eigen::Map<const Eigen::VectorXf>(drive->estimates.value, Arm::kColumns).cast<double>();
   out.filter_sd = Eigen::Map<const Eigen::VectorXf>(drive->estimates.sd, Arm::kColumns).cast<double>();
-  const core::Status begun = estimator::BeginPhysical(drive->image, drive->work.rigid, arm, false, drive->read_out);
+  const core::Status begun = estimator::BeginPhysical(drive->adopted, drive->rigid, arm, false, drive->read_out);
   while (core::IsOk(begun) && !drive->read_out.Step()) {
   }
   out.inconsistent |= estimator::PriorIsTooNarrow(drive->read_out);

@@ -13,7 +13,7 @@ std::string Name(OnlineFilter filter);
 struct OnlineResult {
   calibration::Solution solution;     // of the physical read-out; covariance: its diagonal alone
   Eigen::VectorXd filter, filter_sd;  // [columns] of the filter's own read-out
-  bool inconsistent = false;          // monitor::Consistency, or estimator::PriorIsTooNarrow
+  bool inconsistent = false;          // monitor::InnovationTest, or estimator::PriorIsTooNarrow
 };
 
 // True if the filter is compiled for this model.

@@ -1,14 +1,13 @@
-// controller - connects estimators, feed-forward, table and link to one motion controller.
+// controller - connects estimators, feed-forward, table and link to one motion controller without a board and a bus.
 #pragma once
 
 #include <atomic>
 #include <tuple>
 #include <utility>
 
-#include "armcal/controller/raw_trace.hpp"
-#include "armcal/controller/set_point.hpp"
+#include "armcal/controller/trace_records.hpp"
 #include "armcal/estimator/estimator.hpp"
-#include "armcal/estimator/image.hpp"
+#include "armcal/estimator/intake.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
 #include "armcal/hardware/clock.hpp"
 #include "armcal/hardware/storage.hpp"
@@ -19,8 +18,15 @@
 
 namespace armcal::controller {
 
-// One motion controller: lives as long as the power is on; some 80 KB for six joints. Filters: one or two of those
-// that estimator::Estimator takes; the first is served as filter A, the second as filter B.
+// Where the axes shall be. Shapes: [n], rad (m), rad/s, rad/s^2.
+template <int n>
+struct SetPoint {
+  float q[n], qd[n], qdd[n];
+};
+
+// One motion controller. It lives as long as the power is on, and takes some 80 KB for six joints. Filters: one or two
+// of those that estimator::Estimator takes. Registers call the first one filter A and the second one filter B. Both
+// work on the samples of one intake, so the signal path and the regressor run once.
 template <class Model, class... Filters>
 class Controller {
   static_assert(sizeof...(Filters) == 1 || sizeof...(Filters) == 2);
@@ -30,21 +36,22 @@ class Controller {
   static constexpr int kFilters = sizeof...(Filters);
   static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
 
-  // What the model says of itself is filled in; what of `identity` remains is the integrator's: versions, texts,
-  // capabilities beyond those of this class.
+  // `identity`: versions, texts and further capabilities, which are the integrator's. This class fills in the rest from
+  // the model.
   Controller(const hardware::Storage& storage, const hardware::Clock& clock, const link::Identity& identity = {})
       : clock_(clock),
         store_(storage, Model::kSchema, kWords),
         transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords),
-        device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals}) {
+        device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals}),
+        estimators_(Shared<Filters>()...) {
     model::Encode(estimator::DefaultTable<Model>(), active_);
-    filter<0>().SetResiduals(&residuals_);
+    estimator<0>().SetResiduals(&residuals_);
   }
   Controller(const Controller&) = delete;
 
-  // Once, before the first tick. Without a valid table in storage the estimators start from the model's defaults and
-  // the feed-forward stays off. Answers as table::TableStore::Load, which is served, too; a status of
-  // link::RegisterMap::Add is a wrong map. Context: background.
+  // Call it once, before the first tick. Without a valid table in storage, the estimators start from the model's
+  // defaults, and feed-forward stays off. Answers as table::TableStore::Load; a register serves that answer, too. A
+  // status of link::RegisterMap::Add means a wrong map. Context: background.
   core::Status Boot() {
     const core::Status served = Serve(std::make_index_sequence<kFilters>());
     if (!core::IsOk(served)) return served;
@@ -57,11 +64,11 @@ class Controller {
     return stored;
   }
 
-  // Which axes are under control, a bit each: a table is then adopted only if it is bumpless. Context: any.
+  // Which axes are under control, a bit each. While there is one, only a bumpless table is adopted. Context: any.
   void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
 
-  // From now on a client can record what Push and FeedForward were given; `ring` outlives this. Once, before the first
-  // tick. Answers as link::Trace::Serve. Context: background.
+  // Lets a client record what Push and FeedForward were given. `ring` must live as long as this object. Call it once,
+  // before the first tick. Answers as link::Trace::Serve. Context: background.
   template <std::uint32_t kRingWords>
   core::Status Record(RawTrace<Model, kRingWords>& ring) {
     const core::Status served = ring.Serve(device_.map(), 0);
@@ -71,7 +78,7 @@ class Controller {
     return served;
   }
 
-  // Joint torque of the set-point by the table in force. tau_Nm: [n], zero without a table. Answers as
+  // Joint torque of the set-point by the adopted table. tau_Nm: [n], zero without a valid table. Answers as
   // feedforward::FeedForward::Evaluate. Context: tick.
   core::Status FeedForward(const SetPoint<n>& set, const float* temperature_degC, float* tau_Nm) {
     const std::uint32_t since = clock_.Ticks() - adopted_tick_.load(std::memory_order_relaxed);
@@ -88,19 +95,15 @@ class Controller {
     return status;
   }
 
-  // One measured sample. Constant time. kFull: an estimator is late and lost one (counted). Context: tick.
+  // What was measured in one tick. Constant time. kFull: the estimators are late and lost a sample (counted).
+  // Context: tick.
   core::Status Push(const model::RawSample<n>& raw) {
-    core::Status status = core::Status::kOk;
-    const auto push = [&](auto& estimator) {
-      const core::Status pushed = estimator.Push(raw);
-      if (!core::IsOk(pushed)) status = pushed;
-    };
-    ForEach(push);
+    const core::Status status = intake_.Push(raw);
     if (trace_ != nullptr) RecordTick(raw);
     return status;
   }
 
-  // One bounded slice of everything that has time. False: nothing was left to do. Context: background.
+  // One bounded slice of all work that is not the tick's. False: nothing was left to do. Context: background.
   bool Step() {
     device_.Step(clock_.Ms());
     bool busy = store_.busy() || transaction_.state() == link::TransactionState::kCommitting;
@@ -112,14 +115,18 @@ class Controller {
   link::PduEngine& engine() { return device_.engine(); }  // for a link::RtuService or TcpService
   link::RegisterMap& map() { return device_.map(); }      // for blocks of the integrator's, before the first request
   template <int k>
-  auto& filter() {
+  auto& estimator() {
     return std::get<k>(estimators_);
   }
   const feedforward::FeedForward<Model>& feed_forward() const { return feed_forward_; }  // context: tick
-  const estimator::Image<Model>& in_force() const { return images_[in_force_.load(std::memory_order_relaxed)]; }
+  const estimator::AdoptedTable<Model>& adopted() const { return adopted_[in_force_.load(std::memory_order_relaxed)]; }
   std::uint32_t generation() const { return generation_; }  // adoptions since power-up; context: background
 
  private:
+  template <class Filter>
+  estimator::Intake<Model>& Shared() {
+    return intake_;
+  }
   template <class Call>
   void ForEach(Call call) {
     std::apply([&](auto&... estimator) { (call(estimator), ...); }, estimators_);
@@ -165,8 +172,8 @@ class Controller {
     live_.tick = clock_.Ticks();
     live_.enabled_axes = enabled_axes_.load(std::memory_order_relaxed);
     live_.clamp_count = clamp_count_.load(std::memory_order_relaxed);
-    live_.sample_gaps = filter<0>().refused_samples();
-    (Show(k, filter<k>()), ...);
+    live_.sample_gaps = intake_.refused();
+    (Show(k, estimator<k>()), ...);
   }
   template <class Estimator>
   void Show(std::size_t k, Estimator& estimator) {
@@ -181,14 +188,14 @@ class Controller {
     live_.health = static_cast<std::uint16_t>(e.inconsistent ? live_.health | bit : live_.health & ~bit);
   }
 
-  // Context: tick. A full ring counts what it refuses.
+  // Context: tick. A full ring refuses the record and counts that.
   void RecordTick(const model::RawSample<n>& raw) {
     const link::TraceTurn turn = trace_->Offer(raw.tick);
     if (!turn.recording) return;
     if (turn.first) record_.Clear();
     record_.Add(raw, told_q_, told_Nm_);
     if (!turn.last) return;
-    std::uint16_t words[estimator::RawRecordWords<n>(estimator::kRawAll)];
+    std::uint16_t words[RawRecordWords<n>(kRawAll)];
     record_.Write(trace_->recording().channels, words);
     (void)trace_->Push(words, feed_forward_.generation());
   }
@@ -200,7 +207,7 @@ class Controller {
     const auto& c = *static_cast<const Controller*>(self);
     page.generation = c.generation_;
     page.elapsed_s = c.residuals_.elapsed_s();
-    page.sigma_Nm = c.in_force().sigma_Nm[joint];
+    page.sigma_Nm = c.adopted().sigma_Nm[joint];
     c.residuals_.Write(joint, page.values);
   }
   static core::Status Hold(void* self, bool hold) {
@@ -240,11 +247,11 @@ class Controller {
   }
 
   bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
-  // The one of the two that nobody reads. The estimators read the other one, and the feed-forward has a copy.
-  estimator::Image<Model>& Spare() { return images_[1 - in_force_.load(std::memory_order_relaxed)]; }
-  // Answers as BuildImage; kOutOfRange also if a filter's form cannot hold what the table asks for.
+  // The adopted table that nobody reads: the estimators read the other one, and the feed-forward has a copy.
+  estimator::AdoptedTable<Model>& Spare() { return adopted_[1 - in_force_.load(std::memory_order_relaxed)]; }
+  // Answers as BuildAdoptedTable; kOutOfRange also if a filter's form cannot hold what the table asks for.
   core::Status BuildSpare() {
-    const core::Status built = estimator::BuildImage(table_, generation_ + 1, work_, Spare());
+    const core::Status built = estimator::BuildAdoptedTable(table_, generation_ + 1, rigid_, Spare());
     if (!core::IsOk(built)) return built;
     bool suits = true;
     ForEach([&](auto& estimator) { suits &= estimator.Suits(Spare()); });
@@ -254,7 +261,8 @@ class Controller {
     spare_is_checked_ = false;  // from now on the spare is the table before
     const std::uint32_t now = clock_.Ticks();
     adopted_tick_.store(now, std::memory_order_relaxed);
-    ForEach([&](auto& estimator) { estimator.Adopt(Spare(), now); });
+    ForEach([&](auto& estimator) { estimator.Restart(Spare(), now); });
+    intake_.Adopt(Spare(), now);
     generation_ = Spare().committed.generation;
     in_force_.store(1 - in_force_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }
@@ -268,14 +276,15 @@ class Controller {
 
   feedforward::FeedForward<Model> feed_forward_;
   link::Trace* trace_ = nullptr;
-  estimator::RawRecord<n> record_;          // the tick's, as the two below
+  RawRecord<n> record_;                     // the tick's, as the two below
   float told_q_[n] = {}, told_Nm_[n] = {};  // by the last FeedForward
-  std::tuple<estimator::Estimator<Model, Filters>...> estimators_;
+  estimator::Intake<Model> intake_;
+  std::tuple<estimator::Estimator<Model, Filters, estimator::Intake<Model>&>...> estimators_;
   estimator::Estimates<Model> estimates_[kFilters];
   monitor::ResidualStatistics<n> residuals_;
   estimator::Table<Model> table_;  // the last one that was decoded
-  estimator::ImageWork<Model> work_;
-  estimator::Image<Model> images_[2];
+  estimator::RigidPrior<Model, float> rigid_;
+  estimator::AdoptedTable<Model> adopted_[2];
   bool spare_is_checked_ = false;  // the spare is what the last Check was given
   std::uint32_t generation_ = 0;
   std::atomic<int> in_force_{0};

@@ -1,93 +1,129 @@
-// estimator - where model and filter meet: samples in, estimates out; knows no register and no storage.
+// estimator - works the samples of an intake into a filter, and publishes what the filter knows.
 #pragma once
+
+#include <type_traits>
 
 #include "armcal/core/mailbox.hpp"
 #include "armcal/estimator/estimates.hpp"
-#include "armcal/estimator/image.hpp"
 #include "armcal/estimator/intake.hpp"
-#include "armcal/estimator/row_statistics.hpp"
-#include "armcal/estimator/sample_rows.hpp"
-#include "armcal/filter/row.hpp"
-#include "armcal/filter/slices.hpp"
+#include "armcal/estimator/live_model.hpp"
+#include "armcal/math/columns.hpp"
 
 namespace armcal::estimator {
 
-// Filter: filter::ForgettingFilter<Model>, filter::ModelBank<Model>, filter::KalmanFilter<Model>,
-// filter::ExtendedKalmanFilter<Model>, the last two in either form.
+// One joint's row at one sample, whitened and in prior units.
+template <class Model>
+struct Row {
+  float front[Model::kFront > 0 ? Model::kFront : 1] = {};  // from the joint's first column on
+  float dense[Model::kDense] = {};
+  float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // extended filter only
+  float y = 0.0f;
+  float load_Nm = 0.0f, model_Nm = 0.0f;  // committed torque of the dense columns alone, and of all columns
+  float residual_Nm = 0.0f;               // measured minus committed
+};
+
+// Fills in all but eta. y = (tau - tau at b0) / sigma. committed, seen: the regressor at the committed parameters, and
+// the one that the filter sees. One copy serves all estimators of a model. Context: background.
+template <class Model>
+ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows<Model>& committed,
+                             const model::Rows<Model>& seen, int joint, float tau_Nm, Row<Model>& row) {
+  const int first = Model::kFrontBegin[joint], end = Model::kFrontBegin[joint + 1];
+  const float whiten = 1.0f / table.sigma_Nm[joint];
+  const auto scaled = [&](float value, int column) {
+    return math::Masked(value * (table.scale[column] * whiten), table.prior.active[column]);
+  };
+  for (int k = first; k < end; ++k) row.front[k - first] = scaled(seen.front[k], k);
+  for (int k = 0; k < Model::kDense; ++k)
+    row.dense[k] = scaled(seen.dense[joint * Model::kDense + k], Model::kFront + k);
+  row.load_Nm = model::LoadTorque(table.committed.p, committed, joint);
+  row.model_Nm = model::RowTorque(table.committed.p, committed, joint, row.load_Nm);
+  row.residual_Nm = tau_Nm - row.model_Nm;
+  row.y = row.residual_Nm * whiten;
+}
+
+// Works the samples of an intake into one filter.
+// Filter: filter::ForgettingFilter<Model>, filter::ModelBank<Model>, filter::KalmanFilter<Model> or
+// filter::ExtendedKalmanFilter<Model>; the last two in either form.
+// Source: Intake<Model>, if the estimator has an intake of its own; Intake<Model>&, if several estimators share one.
 // Push and PushSample belong to the tick (use one of the two), everything else to the background.
-template <class Model, class Filter>
+template <class Model, class Filter, class Source = Intake<Model>>
 class Estimator {
  public:
   static constexpr int n = Model::kJoints;
   static constexpr std::uint32_t kRingSamples = Intake<Model>::kRingSamples;
-  // Called once a sample after its rows: flags carry kUsed where a row changed the estimate.
+  // Called once a sample after its rows. Flags carry kUsed where a row changed the estimate.
   using Observer = void (*)(void* context, const model::Sample<n>& sample, const float* tau_model_Nm);
 
-  // One control tick. kOk; kFull: a sample became ready and was refused whole because the background is late
-  // (counted). Context: tick.
-  core::Status Push(const model::RawSample<n>& raw) { return intake_.Push(raw); }
+  Estimator() = default;
+  template <class Shared, class = std::enable_if_t<std::is_same_v<Shared&, Source>>>
+  explicit Estimator(Shared& intake) : intake_(intake) {}
 
-  // A sample that a signal path made elsewhere (torque scale and flags already inside); the rest is bit for bit the
-  // same. kFull as above. Context: tick, or a host's only thread.
+  // As Intake::Push and Intake::PushSample. Where several estimators share an intake, call those, once.
+  core::Status Push(const model::RawSample<n>& raw) { return intake_.Push(raw); }
   core::Status PushSample(const model::Sample<n>& sample) { return intake_.PushSample(sample); }
 
-  // False: the filter's form cannot hold what the table asks for (see filter::Form); a table transaction refuses it.
-  static bool Suits(const Image<Model>& image) { return Filter::Suits(image.prior); }
+  // False: the filter's form cannot represent what the table asks for (see filter::Form). Do not adopt such a table.
+  static bool Suits(const AdoptedTable<Model>& table) { return Filter::Suits(table.prior); }
 
-  // Restarts filter, statistics and signal path from `image`, which must suit and stay as it is until the next Adopt;
-  // its generation must differ from the one before and from 0. Samples made before are dropped. adopted_tick: zero of
-  // the model's time. Context: background.
-  void Adopt(const Image<Model>& image, std::uint32_t adopted_tick) {
-    image_ = &image;
+  // Restarts filter, statistics and signal path from `table`, which must suit and must stay as it is until the next
+  // Adopt. Its generation must differ from the one before and from 0. Samples made before are dropped. adopted_tick:
+  // zero of the model's time. Where several estimators share an intake, call Intake::Adopt once, then Restart of each.
+  // Context: background.
+  void Adopt(const AdoptedTable<Model>& table, std::uint32_t adopted_tick) {
+    Restart(table, adopted_tick);
+    intake_.Adopt(table, adopted_tick);
+  }
+  void Restart(const AdoptedTable<Model>& table, std::uint32_t adopted_tick) {
+    table_ = &table;
     stands_ = false;
-    filter_.Restart(image.prior);
+    filter_.Restart(table.prior);
     estimates_ = Estimates<Model>{};
-    estimates_.generation = image.committed.generation;
+    estimates_.generation = table.committed.generation;
     statistics_.Restart(adopted_tick);
-    rows_.Restart(image, adopted_tick);
+    if constexpr (Filter::kExtended) live_.Restart();
     stage_ = Stage::kIdle;
     credit_ = 0;
     resets_due_ = 0;
     slice_ = filter::EqualSlices(filter_.SampleCost() + kSampleCost + n * kRowCost);
     read_out_due_ = true;
-    intake_.Adopt(image.committed);
   }
 
-  // Works until `budget` is spent, in elements of a filter's columns: eight instructions each on a Cortex-M4F. A column
-  // or a regressor is not cut; what it takes too much is taken off the next call. False: nothing to do.
-  // May be interrupted anywhere. Context: background.
+  // Works until `budget` is spent, counted in elements of a filter's columns: eight instructions each on a Cortex-M4F.
+  // A column or a regressor is not cut; what it spends too much is taken off the next call. False: nothing to do. May
+  // be interrupted anywhere. Context: background.
   bool Step(int budget) {
     credit_ += budget;
     bool worked = false;
     while (credit_ > 0) {
       if (!Advance()) {
-        credit_ = 0;  // no saving up
+        credit_ = 0;  // an idle estimator saves nothing up
         return worked;
       }
       worked = true;
     }
     return true;
   }
-  // One slice: a sample's work is cut into equal ones, whichever rows they hold.
+  // One slice. A sample's work is cut into equal slices, whichever rows they hold.
   bool Step() { return Step(slice_); }
 
-  // True: rows no longer change the estimate, and it does not forget; statistics go on. An adoption leaves it as it is.
-  // From the next sample on. Context: background.
+  // True: from the next sample on, rows do not change the estimate, and it does not forget. Statistics go on. An
+  // adoption does not end a hold. Context: background.
   void Hold(bool hold) { hold_ = hold; }
 
-  // What is known of a block no longer counts, from the next sample on: after work on that joint, or another payload.
-  // block: a joint (its own columns), or n: the links and what else acts on several joints. kOutOfRange: there is no
-  // such block, or the filter's form cannot reset it (Adopt restarts all). Context: background.
+  // From the next sample on, what was known of a block no longer counts: after work on that joint, or with another
+  // payload. block: a joint (its own columns), or n: the links and what else acts on several joints. kOutOfRange: there
+  // is no such block, or the filter's form cannot reset it; then only Adopt helps, which restarts all.
+  // Context: background.
   core::Status Reset(int block) {
     if (!Filter::CanReset(block)) return core::Status::kOutOfRange;
     resets_due_ |= 1u << block;
     return core::Status::kOk;
   }
 
-  // Latest published estimates; false: nothing new since the last call. Context: one reader, any.
+  // The latest published estimates. False: nothing new since the last call. Context: one reader, any.
   bool Take(Estimates<Model>& out) { return published_.Take(out); }
 
-  // Publish after the sample in work, besides every `publish_every` samples. Context: background.
+  // Publishes after the sample in work, besides every `publish_every` samples. Context: background.
   void RequestReadOut() { read_out_due_ = true; }
   void SetPublishEvery(std::uint32_t samples) { publish_every_ = math::Max<std::uint32_t>(samples, 1); }
   void SetObserver(Observer observer, void* context) {
@@ -95,23 +131,27 @@ class Estimator {
     observer_context_ = context;
   }
 
-  // Statistics to fill from now on and to restart with each adoption; nullptr: none. They do not depend on the filter,
-  // so one of two estimators is enough.
+  // The residual statistics to fill from now on and to restart with each adoption; nullptr: none. They do not depend on
+  // the filter, so it is enough to give them to one of several estimators.
   void SetResiduals(monitor::ResidualStatistics<n>* residuals) { statistics_.SetResiduals(residuals); }
 
+  // Counts of the intake.
   std::uint32_t refused_samples() const { return intake_.refused(); }
   std::uint32_t pending() const { return intake_.pending(); }      // samples waiting for Step; context: any
   std::uint32_t tick_gaps() const { return intake_.tick_gaps(); }  // restarts of the signal path; context: tick
+
   const Filter& filter() const { return filter_; }
   // The filter's finished read-out, for BeginPhysical; nullptr: rows have come in since. Context: background.
   const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
 
  private:
   enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReset, kReadOut };
-  // What a sample's regressor and a row's whitening and statistics are worth, from counts of six-axis models.
-  static constexpr int kSampleCost = n * Model::kDense, kRowCost = 3 * Model::kDense;
+  // Credit of a sample's regressor, and of a row's whitening and statistics: from counts of six-axis models.
+  static constexpr int kSampleCost = Intake<Model>::kEvaluationCost, kRowCost = 3 * Model::kDense;
 
-  // The next indivisible piece of work; false: there is none.
+  struct Nothing {};
+
+  // The next piece of work that is not cut. False: there is none.
   bool Advance() {
     switch (stage_) {
       case Stage::kIdle:
@@ -135,27 +175,27 @@ class Estimator {
     return false;
   }
 
+  // Resets and read-outs come before the next sample.
   bool StartSample() {
-    if (image_ != nullptr && resets_due_ != 0u) {
+    if (table_ != nullptr && resets_due_ != 0u) {
       BeginReset();
       return true;
     }
-    if (image_ != nullptr && read_out_due_) {
+    if (table_ != nullptr && read_out_due_) {
       read_out_due_ = false;
       stands_ = false;
       filter_.BeginReadOut(read_out_);
       stage_ = Stage::kReadOut;
       return true;
     }
-    if (!core::IsOk(intake_.Pop(item_))) return false;
+    if (!intake_.Next(reader_, credit_)) return false;
     stands_ = false;
-    credit_ -= Filter::kExtended ? 2 * kSampleCost : kSampleCost;
-    if (image_ == nullptr || item_.generation != image_->committed.generation) {
-      ++estimates_.stale;
-      return true;
+    if constexpr (Filter::kExtended) {
+      credit_ -= kSampleCost;
+      live_.Linearise(*table_, filter_, intake_.input(), intake_.gap());
     }
-    moving_ = rows_.Evaluate(item_.sample, filter_);
-    updating_ = hold_ ? 0u : moving_;
+    updating_ = hold_ ? 0u : intake_.moving();
+    used_ = 0;
     joint_ = 0;
     stage_ = Stage::kRow;
     return true;
@@ -166,29 +206,37 @@ class Estimator {
     while ((resets_due_ >> block & 1u) == 0u) ++block;
     resets_due_ &= ~(1u << block);
     stands_ = false;
-    statistics_.ForgetSurprise();
+    statistics_.ForgetInnovations();
     filter_.BeginReset(block);
     stage_ = Stage::kReset;
   }
 
   void BeginRow() {
-    rows_.Whiten(joint_, item_.sample.tau[joint_]);
-    const auto& row = rows_.row();
+    const float tau_Nm = intake_.sample().tau[joint_];
     const bool use = ((updating_ >> joint_) & 1u) != 0u;
-    if constexpr (Filter::kExtended) filter_.BeginRow(joint_, row.front, row.dense, row.y, use, row.eta);
-    else filter_.BeginRow(joint_, row.front, row.dense, row.y, use);
-    tau_model_Nm_[joint_] = row.model_Nm;
+    FillRow(*table_, intake_.rows(), FilterRows(), joint_, tau_Nm, row_);
+    if constexpr (Filter::kExtended) {
+      live_.CompleteRow(*table_, joint_, tau_Nm, row_);
+      filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use, row_.eta);
+    } else {
+      filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use);
+    }
+    tau_model_Nm_[joint_] = row_.model_Nm;
     credit_ -= kRowCost;
     stage_ = Stage::kUpdate;
+  }
+
+  const model::Rows<Model>& FilterRows() const {
+    if constexpr (Filter::kExtended) return live_.rows();
+    else return intake_.rows();
   }
 
   void FinishRow() {
     const int i = joint_;
     const filter::UpdateReport& report = filter_.report();
-    item_.sample.flags[i] =
-        static_cast<std::uint8_t>((item_.sample.flags[i] & ~model::kUsed) | (report.accepted ? model::kUsed : 0));
-    const auto& row = rows_.row();
-    statistics_.Add(i, report, row.residual_Nm, row.load_Nm, item_.sample, ((moving_ >> i) & 1u) != 0u, estimates_);
+    used_ |= static_cast<std::uint32_t>(report.accepted) << i;
+    const bool moves = ((intake_.moving() >> i) & 1u) != 0u;
+    statistics_.Add(i, report, row_.residual_Nm, row_.load_Nm, intake_.sample(), moves, estimates_);
     stage_ = ++joint_ == n ? Stage::kEnd : Stage::kRow;
     if (stage_ == Stage::kEnd) EndRows();
   }
@@ -196,42 +244,56 @@ class Estimator {
   void EndRows() {
     if constexpr (Filter::kExtended)
       for (int e = 0; e < Model::kNonlinear; ++e)
-        filter_.Clamp(Model::kColumns + e, image_->eta_low[e], image_->eta_high[e]);
+        filter_.Clamp(Model::kColumns + e, table_->eta_low[e], table_->eta_high[e]);
     filter_.BeginEnd(updating_);
   }
 
   void FinishSample() {
-    statistics_.EndSample(item_.sample.tick);
-    estimates_.tick = item_.sample.tick;
-    if (observer_ != nullptr) observer_(observer_context_, item_.sample, tau_model_Nm_);
+    const std::uint32_t tick = intake_.sample().tick;
+    statistics_.EndSample(tick);
+    estimates_.tick = tick;
+    if (observer_ != nullptr) Observe();
+    intake_.Done(reader_);
     if (++estimates_.samples % publish_every_ == 0u) read_out_due_ = true;
     stage_ = Stage::kIdle;
   }
 
+  // Sets kUsed by this estimator's rows. The sample may have come with other flags.
+  void Observe() {
+    model::Sample<n> sample = intake_.sample();
+    for (int i = 0; i < n; ++i) {
+      const bool used = ((used_ >> i) & 1u) != 0u;
+      sample.flags[i] = static_cast<std::uint8_t>((sample.flags[i] & ~model::kUsed) | (used ? model::kUsed : 0));
+    }
+    observer_(observer_context_, sample, tau_model_Nm_);
+  }
+
   void Publish() {
-    FromPriorUnits(*image_, read_out_, estimates_);
+    FromPriorUnits(*table_, read_out_, estimates_);
     if constexpr (Filter::kExtended) estimates_.clamps = filter_.clamp_count();
     statistics_.Publish(estimates_);
+    estimates_.stale = intake_.stale();
     estimates_.refused = intake_.refused();
     published_.Post(estimates_);
     stands_ = true;
     stage_ = Stage::kIdle;
   }
 
-  Intake<Model> intake_;
+  Source intake_;
   core::Mailbox<Estimates<Model>> published_;
 
-  const Image<Model>* image_ = nullptr;  // the background's, from here on
+  const AdoptedTable<Model>* table_ = nullptr;  // the background's, from here on
   Filter filter_;
   typename Filter::ReadOut read_out_;
-  SampleRows<Model, Filter::kExtended> rows_;
+  std::conditional_t<Filter::kExtended, LiveModel<Model>, Nothing> live_;
+  Row<Model> row_;
   RowStatistics<Model> statistics_;
   Estimates<Model> estimates_;
-  typename Intake<Model>::Item item_ = {};
   float tau_model_Nm_[n] = {};
   int credit_ = 0, slice_ = filter::kSliceCredit;
-  std::uint32_t moving_ = 0, updating_ = 0;  // joints, a bit each; without those on hold
-  std::uint32_t resets_due_ = 0;             // blocks, a bit each
+  const std::uint32_t reader_ = intake_.Join();  // this estimator's bit
+  std::uint32_t updating_ = 0, used_ = 0;        // joints, a bit each: rows that may change the estimate, and that did
+  std::uint32_t resets_due_ = 0;                 // blocks, a bit each
   std::uint32_t publish_every_ = 125;
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;

@@ -1,23 +1,13 @@
-// estimator - the regressor and its derivative at the live estimate, for the extended filter; knows no filter's inside.
+// estimator - the regressor and its derivative at the live estimate; only the extended filter takes this way.
 #pragma once
 
-#include "armcal/estimator/image.hpp"
+#include "armcal/estimator/adopted_table.hpp"
 
 namespace armcal::estimator {
 
-// value of eta at x in prior units, and its derivative; see IsLogarithmic.
-template <class Model>
-float EtaAt(const Image<Model>& image, int e, float x) {
-  const float step = image.scale[Model::kColumns + e] * x;
-  return IsLogarithmic<Model>(e) ? image.committed.eta[e] * math::Exp(step) : image.committed.eta[e] + step;
-}
-template <class Model>
-float EtaSlope(const Image<Model>& image, int e, float eta) {
-  return image.scale[Model::kColumns + e] * (IsLogarithmic<Model>(e) ? eta : 1.0f);
-}
-
-// Rows tau = tau(x0) + h (x - x0) of one sample at the estimate x0 before it. States of effects with memory run at the
-// live eta, with their sensitivities, beside those of the committed model. The instructions are the same for any data.
+// The rows of one sample, linearised at the estimate x0 before it: tau = tau(x0) + h (x - x0). The states of effects
+// with memory run here at the live eta, together with their sensitivities; the intake runs those of the committed
+// model. The instructions are the same for any data. Context: background.
 template <class Model>
 class LiveModel {
  public:
@@ -25,20 +15,22 @@ class LiveModel {
 
   void Restart() { running_ = false; }
 
-  // `filter`: x(column) is its estimate in prior units. A step that is not finite starts the states anew.
+  // filter.x(column) is the estimate in prior units. gap: the sample does not follow the one before. After a gap, or
+  // after a state that is not finite, the states start again.
   template <class Filter>
-  void Linearise(const Image<Model>& image, const Filter& filter, const model::ModelInput<float, n>& x, bool gap) {
+  void Linearise(const AdoptedTable<Model>& table, const Filter& filter, const model::ModelInput<float, n>& x,
+                 bool gap) {
     for (int k = 0; k < Model::kColumns + kNonlinear; ++k) x0_[k] = filter.x(k);
-    for (int k = 0; k < Model::kColumns; ++k) p_[k] = image.committed.p[k] + image.scale[k] * x0_[k];
-    for (int e = 0; e < kNonlinear; ++e) eta_[e] = EtaAt(image, e, x0_[Model::kColumns + e]);
+    for (int k = 0; k < Model::kColumns; ++k) p_[k] = table.committed.p[k] + table.scale[k] * x0_[k];
+    for (int e = 0; e < kNonlinear; ++e) eta_[e] = EtaAt(table, e, x0_[Model::kColumns + e]);
     if constexpr (kCarried > 0) {
       if (gap || !running_) {
-        Model::InitialState(x, image.committed.p, eta_, now_);
+        Model::InitialState(x, table.committed.p, eta_, now_);
         for (int k = Model::kStates; k < kCarried; ++k) now_[k] = 0.0f;
       }
     }
-    Model::Regressor(x, image.committed.p, eta_, now_, next_, rows_.front, rows_.dense);
-    Model::Jacobian(x, image.committed.p, eta_, p_, now_, next_, jacobian_);
+    Model::Regressor(x, table.committed.p, eta_, now_, next_, rows_.front, rows_.dense);
+    Model::Jacobian(x, table.committed.p, eta_, p_, now_, next_, jacobian_);
     running_ = true;
     for (int k = 0; k < kCarried; ++k) {
       running_ = running_ && math::IsFinite(next_[k]);
@@ -46,19 +38,25 @@ class LiveModel {
     }
   }
 
-  const feedforward::Rows<Model>& rows() const { return rows_; }
-  float Torque(int joint) const { return feedforward::RowTorque(p_, rows_, joint); }
-  // d tau / d x of the eta columns, N m. Shape: slope [kNonlinear].
-  void EtaRow(const Image<Model>& image, int joint, float* slope) const {
+  const model::Rows<Model>& rows() const { return rows_; }
+  // Completes a row that FillRow has filled in: eta = d tau / d x, whitened, and y = (tau - tau(x0)) / sigma + h x0.
+  template <class Row>
+  void CompleteRow(const AdoptedTable<Model>& table, int joint, float tau_Nm, Row& row) const {
+    const int first = Model::kFrontBegin[joint], end = Model::kFrontBegin[joint + 1];
+    const float whiten = 1.0f / table.sigma_Nm[joint];
     for (int e = 0; e < kNonlinear; ++e)
-      slope[e] = math::Masked(jacobian_[joint * kNonlinear + e] * EtaSlope(image, e, eta_[e]),
-                              image.prior.active[Model::kColumns + e]);
+      row.eta[e] = math::Masked(jacobian_[joint * kNonlinear + e] * EtaSlope(table, e, eta_[e]),
+                                table.prior.active[Model::kColumns + e]);
+    float y = (tau_Nm - model::RowTorque(p_, rows_, joint)) * whiten;
+    for (int k = first; k < end; ++k) y += row.front[k - first] * x0_[k];
+    for (int k = 0; k < Model::kDense; ++k) y += row.dense[k] * x0_[Model::kFront + k];
+    for (int e = 0; e < kNonlinear; ++e) y += (row.eta[e] *= whiten) * x0_[Model::kColumns + e];
+    row.y = y;
   }
-  float x0(int column) const { return x0_[column]; }
 
  private:
   static constexpr int kCarried = Model::kStates + Model::kSensitivities;
-  feedforward::Rows<Model> rows_ = {};
+  model::Rows<Model> rows_ = {};
   float jacobian_[n * kNonlinear] = {};
   float x0_[Model::kColumns + kNonlinear] = {}, p_[Model::kColumns] = {}, eta_[kNonlinear] = {};
   float now_[kCarried > 0 ? kCarried : 1] = {}, next_[kCarried > 0 ? kCarried : 1] = {};

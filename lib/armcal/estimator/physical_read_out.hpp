@@ -1,4 +1,4 @@
-// estimator - hands a filter's result to the physical read-out; knows each filter's way to keep it, and no register.
+// estimator - hands a filter's result to the physical read-out.
 #pragma once
 
 #include <type_traits>
@@ -22,19 +22,20 @@ const auto& EstimateOf(const filter::KalmanFilter<Layout, form, beside>& filter,
   return filter.estimate();
 }
 
-// From an estimator's filter between two samples: read_out.Step may follow while the estimator goes on. image, rigid:
-// what the estimator runs on, and what BuildImage left for it; both must stay until the read-out is done. warm: the
-// image is that of the last read-out. kBusy: rows have come in since the filter's own read-out; ask for one
-// (RequestReadOut) and come back. Else as MapReadOut::Begin and AddSpread. Some kColumns^3 multiplications and
-// additions; to cut that into slices call those two as here. Context: background.
-template <class Model, class Filter, class T>
-core::Status BeginPhysical(const Image<Model>& image, const RigidPrior<Model, float>& rigid,
-                           const Estimator<Model, Filter>& estimator, bool warm,
+// Copies what an estimator's filter knows between two samples. After that, read_out.Step may be called while the
+// estimator goes on. table, rigid: what the estimator works with, and what BuildAdoptedTable left there; both must stay
+// until the read-out is done. warm: the last read-out was of the same table. kBusy: rows have come in since the
+// filter's own read-out; call RequestReadOut and come back. All other answers are those of MapReadOut::Begin and
+// AddSpread. Takes some kColumns^3 multiplications and additions; to cut that into slices, call those two as is done
+// here. Context: background.
+template <class Model, class Filter, class Source, class T>
+core::Status BeginPhysical(const AdoptedTable<Model>& table, const RigidPrior<Model, float>& rigid,
+                           const Estimator<Model, Filter, Source>& estimator, bool warm,
                            physical::MapReadOut<Model, T>& read_out) {
   const typename Filter::ReadOut* done = estimator.read_out();
   if (done == nullptr) return core::Status::kBusy;
   core::Status status =
-      read_out.Begin({rigid.mean, rigid.sd, image.committed.p, image.scale, image.prior.dense_ud}, done->x, warm);
+      read_out.Begin({rigid.mean, rigid.sd, table.committed.p, table.scale, table.prior.dense_ud}, done->x, warm);
   const auto& estimate = EstimateOf(estimator.filter(), *done);
   constexpr int kSize = std::decay_t<decltype(estimate)>::kSize;
   for (int p = 0; p < kSize && core::IsOk(status); ++p) {
@@ -45,9 +46,9 @@ core::Status BeginPhysical(const Image<Model>& image, const RigidPrior<Model, fl
   return status;
 }
 
-// From a finished read-out: the parameters have moved further than the table's deviations allow, so what the data
-// hardly tell is less certain than it says. Of tables that are right, one in a thousand is called so, or less. Context:
-// background.
+// From a finished read-out. True: the parameters have moved further than the table's deviations allow. Then parameters
+// that the data hardly determine are less certain than the read-out says. A right table is called too narrow at most
+// once in a thousand times. Context: background.
 template <class Model, class T>
 bool PriorIsTooNarrow(const physical::MapReadOut<Model, T>& read_out) {
   constexpr float kSigmas = 3.09f;  // of the normal distribution, for one in a thousand

@@ -1,14 +1,15 @@
-// estimator - the bodies' prior seen through the base map b = B phi, and the way back; knows no filter.
+// estimator - from the prior of the bodies to that of the base parameters b = B phi, and back from base to bodies.
 //
-// A body parameter's prior is Gaussian in (m, c, I about the centre, rotor inertia): phi ~ phi0 + J S xi, xi ~ N(0, 1),
-// J = d(m, mc, Io) / d(m, c, Ic) at the mean, S = diag(sd). Base coordinates: b - b0 = W xi with W = B J S.
-// Factored as W = U w~, w~ w~' = D, the standard-parameter Kalman read-out phi = phi0 + P0 B' (B P0 B')^-1 (b - b0)
-// is phi0 + J S w~' D^-1 U^-1 (b - b0). T: float on the target, double on the host. Context: background.
+// The prior of a body is Gaussian in (m, c, I about the centre, rotor inertia): phi ~ phi0 + J S xi with xi ~ N(0, 1),
+// J = d(m, mc, Io) / d(m, c, Ic) at the mean, and S = diag(sd). In base coordinates, b - b0 = W xi with W = B J S. W is
+// factored as W = U w~ with w~ w~' = D. Then the Kalman read-out of the bodies,
+//   phi = phi0 + P0 B' (B P0 B')^-1 (b - b0), is phi0 + J S w~' D^-1 U^-1 (b - b0).
+// T: float on the target, double on a PC. Context: background.
 #pragma once
 
-#include "armcal/math/ud.hpp"
+#include "armcal/math/symmetric.hpp"
 #include "armcal/model/contract.hpp"
-#include "armcal/physical/physical.hpp"
+#include "armcal/physical/body.hpp"
 
 namespace armcal::estimator {
 
@@ -32,7 +33,7 @@ void MapBodies(const T* body, T* base) {
   }
 }
 
-// J of one link at its mean. Shape: jacobian [100].
+// J of one link at the mean `body`. Shape: jacobian [100].
 template <class T>
 void LinkJacobian(const T* body, T* jacobian) {
   T centre[3];
@@ -63,14 +64,15 @@ void SpreadPrior(RigidPrior<Model, T>& prior) {
   }
 }
 
-// After SpreadPrior: ud = U D U', w becomes w~. About kRigid^2 kBodyParameters multiplications, once per table.
+// After SpreadPrior: ud = U D U', and w becomes w~. Takes about kRigid^2 kBodyParameters multiplications, once per
+// table.
 template <class Model, class T>
 void FactorPrior(RigidPrior<Model, T>& prior) {
   math::UdFromSquareRoot<Model::kRigid, Model::kBodyParameters>(prior.w, prior.ud);
 }
 
-// After FactorPrior: body [kBodyParameters] from base [kRigid] = b. What the base does not determine follows the
-// prior's correlation. Linear: the result of a large step need not be physical.
+// After FactorPrior: fills in body [kBodyParameters] from base [kRigid] = b. Directions that the base parameters do not
+// determine follow the prior's correlation. The map is linear, so after a large step a body need not be possible.
 template <class Model, class T>
 void ReadBodies(const RigidPrior<Model, T>& prior, const T* base, T* body) {
   constexpr int kBodies = Model::kBodyParameters, kBlock = model::kBodyBlock;

@@ -1,19 +1,20 @@
-// estimator - keeps the last estimates that can be believed; knows no filter and no register.
+// estimator - keeps the last estimates that can be believed. No program of the project uses it yet.
 #pragma once
 
-#include "armcal/estimator/estimator.hpp"
+#include "armcal/estimator/estimates.hpp"
 
 namespace armcal::estimator {
 
-// Between an estimator and whoever acts on its numbers. One of them may be far off while an arm is being worked on, or
-// belong to no arm that can exist: then the last good ones stay. Context: one, any.
+// Stands between an estimator and whoever acts on its numbers. While somebody works on an arm, its estimates may be far
+// off, or may belong to no arm that can exist; then the last good ones stay. Context: one, any.
 template <class Model>
 class Supervisor {
  public:
-  // Takes what an estimator has published. bodies [kBodyParameters]: the arm that belongs to it, from BeginPhysical's
-  // read-out, or from ReadBodies where that is too long. kOk: these are the good ones now. Refused, the old ones stay:
-  // kNotFinite; kUnphysical (a body, or a negative rotor inertia). kHeld, too: the innovations are larger than the
-  // filter believes (Estimates::inconsistent): the arm has changed, or does what the model does not know.
+  // Takes what an estimator has published. bodies [kBodyParameters] are the arm that belongs to it: from the read-out
+  // of BeginPhysical, or from ReadBodies if that takes too long. kOk: these are the good ones now. With every other
+  // answer the old ones stay: kNotFinite; kUnphysical (a body, or a negative rotor inertia); kHeld
+  // (Estimates::inconsistent: the innovations are larger than the filter believes, because the arm has changed or does
+  // what the model lacks).
   core::Status Accept(const Estimates<Model>& estimates, const float* bodies) {
     const core::Status status = Judge(estimates, bodies);
     ++(core::IsOk(status) ? accepted_ : kept_);

@@ -1,9 +1,9 @@
-// feedforward - committed table and set-point to joint torque; knows no filter, no live estimate, no table layout.
+// feedforward - the torque of a set-point, by the committed parameters alone; an estimate has no part in it.
 #pragma once
 
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/status.hpp"
-#include "armcal/feedforward/committed.hpp"
+#include "armcal/model/evaluate.hpp"
 
 namespace armcal::feedforward {
 
@@ -12,18 +12,19 @@ class FeedForward {
  public:
   static constexpr int n = Model::kJoints;
 
-  // Hands over the next committed set; it takes effect at the next tick. kAxisEnabled: an axis is enabled and the
-  // set is not bumpless; nothing changed. Context: background.
-  core::Status Offer(const Committed<Model>& next, bool any_axis_enabled) {
+  // Hands over the next committed parameters. They take effect at the next tick. kAxisEnabled: an axis is enabled and
+  // they are not bumpless; nothing has changed. Context: background.
+  core::Status Offer(const model::Committed<Model>& next, bool any_axis_enabled) {
     if (any_axis_enabled && !next.bumpless) return core::Status::kAxisEnabled;
     offered_.Post(next);
     return core::Status::kOk;
   }
 
-  // Torque of the set-point. Shapes: all [kJoints]; t_s: seconds since the table was adopted. A set-point speed below
-  // v_min counts as standing, so that friction does not chatter. kOk; kClamped (a joint was cut to its limit and
-  // counted); kEmpty (no valid table; torque zero); kNotFinite (set-point or model not finite; that joint zero).
-  // Always evaluates both sets of a cross-fade: constant time. Context: tick.
+  // Torque of the set-point. Shapes: all [kJoints]. t_s: seconds since the table was adopted. A set-point slower than
+  // v_min counts as standing, so that friction does not chatter. kOk; kClamped (a joint was cut to its limit, and that
+  // was counted); kEmpty (no valid table; torque zero); kNotFinite (set-point or model is not finite; that joint's
+  // torque is zero). Constant time, because the old and the new parameters of a cross-fade are always both evaluated.
+  // Context: tick.
   core::Status Evaluate(const float* q, const float* qd, const float* qdd, const float* temperature_degC, float t_s,
                         float* tau_Nm) {
     Adopt();
@@ -41,8 +42,8 @@ class FeedForward {
     const float share =
         math::Select(blending, static_cast<float>(blended_ticks_) / Positive(active_.blend_ticks), 1.0f);
     float before[n], now[n];
-    ModelTorque(previous_, state, previous_memory_, rows_, before);
-    ModelTorque(active_, state, active_memory_, rows_, now);
+    model::ModelTorque(previous_, state, previous_memory_, rows_, before);
+    model::ModelTorque(active_, state, active_memory_, rows_, now);
 
     core::Status status = active_.valid ? core::Status::kOk : core::Status::kEmpty;
     const std::uint32_t fading = math::MaskOf(blending && previous_.valid);
@@ -55,7 +56,7 @@ class FeedForward {
     return status;
   }
 
-  std::uint32_t clamp_count() const { return clamp_count_; }  // joint-ticks cut to the limit
+  std::uint32_t clamp_count() const { return clamp_count_; }  // how often a joint was cut to its limit
   std::uint32_t generation() const { return active_.generation; }
   bool valid() const { return active_.valid; }
   bool blending() const { return blended_ticks_ < active_.blend_ticks; }
@@ -80,10 +81,10 @@ class FeedForward {
     return math::Max(-limit, math::Min(limit, tau));
   }
 
-  core::Mailbox<Committed<Model>> offered_;
-  Committed<Model> active_, previous_;
-  Memory<Model> active_memory_, previous_memory_;
-  Rows<Model> rows_ = {};
+  core::Mailbox<model::Committed<Model>> offered_;
+  model::Committed<Model> active_, previous_;
+  model::Memory<Model> active_memory_, previous_memory_;
+  model::Rows<Model> rows_ = {};
   std::uint32_t blended_ticks_ = 0;
   std::uint32_t clamp_count_ = 0;
 };

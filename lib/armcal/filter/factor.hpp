@@ -1,15 +1,24 @@
-// filter - an estimate x and its covariance U D U' in memory; knows positions, and what the prior says of columns.
+// filter - an estimate x with its covariance P = U D U': where the numbers are, and how a row or a sum is worked in.
+//
+// G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, 1977 (measurement); W. S. Agee, R. H.
+// Turner, 1972 (rank-one sum). A row of zeros leaves every bit as it was. So a row that must not count is masked to
+// zeros, and the instructions are the same whatever the numbers are.
+//
+// FactorWork and the functions before it know an order's tables, but no layout: one copy of their code serves all
+// filters of a form. None of it is inlined. That costs no instructions, because a loop out of line leaves its caller
+// the registers. Context: background.
 #pragma once
 
 #include "armcal/filter/order.hpp"
+#include "armcal/filter/slices.hpp"
 #include "armcal/math/columns.hpp"
 #include "armcal/math/elementary.hpp"
-#include "armcal/math/ud.hpp"
+#include "armcal/math/symmetric.hpp"
 
 namespace armcal::filter {
 
-// Where the numbers are: x, a row in work and its gain, [shape->size] each, then the factor's elements. What is called
-// with one knows no layout: one copy serves all filters of a form. Context: background.
+// Where the numbers are. x points at: the estimate, a row in work and its gain, [shape->size] each, then the factor's
+// elements.
 template <Form form>
 struct Factor {
   const Shape<form>* shape;
@@ -17,13 +26,12 @@ struct Factor {
 
   float* row() const { return x + shape->size; }
   float* gain() const { return x + 2 * shape->size; }
-  float* element() const { return x + 3 * shape->size; }
-  float* column(int p) const { return x + shape->Origin(p); }  // its element (i, p) at i
+  float* column(int p) const { return x + shape->Origin(p); }  // element (i, p) of the factor is column(p)[i]
   float& d(int p) const { return column(p)[p]; }
 };
 
-// x = 0 and the prior's correlation: dense_ud of the dense columns, the others on their own if active. Slopes start as
-// known: zero.
+// x = 0, and the prior's covariance: dense_ud for the dense columns, 1 for every other active column. Slopes start at
+// zero and as known.
 template <Form form>
 ARMCAL_NOINLINE void StartAtPrior(Factor<form> f, const float* dense_ud, const std::uint32_t* active) {
   const auto& shape = *f.shape;
@@ -36,7 +44,7 @@ ARMCAL_NOINLINE void StartAtPrior(Factor<form> f, const float* dense_ud, const s
   }
 }
 
-// Dense D below the floor is raised to it. Returns how many.
+// Raises every dense D that is below the floor to the floor. Returns how many it raised.
 template <Form form>
 ARMCAL_NOINLINE std::uint32_t HoldFloor(Factor<form> f, float link_floor, const std::uint32_t* active) {
   std::uint32_t held = 0;
@@ -49,22 +57,298 @@ ARMCAL_NOINLINE std::uint32_t HoldFloor(Factor<form> f, float link_floor, const 
   return held;
 }
 
-// variance [size] += the parts of columns `next` on of the diagonal of P, as far as credit lasts; all columns from
-// variance = 0 on give it. True: done.
+// Adds to variance [size] what the columns from `next` on give to the diagonal of P, as long as credit lasts. All
+// columns together, from variance = 0 on, give the diagonal. True: done. x as in Factor.
 template <Form form>
-ARMCAL_NOINLINE bool AddDiagonal(Factor<form> f, float* variance, int& next, int& credit) {
+ARMCAL_NOINLINE bool AddDiagonal(const Shape<form>& shape, const float* x, float* variance, int& next, int& credit) {
   int p = next, left = credit;
-  for (; p < f.shape->size && left > 0; ++p) {
-    const float* column = f.column(p);
+  for (; p < shape.size && left > 0; ++p) {
+    const float* column = x + shape.Origin(p);
     const float weight = column[p];
-    const int begin = f.shape->Begin(p);
+    const int begin = shape.Begin(p);
     for (int i = begin; i < p; ++i) variance[i] += weight * column[i] * column[i];
     variance[p] += weight;
     left -= 8 + (p - begin) / 2;
   }
   credit = left;
   next = p;
-  return p == f.shape->size;
+  return p == shape.size;
 }
+
+// A row or a rank-one sum in work. A slice (slices.hpp) ends between two columns. Between slices anything may happen
+// but another call that begins work on the same object.
+template <Form form>
+class FactorWork {
+ public:
+  using Shape = filter::Shape<form>;
+  using Factor = filter::Factor<form>;
+
+  // The cost of a row. The constants (a column's own work, a row's beginning and end) were measured.
+  static constexpr int RowCost(const Shape& shape, int first, Front front) {
+    int cost = BeginCost(shape, first) + ApplyCost(shape);
+    for (int p = first; p < shape.size; p = shape.Above(p, front))
+      cost += ProjectCost(p - first) + MeasureCost(p - shape.Begin(p));
+    return cost;
+  }
+
+  // The row y = h' x + noise of `variance` > 0. The caller has filled in h from position `first` on; before, it is
+  // zero. gate_sigma > 0: an innovation beyond so many standard deviations changes no bit.
+  ARMCAL_NOINLINE void BeginRow(Factor f, int first, Front front, float y, float variance, float gate_sigma) {
+    first_ = first, front_ = front;
+    innovation_ = y - math::Dot(f.row() + first, f.x + first, f.shape->size - first);
+    alpha_ = sum_ = variance;
+    gate_sigma_ = gate_sigma;
+    for (int p = 0; p < f.shape->size; ++p) f.gain()[p] = 0.0f;
+    next_ = f.shape->size - 1;
+    stage_ = Stage::kBegun;
+  }
+  // True: the row is in. Bit p of `considered`: the column at position p has uncertainty and does not move. nullptr:
+  // there is none.
+  ARMCAL_NOINLINE bool StepRow(Factor f, const std::uint32_t* considered, int& credit) {
+    if (stage_ == Stage::kBegun) {
+      credit -= BeginCost(*f.shape, first_);
+      stage_ = Stage::kProject;
+    }
+    if (stage_ == Stage::kProject && !Project(f, credit)) return false;
+    if (stage_ == Stage::kMeasure) {
+      if (!Measure(f, credit)) return false;
+      credit -= ApplyCost(*f.shape);
+      Apply(f, considered);
+    }
+    return stage_ == Stage::kIdle || StepSum(f, credit);
+  }
+  float innovation() const { return innovation_; }  // of the row in work, or of the last one
+  float variance() const { return sum_; }           // h' P h + noise, before the row
+  bool inside() const { return taken_ != 0u; }      // the innovation is inside the gate
+
+  static constexpr int SumCost(const Shape& shape, int last) {  // of BeginUnitSum
+    const int columns = last + 1 - shape.Begin(last);
+    return columns * FoldCost(0) + columns * (columns - 1) * 5 / 8;
+  }
+  // P + c e e' with c >= 0, where e is the unit vector of position p <= last. In the block form p and last lie in the
+  // front of one joint. The instructions depend on `last` alone.
+  ARMCAL_NOINLINE void BeginUnitSum(Factor f, int p, float c, int last) {
+    for (int k = f.shape->Begin(last); k <= last; ++k) f.row()[k] = 0.0f;
+    f.row()[p] = 1.0f;
+    BeginSum(f, c, last);
+  }
+  ARMCAL_NOINLINE bool StepSum(Factor f, int& credit) {
+    float c = alpha_;
+    int p = next_, left = credit;
+    const int first = first_;
+    float* const row = f.row();
+    for (; p >= first && left > 0; --p) {
+      float* const column = f.column(p);
+      const float a = row[p], old = column[p];
+      const float now = old + c * a * a;
+      const std::uint32_t some = math::MaskOf(now > 1e-30f);
+      const float inverse = 1.0f / math::Max(now, 1e-30f);
+      math::Fold(row + first, column + first, a, math::Masked(c * a * inverse, some), p - first);
+      column[p] = now;
+      c *= math::Select(some != 0u, old * inverse, 1.0f);
+      left -= FoldCost(p - first);
+    }
+    credit = left;
+    alpha_ = c, next_ = p;
+    if (p < first) stage_ = Stage::kIdle;
+    return p < first;
+  }
+
+ private:
+  static constexpr int BeginCost(const Shape& shape, int first) { return 45 + 2 * (shape.size - first); }
+  static constexpr int ApplyCost(const Shape& shape) { return 20 + shape.size; }
+  static constexpr int ProjectCost(int length) { return Shape::kColumnCost + length / 2; }
+  static constexpr int MeasureCost(int length) { return Shape::kColumnCost + 2 + length; }
+  static constexpr int FoldCost(int length) { return 8 + length + length / 4; }
+
+  enum class Stage : std::uint8_t { kIdle, kBegun, kProject, kMeasure, kSum };
+
+  // P + c a a' with c >= 0 and a = row, which is zero after position `last`. All columns that it touches begin at the
+  // same position.
+  void BeginSum(Factor f, float c, int last) {
+    alpha_ = c;
+    next_ = last;
+    first_ = f.shape->Begin(last);
+    stage_ = Stage::kSum;
+  }
+
+  // row = U' h in place, from the last column back, and h' P h on the way. Two neighbouring columns that begin at the
+  // same position are worked on together. Otherwise the one column stands in the place of both.
+  ARMCAL_NOINLINE bool Project(Factor f, int& credit) {
+    const Shape& shape = *f.shape;
+    const int first = first_;
+    const Front front = front_;
+    int p = next_, left = credit;
+    float sum = sum_;
+    float* const row = f.row();
+    while (p >= first && left > 0) {
+      const int below = shape.Below(p, front);
+      const bool pair = below >= first && shape.Begin(below, front) == shape.Begin(p, front);
+      const int q = pair ? below : p;
+      const float* const column = f.column(p);
+      const float* const second = f.column(q);
+      float a = row[p];
+      for (int i = q; i < p; ++i) a += column[i] * row[i];
+      const auto dots = math::Dots(column + first, second + first, row + first, q - first, a, row[q]);
+      row[q] = dots.second;
+      row[p] = dots.first;
+      sum += column[p] * dots.first * dots.first;
+      left -= ProjectCost(p - first);
+      if (pair) {
+        sum += second[q] * dots.second * dots.second;
+        left -= ProjectCost(q - first);
+      }
+      p = pair ? shape.Below(q, front) : below;
+    }
+    credit = left;
+    sum_ = sum;
+    next_ = p;
+    if (p >= first) return false;
+    const float limit = gate_sigma_ * gate_sigma_ * sum;
+    taken_ = ~(math::MaskOf(gate_sigma_ > 0.0f) & math::MaskOf(innovation_ * innovation_ > limit));
+    next_ = first;
+    stage_ = Stage::kMeasure;
+    return true;
+  }
+
+  ARMCAL_NOINLINE bool Measure(Factor f, int& credit) {
+    const Shape& shape = *f.shape;
+    const Front front = front_;
+    int p = next_, left = credit;
+    float alpha = alpha_;
+    float* const gain = f.gain();
+    // A row outside the gate must act as a row of zeros. The gain lies right after the row and is still zero where it
+    // is read, so the gain is read in the place of the row.
+    const float* const row = f.row() + (static_cast<std::uint32_t>(shape.size) & ~taken_);
+    while (p < shape.size && left > 0) {
+      const int begin = shape.Begin(p, front), q = shape.Above(p, front);
+      const bool pair = q < shape.size && shape.Begin(q, front) == begin;
+      float* column = f.column(p);
+      float shift, v;
+      alpha = Pivot(row[p], alpha, column[p], shift, v);
+      left -= MeasureCost(p - begin);
+      int from = begin, to = p;
+      if (pair) {
+        float* const second = f.column(q);
+        float shift2, v2;
+        alpha = Pivot(row[q], alpha, second[q], shift2, v2);
+        left -= MeasureCost(q - begin);
+        math::BiermanColumns(column + begin, second + begin, gain + begin, shift, v, shift2, v2, p - begin);
+        gain[p] = v;
+        column = second, shift = shift2, v = v2;
+        from = p, to = q;
+      }
+      math::BiermanColumn(column + from, gain + from, shift, v, to - from);
+      gain[to] = v;
+      p = pair ? shape.Above(q, front) : q;
+    }
+    credit = left;
+    alpha_ = alpha;
+    next_ = p;
+    return p >= shape.size;
+  }
+
+  // Updates the D of one column and gives what its elements need. Returns the next alpha.
+  static float Pivot(float f, float alpha, float& d, float& shift, float& v) {
+    v = d * f;
+    shift = -f / alpha;
+    const float next = alpha + v * f;
+    d *= alpha / next;  // exactly 1 for f = 0
+    return next;
+  }
+
+  // x moves by gain times innovation. Considered columns follow Schmidt's form: their gain is zero, and S k k' goes
+  // back to P, where k is the gain that they would have had.
+  void Apply(Factor f, const std::uint32_t* considered) {
+    const float scale = 1.0f / alpha_, step = math::Masked(innovation_, taken_);
+    const int size = f.shape->size;
+    if (considered == nullptr) {
+      math::AddScaled(f.x, f.gain(), scale * step, size);
+      stage_ = Stage::kIdle;
+      return;
+    }
+    for (int p = 0; p < size; ++p) {
+      const std::uint32_t kept = 0u - ((considered[p / 32] >> (p % 32)) & 1u);
+      const float k = f.gain()[p] * scale;
+      f.x[p] += math::Masked(k, ~kept) * step;
+      f.row()[p] = math::Masked(k, kept);
+    }
+    BeginSum(f, alpha_, size - 1);
+  }
+
+  float alpha_ = 0.0f, sum_ = 0.0f, innovation_ = 0.0f, gate_sigma_ = 0.0f;
+  int next_ = 0, first_ = 0;
+  Front front_ = {};
+  Stage stage_ = Stage::kIdle;
+  std::uint32_t taken_ = 0;  // mask: zero if the row is outside the gate
+};
+
+// The room for an estimate and its factor in a filter's order, with the work on them.
+template <class Order>
+class UdEstimate {
+ public:
+  using Columns = Order;
+  static constexpr int kSize = Order::kSize;
+  static constexpr const auto& kShape = Order::kShape;
+  using Work = FactorWork<Order::kForm>;
+
+  // The cost of a sample's rows.
+  static constexpr int kRowsCost = [] {
+    int cost = 0;
+    for (int i = 0; i < Order::kJoints; ++i)
+      cost += Work::RowCost(Order::kShape, Order::kAt.first[i], Order::FrontOf(i));
+    return cost;
+  }();
+
+  float& u(int i, int p) { return factor().column(p)[i]; }
+  float& d(int p) { return factor().d(p); }
+  float d(int p) const { return number_[kShape.Origin(p) + p]; }
+  float& x(int p) { return number_[p]; }
+  float x(int p) const { return number_[p]; }
+  const float* elements() const { return number_ + 3 * kSize; }  // [Order::kElements], of the factor
+  // P is the sum over all positions p of d u u', with u [kSize] by columns. Fills in u and returns d.
+  float Spread(int p, float* u) const {
+    const float* column = number_ + kShape.Origin(p);
+    for (int k = 0; k < kSize; ++k) u[k] = 0.0f;
+    for (int i = kShape.Begin(p); i < p; ++i) u[kShape.column[i]] = column[i];
+    u[kShape.column[p]] = 1.0f;
+    return column[p];
+  }
+
+  template <class Prior>
+  void Start(const Prior& prior) {
+    StartAtPrior(factor(), prior.dense_ud, prior.active);
+  }
+  template <class Prior>
+  std::uint32_t HoldFloor(const Prior& prior) {
+    return filter::HoldFloor(factor(), prior.link_floor, prior.active);
+  }
+  bool AddDiagonal(float* variance, int& next, int& credit) const {
+    return filter::AddDiagonal(kShape, number_, variance, next, credit);
+  }
+
+  // A row and a sum in work: see FactorWork.
+  float* row() { return factor().row(); }  // [kSize] by positions, for the row's h
+  void BeginRow(int first, int joint, float y, float variance, float gate_sigma) {
+    work_.BeginRow(factor(), first, Order::FrontOf(joint), y, variance, gate_sigma);
+  }
+  bool StepRow(const std::uint32_t* considered, int& credit) { return work_.StepRow(factor(), considered, credit); }
+  float innovation() const { return work_.innovation(); }
+  float variance() const { return work_.variance(); }
+  bool inside() const { return work_.inside(); }
+  void BeginUnitSum(int p, float c, int last) { work_.BeginUnitSum(factor(), p, c, last); }
+  bool StepSum(int& credit) { return work_.StepSum(factor(), credit); }
+  void AddUnit(int p, float c, int last) {  // the whole sum
+    BeginUnitSum(p, c, last);
+    int all = kNoSlices;
+    (void)StepSum(all);
+  }
+
+ private:
+  Factor<Order::kForm> factor() { return {&kShape, number_}; }
+
+  float number_[3 * kSize + Order::kElements] = {};
+  Work work_;
+};
 
 }  // namespace armcal::filter

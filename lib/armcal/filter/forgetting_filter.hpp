@@ -1,20 +1,19 @@
-// filter - least squares of the data with exponential forgetting, as an information triangle; knows columns only.
+// filter - least squares of the data with exponential forgetting, kept as an information triangle.
 #pragma once
 
+#include "armcal/filter/factor.hpp"
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
-#include "armcal/filter/ud_estimate.hpp"
-#include "armcal/filter/whole_rows.hpp"
-#include "armcal/math/givens.hpp"
 
 namespace armcal::filter {
 
-// Holds R' diag(d) R and z of the data only; the prior enters at the read-out. Columns in the order [front, dense]:
-// a front column meets its own joint's rows only, so the triangle never fills in and is stored row by row as
+// Holds the information R' diag(d) R and z of the data alone; the prior enters at the read-out. The columns are in the
+// order [front, dense]. A front column meets only the rows of its own joint, so zeros of the triangle stay zero and are
+// not stored. The triangle is stored row by row as
 //   [later front columns of the joint, dense columns from kRowBegin[joint] on, z]      for a front column,
 //   [later dense columns, z]                                                           for a dense column.
-// The triangle starts from, and never falls below, d = kFloor: a millionth of the prior's weight. The read-out takes
-// that much off the prior, so that it is counted once.
+// Every d starts at kFloor, a millionth of the prior's weight, and never falls below it. The read-out takes that much
+// off the prior, so that nothing is counted twice. Context of every call: background.
 template <class Layout>
 class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
  public:
@@ -38,7 +37,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   static constexpr Offsets kOffsets{};
   static constexpr int kTriangle = kOffsets.at[kColumns];
 
-  // What the rows and the end of a sample spend (slices.hpp).
+  // The cost of the rows and the end of a sample (slices.hpp).
   static constexpr int SampleCost() {
     int cost = kEndCost;
     for (int i = 0; i < Layout::kJoints; ++i) {
@@ -48,10 +47,10 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     return cost;
   }
 
-  // Any prior: noise and considered columns are the Kalman forms'.
+  // This form suits every prior. It does not use process noise, and estimates considered columns like others.
   static bool Suits(const Prior<Layout>&) { return true; }
 
-  // Estimate in prior units and its standard deviation, by column; the rest is work space.
+  // The estimate in prior units and its standard deviation, by column. The rest is work space.
   struct ReadOut {
     float x[kColumns] = {};
     float sd[kColumns] = {};
@@ -61,16 +60,16 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     bool inside_row = false;
   };
 
-  // Starts without data. The prior must outlive the filter's use of it.
+  // Starts without data. The prior must stay as it is while the filter works.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
     for (float& d : d_) d = kFloor;
     for (float& r : rows_) r = 0.0f;
   }
 
-  // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense], zero before kRowBegin[joint].
-  // With use = false, or when the report is not kOk, every bit of the triangle stays; the instructions are the same.
-  // Then StepRow, which spends credit (slices.hpp), until it answers true; then report().
+  // One whitened row of `joint`. Shapes: front [the joint's front columns]; dense [kDense], zero before
+  // kRowBegin[joint]. If use is false or the report is not kOk, no bit of the triangle changes, and the instructions
+  // are the same. After BeginRow call StepRow, which spends credit (slices.hpp), until it answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     const int begin = Layout::kRowBegin[joint];
     first_ = Layout::kFrontBegin[joint];
@@ -90,7 +89,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     weight_ = 1.0f;
     next_ = 0;
   }
-  ARMCAL_NOINLINE bool StepRow(int& credit) {  // keeps its registers whatever calls it
+  ARMCAL_NOINLINE bool StepRow(int& credit) {  // out of line, so that no caller takes its registers
     int k = next_, left = credit;
     float weight = weight_;
     float* const row = row_;
@@ -115,8 +114,8 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   }
   const UpdateReport& report() const { return report_; }
 
-  // Once after the rows of a sample: a front column forgets if its joint moves (bit i of `moving`), a dense column if
-  // all move. What stands still keeps all it knows.
+  // Once after the rows of a sample. A front column forgets if its joint moves (bit i of `moving`), a dense column if
+  // all joints move. A joint at rest brings no new data, so what is known of it must not fade.
   void BeginEnd(std::uint32_t moving) {
     constexpr std::uint32_t kAll = (1u << Layout::kJoints) - 1u;
     int k = 0;
@@ -131,9 +130,10 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     return true;
   }
 
-  // What the filter knew of a block's columns no longer counts; they start again without data. block: a joint's front
-  // columns, or kJoints: the dense ones. A front column is known through the dense ones of its row; where these may now
-  // be anywhere in their prior, the row says that much less. Between samples; interface shared by all filters.
+  // What the filter knew of a block no longer counts: its columns start again without data. block: a joint (its front
+  // columns), or kJoints (the dense columns). The rows of front columns also contain dense columns. After a reset of
+  // these, such a row says less about its front column, so its weight is reduced. Only between samples; the calls are
+  // the same for all filters.
   static constexpr bool CanReset(int block) { return block >= 0 && block <= Layout::kJoints; }
   void BeginReset(int block) {
     const ColumnRange columns = ColumnsOfBlock<Layout>(block, kColumns);
@@ -146,8 +146,8 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     return next_ >= Layout::kFront;
   }
 
-  // Shape: x [kColumns], prior units. What the data alone say, by back substitution; zero where they say nothing. No
-  // prior, no standard deviation: a hundredth of the read-out's work.
+  // What the data alone say, by back substitution; zero where they say nothing. Shape: x [kColumns], prior units.
+  // Without prior and standard deviation this is a hundredth of the read-out's work.
   void Solve(float* x) const {
     for (int k = kColumns - 1; k >= Layout::kFront; --k) {
       const float* row = rows_ + kOffsets.at[k];
@@ -167,8 +167,8 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     }
   }
 
-  // Read-out in slices: the prior's factor takes the triangle's rows as measurements of variance 1 / d.
-  // Begin, then Step until it answers true. No update between.
+  // Read-out in slices: the prior's factor takes the triangle's rows as measurements of variance 1 / d. BeginReadOut,
+  // then StepReadOut until it answers true. No row between.
   void BeginReadOut(ReadOut& out) const {
     out.estimate.Start(*prior_);
     for (int p = 0; p < kColumns; ++p) out.estimate.d(p) *= 1.0f / (1.0f - kFloor);
@@ -199,8 +199,8 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
 
   static constexpr int kColumnCost = 6, kRowCost = 24, kEndCost = 2 * kColumns;
 
-  // Takes as much off the weight of a front column's row as the prior's spread of its dense columns makes its noise
-  // larger. Returns the work, in elements.
+  // The dense columns of a front column's row may be anywhere in their prior. That acts on the row as additional noise,
+  // and this reduces the row's weight accordingly. Returns the work, in elements.
   int WidenByDense(int column) {
     const int joint = JointOf<Layout>(column), begin = Layout::kRowBegin[joint];
     const float* coupling = rows_ + kOffsets.at[column] + (Layout::kFrontBegin[joint + 1] - 1 - column);
@@ -214,7 +214,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     return (Layout::kDense - begin) * (Layout::kDense - begin + 1) / 2;
   }
 
-  // Row `column` of the triangle as a measurement of the read-out's estimate.
+  // Begins to work row `column` of the triangle into the read-out's estimate.
   void BeginTake(int column, UdEstimate<Columns>& estimate) const {
     const float* stored = rows_ + kOffsets.at[column];
     const auto& at = Columns::kAt.position;
@@ -237,7 +237,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   UpdateReport report_;
   float d_[kColumns] = {};
   float rows_[kTriangle] = {};
-  float row_[kColumns + 1] = {};  // the row in work, and what remains of it
+  float row_[kColumns + 1] = {};  // what remains of the row in work
   float weight_ = 1.0f;
   int first_ = 0, width_ = 0, length_ = 0, dense_first_ = 0, next_ = 0;
 };

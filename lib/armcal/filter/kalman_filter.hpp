@@ -1,17 +1,15 @@
-// filter - the Kalman filter of a constant state with process noise; knows columns, not what they mean.
+// filter - the Kalman filter of constant parameters with process noise; and the extended one.
 #pragma once
 
+#include "armcal/filter/factor.hpp"
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
-#include "armcal/filter/ud_estimate.hpp"
-#include "armcal/filter/whole_rows.hpp"
 
 namespace armcal::filter {
 
-// Scalar rows in sequence; process noise by rank-one sums; `considered` columns by Schmidt's form. An instance belongs
-// to the background; no call allocates, each is bounded.
-// Noise goes to one column a sample in turn, as much at once as is due until its next turn.
-// The state is [front, dense], and kEta columns after it in an extended filter.
+// Takes scalar rows one after the other. Process noise enters by rank-one sums, `considered` columns by Schmidt's form.
+// Each sample adds the noise of one column, in turn, and as much as is due until that column's next turn. The state is
+// [front, dense], and in an extended filter the kEta columns after it. Every call is bounded. Context: background.
 template <class Layout, Form form = Form::kDense, Beside beside = Beside::kNothing>
 class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
  public:
@@ -20,7 +18,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   using Estimate = UdEstimate<Columns>;
   static constexpr int kSize = Columns::kSize;
 
-  // Estimate in prior units and its standard deviation, by column. `variance`, `next`: work space.
+  // The estimate in prior units and its standard deviation, by column. variance and next are work space.
   struct ReadOut {
     float x[kSize] = {};
     float sd[kSize] = {};
@@ -28,7 +26,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     int next = 0;
   };
 
-  // True if the form can hold what the prior asks for. The dense form always can.
+  // True if the form can represent what the prior asks for. The dense form always can.
   static bool Suits(const Prior<Layout>& prior) {
     if (form == Form::kDense) return true;
     bool suits = true;
@@ -36,7 +34,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     return suits;
   }
 
-  // Starts at the prior, which must suit and outlive the filter's use of it.
+  // Starts at the prior, which must suit, and must stay as it is while the filter works.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
     estimate_.Start(prior);
@@ -53,10 +51,10 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     clamp_count_ = 0;
   }
 
-  // One whitened row of `joint`. Shapes: front [its front columns], dense [kDense], zero before kRowBegin[joint];
-  // eta [kNonlinear] in an extended filter. With use = false, or when the report is not kOk, every bit of the estimate
-  // stays as it was; the instructions spent are the same. Then StepRow, which spends credit (slices.hpp), until it
-  // answers true; then report().
+  // One whitened row of `joint`. Shapes: front [the joint's front columns]; dense [kDense], zero before
+  // kRowBegin[joint]; eta [kNonlinear], in an extended filter only. If use is false or the report is not kOk, no bit of
+  // the estimate changes, and the instructions are the same. After BeginRow call StepRow, which spends credit
+  // (slices.hpp), until it answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
     const int first = Columns::kAt.first[joint];
     const std::uint32_t taken = FillRow<Layout, Columns>(joint, front, dense, eta, y, use, estimate_.row(), report_);
@@ -73,14 +71,14 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   }
   const UpdateReport& report() const { return report_; }
 
-  // What the rows and the end of a sample spend (slices.hpp). A considered column makes it more.
+  // The cost of the rows and the end of a sample (slices.hpp). A considered column makes it larger.
   int SampleCost() const {
     const int sum = turns_ > 0 ? Estimate::Work::SumCost(Columns::kShape, last_noise_) : 0;
     return kEndCost + Estimate::kRowsCost + Layout::kJoints * ConsideredCost() + sum;
   }
 
-  // Once after the rows of a sample: process noise, for columns whose joints move (bit i of `moving`: joint i), and the
-  // floor under the dense D.
+  // Once after the rows of a sample. Adds process noise to a column whose joints move (bit i of `moving`: joint i), and
+  // holds the floor under the dense D.
   void BeginEnd(std::uint32_t moving) {
     floor_count_ += estimate_.HoldFloor(*prior_);
     if (turns_ == 0) return;
@@ -89,7 +87,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     const float noise = prior_->noise[k] * static_cast<float>(turns_);
     estimate_.BeginUnitSum(p, math::Masked(noise, math::MaskOf((moving & needed) == needed)), LastOf(k));
     const int following = next_turn_ + 1 < turns_ ? next_turn_ + 1 : 0;
-    next_turn_ = moving != 0u ? following : next_turn_;  // at rest the turn does not pass, however long it lasts
+    next_turn_ = moving != 0u ? following : next_turn_;  // while all joints rest, no turn passes
   }
   bool StepEnd(int& credit) {
     if (turns_ > 0 && !estimate_.StepSum(credit)) return false;
@@ -97,9 +95,10 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     return true;
   }
 
-  // What the filter knew of a block's columns no longer counts: their prior's variance is added to what they have. The
-  // estimate stays until data move it. block: a joint's front columns, or kJoints: all others, which the block form
-  // cannot reset. Between samples, in slices: StepReset, which spends credit, until it answers true.
+  // What the filter knew of a block no longer counts: the prior's variance is added to the variance of its columns. The
+  // estimate stays until data move it. block: a joint (its front columns), or kJoints (all others), which the block
+  // form cannot reset. Only between samples. After BeginReset call StepReset, which spends credit, until it answers
+  // true.
   static constexpr bool CanReset(int block) {
     return block >= 0 && (form == Form::kDense ? block <= Layout::kJoints : block < Layout::kJoints);
   }
@@ -116,7 +115,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     return reset_.begin == reset_.end;
   }
 
-  // Read-out in slices, interface shared by all filters: Begin, then Step until it answers true. No update between.
+  // Read-out in slices, the same for all filters: BeginReadOut, then StepReadOut until it answers true. No row between.
   void BeginReadOut(ReadOut& out) const {
     for (float& v : out.variance) v = 0.0f;
     out.next = 0;
@@ -131,7 +130,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   }
 
   float x(int column) const { return estimate_.x(Columns::kAt.position[column]); }
-  // Keeps x of a column within [low, high] and counts when it had to. Between samples.
+  // Keeps x of a column within [low, high], and counts how often it had to. Only between samples.
   void Clamp(int column, float low, float high) {
     float& x = estimate_.x(Columns::kAt.position[column]);
     clamp_count_ += !(x >= low && x <= high);
@@ -153,7 +152,8 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   bool AnyConsidered() const { return form == Form::kDense && prior_->any_considered; }
   int ConsideredCost() const { return AnyConsidered() ? Estimate::Work::SumCost(Columns::kShape, kSize - 1) : 0; }
 
-  // A sum starts at the last column that may have a turn, whoever's turn it is: the same instructions each time.
+  // A sum starts at the last column that may have a turn, whichever column has it now. So each sum takes the same
+  // instructions.
   int LastOf(int column) const {
     return form == Form::kBlock ? Columns::kAt.front_end[JointOf<Layout>(column)] - 1 : last_noise_;
   }
@@ -167,5 +167,12 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   ColumnRange reset_ = {};  // what remains of a reset
   std::uint32_t floor_count_ = 0, clamp_count_ = 0;
 };
+
+// The Kalman filter over [front, dense, eta]. Rows are linearised at the estimate before the sample: y = tau - tau(x0)
+// + h x0, where h = [columns, d tau / d eta] at x0. Whoever makes the rows keeps to that (estimator/live_model.hpp). In
+// all else it is the same filter. The block form serves wherever process noise is on front columns only, because eta is
+// a dense column.
+template <class Layout, Form form = Form::kDense>
+using ExtendedKalmanFilter = KalmanFilter<Layout, form, Beside::kEta>;
 
 }  // namespace armcal::filter

@@ -1,19 +1,91 @@
-// filter - three Kalman filters of one model for friction that changes, from hardly to suddenly; knows columns only.
+// filter - a bank of three Kalman filters for friction that changes slowly or suddenly. No program of the project uses
+// it yet.
 #pragma once
 
-#include "armcal/filter/mode_weights.hpp"
+#include "armcal/filter/factor.hpp"
 #include "armcal/filter/prior.hpp"
 #include "armcal/filter/row.hpp"
-#include "armcal/filter/ud_estimate.hpp"
-#include "armcal/filter/whole_rows.hpp"
 
 namespace armcal::filter {
 
-// The last front column of each joint that has process noise has a slope beside it: a state that is added to it with
-// each sample in motion. The members differ in how far column and slope walk; the innovations of a joint's rows weigh
-// them for that joint. Every kMixEvery samples each member takes over a share of the others' means, as in an IMM
-// (H. Blom, Y. Bar-Shalom, 1988), but keeps its own covariance: mixing those, too, would need new factors of all three
-// and follows no better.
+// How likely each member of a bank is, for each joint, by its innovations. Context: background.
+template <int kJoints, int kMembers>
+class ModeWeights {
+ public:
+  void Restart() {
+    for (int i = 0; i < kJoints; ++i)
+      for (int m = 0; m < kMembers; ++m) weight_[i][m] = 1.0f / kMembers, log_likelihood_[i][m] = 0.0f;
+    Average();
+  }
+
+  // What a member predicted of a whitened row of the joint. A row that is not used says nothing.
+  void Add(int joint, int member, float innovation, float variance, bool used) {
+    const float unlikely = 0.5f * (innovation * innovation / variance + math::Log(variance));
+    log_likelihood_[joint][member] -= math::Masked(unlikely, math::MaskOf(used));
+  }
+
+  // Bayes' rule over the rows of a sample, for joints that move (bit i: joint i). The weight of a member that is wrong
+  // stays at kLeast, so that the member can come back.
+  void EndSample(std::uint32_t moving) {
+    for (int i = 0; i < kJoints; ++i) {
+      float best = log_likelihood_[i][0], sum = 0.0f;
+      for (const float l : log_likelihood_[i]) best = math::Max(best, l);
+      float next[kMembers];
+      for (int m = 0; m < kMembers; ++m) {
+        next[m] = math::Max(kLeast, weight_[i][m] * math::Exp(log_likelihood_[i][m] - best));
+        log_likelihood_[i][m] = 0.0f;
+        sum += next[m];
+      }
+      for (int m = 0; m < kMembers; ++m)
+        weight_[i][m] = math::Select((moving >> i & 1u) != 0u, next[m] / sum, weight_[i][m]);
+    }
+    Average();
+  }
+
+  // The mean of the joints' weights, for the columns that all joints see.
+  void Average() {
+    for (int m = 0; m < kMembers; ++m) {
+      float sum = 0.0f;
+      for (const auto& joint : weight_) sum += joint[m];
+      dense_[m] = sum / kJoints;
+    }
+  }
+
+  // Since the last exchange the friction may have changed to another member's behaviour. Fills in share[to][from]: how
+  // much of member `from` member `to` goes on with. A joint's weights change accordingly unless `due` is zero; the mean
+  // weights (kJoints) do not. Call it for kJoints first, then for all joints, then call Average.
+  void Exchange(int joint, float (&share)[kMembers][kMembers], std::uint32_t due) {
+    float next[kMembers];
+    for (int to = 0; to < kMembers; ++to) next[to] = Shares(of(joint), to, share[to]);
+    if (joint == kJoints) return;
+    for (int m = 0; m < kMembers; ++m) weight_[joint][m] = math::Select(due != 0u, next[m], weight_[joint][m]);
+  }
+
+  // The weights [kMembers] of a joint; kJoints: their mean.
+  const float* of(int joint) const { return joint < kJoints ? weight_[joint] : dense_; }
+
+ private:
+  static constexpr float kStay = 0.995f;  // probability that a mode lasts from one exchange to the next
+  static constexpr float kLeast = 1e-4f;
+
+  static float Shares(const float* weight, int to, float* share) {
+    float sum = 0.0f;
+    for (int from = 0; from < kMembers; ++from) {
+      share[from] = weight[from] * (from == to ? kStay : (1.0f - kStay) / (kMembers - 1));
+      sum += share[from];
+    }
+    for (int from = 0; from < kMembers; ++from) share[from] /= sum;
+    return sum;
+  }
+
+  float weight_[kJoints][kMembers] = {}, log_likelihood_[kJoints][kMembers] = {}, dense_[kMembers] = {};
+};
+
+// In each joint, the last front column with process noise has a slope: a second state that is added to the column with
+// each sample in motion. The three members differ in how far column and slope walk. For each joint, the innovations of
+// its rows decide how much each member counts. Every kMixEvery samples each member takes over a share of the others'
+// means, as in an IMM (H. Blom, Y. Bar-Shalom, 1988). It keeps its own covariance: mixing covariances would need new
+// factors of all three, and follows no better (measured). Context of every call: background.
 template <class Layout>
 class ModelBank : public WholeRows<ModelBank<Layout>> {
  public:
@@ -29,15 +101,15 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     int member = 0, next = 0;
   };
 
-  // Process noise on front columns only, none considered.
+  // True if only front columns have process noise, and no column is considered.
   static bool Suits(const Prior<Layout>& prior) {
     bool suits = !prior.any_considered;
     for (int k = Layout::kFront; k < kColumns; ++k) suits &= !(prior.noise[k] > 0.0f);
     return suits;
   }
 
-  // Starts at the prior, which must suit and outlive the filter's use of it. Its noise says which columns change; how
-  // fast is the members' matter.
+  // Starts at the prior, which must suit, and must stay as it is while the filter works. The prior's process noise only
+  // says which columns change; each member has its own idea of how fast.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
     for (int i = 0; i < kJoints; ++i) {
@@ -57,7 +129,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     floor_count_ = 0;
   }
 
-  // Verbs and slices as of the other filters. The report's innovation and variance are the mixture's.
+  // Calls and slices are those of the other filters. The report's innovation and variance are those of the mixture.
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     joint_ = joint;
     y_ = math::Masked(y, FillRow<Layout, Columns>(joint, front, dense, nullptr, y, use, row_, report_));
@@ -89,7 +161,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     weights_.EndSample(moving);
     for (Estimate& e : member_) floor_count_ += e.HoldFloor(*prior_);
     at_ = -1;
-    samples_ += moving != 0u;  // at rest nothing changes, however long it lasts
+    samples_ += moving != 0u;  // while all joints rest, nothing changes
   }
   bool StepEnd(int& credit) {
     for (; at_ <= 2 * kJoints && credit > 0; ++at_) {
@@ -106,7 +178,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     return cost;
   }
 
-  // What the bank knew of a joint's front columns no longer counts: see KalmanFilter::BeginReset.
+  // What the bank knew of a joint's front columns no longer counts. See KalmanFilter::BeginReset.
   static constexpr bool CanReset(int block) { return block >= 0 && block < kJoints; }
   void BeginReset(int block) { joint_ = block, at_ = 0; }
   bool StepReset(int& credit) {
@@ -124,7 +196,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
       for (float& v : member) v = 0.0f;
     out.member = out.next = 0;
   }
-  // Mean and standard deviation of the mixture.
+  // Reads out mean and standard deviation of the mixture.
   bool StepReadOut(ReadOut& out, int& credit) const {
     for (; out.member < kMembers; ++out.member, out.next = 0)
       if (!member_[out.member].AddDiagonal(out.variance[out.member], out.next, credit)) return false;
@@ -148,17 +220,17 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
   const Estimate& estimate(int member) const { return member_[member]; }
 
  private:
-  // Steps per sample, in standard deviations of the column's prior: of the column, of its slope. Chosen on profiles of
-  // other sizes than those of any test.
+  // Steps of a column and of its slope per sample, in standard deviations of the column's prior. They were chosen on
+  // other profiles of friction than the tests have.
   struct Mode {
     float walk, slope;
   };
   static constexpr Mode kModes[kMembers] = {{4e-4f, 2e-6f}, {2e-3f, 2e-5f}, {0.06f, 2e-6f}};
   static constexpr float kFirstSlope = 4e-4f;
-  static constexpr float kOthers = 0.02f;  // walk of the joint's other front columns
+  static constexpr float kOthers = 0.02f;  // the other front columns of the joint walk less, by this factor
   static constexpr std::uint32_t kMixEvery = 10;
 
-  // What a sample's steps spend, as measured: a row beside the members' work, the weights, a prediction, a mix.
+  // Costs, as measured: of a row beside the members' work, of the weights, of a prediction, of a mix.
   static constexpr int RowCost(int i) { return 100 + 2 * (Columns::kSize - Columns::kAt.first[i]); }
   static constexpr int kEndCost = 500;
   static constexpr int PredictCost(int i) {
@@ -187,13 +259,13 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     report_.variance = variance;
   }
 
-  // The column takes its slope, U and x alike: a unit upper triangular step, D stays. Noise in turn over the joint's
-  // front, as much at once as is due until the next turn.
+  // Adds the slope to its column, in x and in U. The slope stands after its column, so this adds rows of U and leaves
+  // D. Then adds noise to one front column of the joint, in turn, and as much as is due until its next turn.
   void Predict(int i) {
     const int first = Columns::kAt.first[i], slope = Columns::kAt.front_end[i] - 1, width = slope + 1 - first;
     const std::uint32_t moves = math::MaskOf((moving_ >> i & 1u) != 0u);
     const int p = drifting_[i] < 0 ? slope : drifting_[i], turn = first + turn_[i];
-    const float noise = prior_->noise[turn == slope ? 0 : Columns::kAt.column[turn]];  // of the slope: not asked
+    const float noise = prior_->noise[turn == slope ? 0 : Columns::kAt.column[turn]];  // a slope has none
     const bool walks = (drifting_[i] >= 0) & ((turn == slope) | (noise > 0.0f));
     for (int m = 0; m < kMembers; ++m) {
       Estimate& e = member_[m];
@@ -211,8 +283,8 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     turn_[i] = static_cast<std::uint8_t>((following & moves) | (turn_[i] & ~moves));
   }
 
-  // The means of what all joints see (kJoints) first, then of each joint's own, joint 0 last. Computed with every
-  // sample, so that all cost the same; zero `due` changes nothing.
+  // Mixes the members' means: first of the columns that all joints see (kJoints), then of each joint's own, joint 0
+  // last. It is computed with every sample, so that all samples cost the same. If `due` is zero, it changes nothing.
   void Mix(int i, std::uint32_t due) {
     const bool dense = i == kJoints;
     float share[kMembers][kMembers];

@@ -1,10 +1,11 @@
-// filter - in which order a UD factor holds the columns, and where each column of it begins; knows no number.
+// filter - in which order a factor holds the columns of a model, and at which row each column of it begins.
 //
-// A joint's front columns stand just before the first dense column of its row. Two things follow:
-//   row i of the regressor is zero before first[i], so that the factor's columns before it are not touched by it;
-//   front columns of two joints never meet in a row, so that U between them stays zero as long as process noise and
-//   considered columns do not couple them. The block form does not store those zeros: a front column begins at its
-//   joint's first one, a dense column at the top.
+// A column's place in this order is its position. The front columns of a joint stand just before the first dense column
+// of the joint's row. Two things follow:
+//   Row i of the regressor is zero before position first[i]. So it does not touch the factor's columns before that.
+//   Front columns of two joints never meet in a row. So U between them stays zero, as long as process noise and
+//   considered columns do not couple them. The block form does not store those zeros: there a front column begins at
+//   the first front column of its joint, and a dense column begins at the top.
 #pragma once
 
 #include <cstdint>
@@ -16,22 +17,22 @@ enum class Form : std::uint8_t {
   kBlock   // process noise on front columns only, none considered; half the instructions, a quarter less memory
 };
 
-// Columns of a filter beside the layout's own [front, dense], numbered from Layout::kColumns on.
+// Which columns a filter has beside the layout's [front, dense]. They are numbered from Layout::kColumns on.
 enum class Beside : std::uint8_t {
   kNothing,
   kEta,    // the nonlinear parameters, after all others: kNonlinear columns
-  kSlopes  // one a joint, after its front columns: d/dt of one of them
+  kSlopes  // one for each joint, after its front columns: the rate of change of one of them
 };
 
-// The front columns of the block form that a row touches: those of its joint; {0, 0}: none, or the dense form.
+// The front columns that a row touches in the block form: those of its joint. {0, 0}: none, or the dense form.
 struct Front {
   std::uint8_t begin, end;  // positions
 };
 
-// What is known of an order without its layout: one copy of the code that works on a factor serves all filters of a
-// form.
+// The tables of an order, without the type of its layout. With these, one copy of the code that works on a factor
+// serves all filters of a form.
 struct AnyShape {
-  std::uint8_t size, fronts, denses, states;  // positions; columns: front, dense, all that the prior knows
+  std::uint8_t size, fronts, denses, states;  // number of positions; of front, of dense, and of all prior columns
   const std::uint8_t* position;               // of a column
   const std::uint8_t* column;                 // at a position
 };
@@ -39,8 +40,8 @@ template <Form form>
 struct Shape;
 template <>
 struct Shape<Form::kDense> : AnyShape {
-  static constexpr int kColumnCost = 6;  // a column's own work besides its elements (slices.hpp), as measured
-  // Element (i, p) is number Origin(p) + i of a Factor, from row Begin(p) on; D is (p, p).
+  static constexpr int kColumnCost = 6;  // of a column besides its elements (slices.hpp), as measured
+  // Element (i, p) is number Origin(p) + i of a Factor. A column has elements from row Begin(p) on. (p, p) holds D.
   constexpr int Origin(int p) const { return 3 * size + p * (p + 1) / 2; }
   constexpr int Begin(int) const { return 0; }
   constexpr int Begin(int, Front) const { return 0; }
@@ -58,7 +59,7 @@ struct Shape<Form::kBlock> : AnyShape {
   static constexpr int kColumnCost = 8;
   constexpr int Origin(int p) const { return origin[p]; }
   constexpr int Begin(int p) const { return begin[p]; }
-  constexpr int Begin(int p, Front front) const { return p < front.end ? front.begin : 0; }  // of one that it touches
+  constexpr int Begin(int p, Front front) const { return p < front.end ? front.begin : 0; }  // if the row touches p
   constexpr int Above(int p, Front front) const { return p + 1 < front.end ? p + 1 : above[p]; }
   constexpr int Below(int p, Front front) const {
     const int own = (p < front.end ? p : front.end) - 1;
@@ -76,7 +77,7 @@ struct Order {
                                                            : 0;
   static constexpr int kSize = Layout::kColumns + kMore;
 
-  // Of all orders, and what the block form needs besides.
+  // What every order has, and below what the block form needs besides.
   struct Tables {
     std::uint8_t position[kSize] = {};
     std::uint8_t column[kSize] = {};

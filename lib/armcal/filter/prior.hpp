@@ -1,17 +1,18 @@
-// filter - where a filter starts and what each column may do; knows columns, not what they mean.
+// filter - the prior: where a filter starts, and what each column may do.
 //
-// Prior units: x_k = (b_k - b0_k) / s_k with s_k^2 the prior variance of column k, so that every active column starts
-// with mean 0 and variance 1. Rows are whitened: y = (tau - Y b0) / sigma, h_k = Y_k s_k / sigma, noise variance 1.
-// Front columns are independent of all others in the prior; dense columns are correlated.
+// Prior units: x_k = (b_k - b0_k) / s_k, where s_k^2 is the prior variance of column k. So every active column starts
+// with mean 0 and variance 1. Whitened rows: y = (tau - Y b0) / sigma and h_k = Y_k s_k / sigma, so the noise has
+// variance 1. In the prior, dense columns are correlated with each other, and a front column is independent of all
+// others.
 //
 // Layout is a struct of constants (a generated model is one): kJoints, kFront, kFrontBegin[kJoints + 1], kDense,
 // kRowBegin[kJoints], kColumns = kFront + kDense, kNonlinear. See model/contract.hpp. The nonlinear parameters eta are
-// columns of the extended filter alone, numbered from kColumns on, independent of all others in the prior.
+// columns of the extended filter only. They are numbered from kColumns on, and are independent of all others.
 #pragma once
 
 #include <cstdint>
 
-#include "armcal/math/ud.hpp"
+#include "armcal/math/symmetric.hpp"
 
 namespace armcal::filter {
 
@@ -20,7 +21,7 @@ struct Prior {
   static constexpr int kStates = Layout::kColumns + Layout::kNonlinear;
   float dense_ud[math::UdSize(Layout::kDense)] = {};  // correlation of the dense columns as U D U'
   std::uint32_t active[kStates] = {};                 // all ones: the column has uncertainty; 0: fixed or standby
-  bool considered[kStates] = {};                      // counted, not updated (Kalman form)
+  bool considered[kStates] = {};                      // its uncertainty counts, it is not updated (Kalman form)
   bool any_considered = false;
   float lambda[kStates] = {};  // forgetting per sample, in (0, 1] (forgetting form)
   float noise[kStates] = {};   // variance per sample, prior units (Kalman form)
@@ -28,21 +29,21 @@ struct Prior {
   float gate_sigma = 0.0f;     // innovations beyond are not used; 0: no gate (Kalman form)
 };
 
-// Joint of a front column; kJoints: of another one. The same instructions for all.
+// The joint of a front column, or kJoints for any other column. The same instructions for all.
 template <class Layout>
 constexpr int JointOf(int column) {
   int joint = 0;
   for (int i = 0; i < Layout::kJoints; ++i) joint += column >= Layout::kFrontBegin[i + 1];
   return joint;
 }
-// The joints that must move before a column may change by itself: a front column needs its own joint, others all.
+// The joints that must move before a column may change by itself: its own for a front column, all for any other.
 template <class Layout>
 constexpr std::uint32_t JointsOf(int column) {
   const int joint = JointOf<Layout>(column);
   return joint < Layout::kJoints ? 1u << joint : (1u << Layout::kJoints) - 1u;
 }
 
-// Columns of a block that can be reset: a joint's front ones, or (kJoints) all others of `columns`.
+// The columns of a block that can be reset: the front columns of a joint, or (block kJoints) all other columns.
 struct ColumnRange {
   int begin, end;
 };

@@ -1,9 +1,14 @@
-// filter - how long work is cut into slices; knows no filter.
+// filter - how a filter is called: in bounded slices or a whole row at once; and what it reports of a row.
 //
-// Work is counted in elements of a factor's column: eight instructions each on a Cortex-M4F. A call is given `credit`,
-// takes off what it spends, and stops at the next place where it can once none is left. The caller adds to what is left
-// over, debts too, so that slices stay equal: only the last one may be off by what cannot be cut.
+// Work is counted in elements of a factor's column: one element is eight instructions on a Cortex-M4F. A call in slices
+// is given `credit` and takes off what it spends. When no credit is left, it stops at the next place where it can,
+// which may be a few elements later. The caller keeps what is left over, also if that is a debt, and adds the credit of
+// the next slice to it. So all slices but the last are nearly equal.
 #pragma once
+
+#include <cstdint>
+
+#include "armcal/core/status.hpp"
 
 namespace armcal::filter {
 
@@ -15,5 +20,37 @@ constexpr int EqualSlices(int cost) {
   const int slices = (cost + kSliceCredit / 2) / kSliceCredit;
   return slices > 1 ? (cost + slices - 1) / slices : cost;
 }
+
+// What one row did. Whitened units.
+struct UpdateReport {
+  float innovation = 0.0f;  // row minus its prediction by this filter before the row; 0 unless the row was judged
+  float variance = 1.0f;    // its variance by this filter (forgetting form: from data alone, without the prior)
+  bool accepted = false;
+  core::Status status = core::Status::kGated;  // kOk, kGated, kNotFinite, kOutOfRange (element beyond kRowLimit)
+};
+
+// The calls without slices, made of those in slices. Base of a Filter that has BeginRow, StepRow, report, BeginEnd and
+// StepEnd. Context: background.
+template <class Filter>
+class WholeRows {
+ public:
+  // A whole row. Arguments as of BeginRow.
+  template <class... Row>
+  UpdateReport Update(int joint, const Row&... row) {
+    self().BeginRow(joint, row...);
+    int all = kNoSlices;
+    (void)self().StepRow(all);
+    return self().report();
+  }
+  // The whole end of a sample. Arguments as of BeginEnd.
+  void EndSample(std::uint32_t moving) {
+    self().BeginEnd(moving);
+    int all = kNoSlices;
+    (void)self().StepEnd(all);
+  }
+
+ private:
+  Filter& self() { return static_cast<Filter&>(*this); }
+};
 
 }  // namespace armcal::filter

@@ -1,10 +1,10 @@
-// math - elementary functions that give the same bits on every target; knows no model and no filter.
+// math - elementary functions that give the same bits on every target.
 //
-// float, and Log of a double: own, branch-free, no library call (std::sqrt is one instruction with -fno-math-errno),
-// NaN in gives NaN out. Any other scalar: the function that argument-dependent lookup or std:: finds, so that double,
-// long double and counting scalars run the same generated code. Polynomials: weighted minimax fits made for this file.
-// Errors below are maxima over the stated range, checked against long double in tests/unit/math.
-// Context: any.
+// For float, and for Log of a double, the functions are written here: without a branch and without a library call
+// (std::sqrt is one instruction with -fno-math-errno). NaN in gives NaN out. For any other scalar they call the
+// function that argument-dependent lookup or std:: finds. So double, long double and counting scalars run the same
+// generated code. The polynomials are weighted minimax fits made for this file. Each error below is the largest over
+// the stated range; tests/unit/math checks it against long double. Context: any.
 #pragma once
 
 #include <cmath>
@@ -29,7 +29,7 @@ inline float FloatOf(std::uint32_t b) {
   std::memcpy(&x, &b, sizeof x);
   return x;
 }
-// All ones where the condition holds: kernels choose by mask, never by branch.
+// All ones if the condition holds. Kernels choose by mask, never by branch.
 constexpr std::uint32_t MaskOf(bool condition) { return 0u - static_cast<std::uint32_t>(condition); }
 inline float Masked(float x, std::uint32_t mask) { return FloatOf(BitsOf(x) & mask); }  // x or +0, even for NaN
 inline float Select(bool condition, float yes, float no) {

@@ -1,11 +1,11 @@
-// math - a b + c with one rounding where the machine has it; knows no model and no filter.
+// math - a b + c, with one rounding where the machine can do that in one instruction.
 #pragma once
 
 namespace armcal::math {
 
-// float: rounded once on every target, so that host and target agree bit for bit (one instruction on Cortex-M4F and
-// M7; on a host without it the C library's exact fmaf). Other scalars: rounded once where that is one instruction, else
-// twice. Context: any.
+// float: rounded once everywhere, so that host and target agree bit for bit. It is one instruction on Cortex-M4F and
+// M7, and the C library's exact fmaf on a host that has no such instruction. Other scalars: rounded once where that is
+// one instruction, else twice. Context: any.
 inline float MulAdd(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
 
 inline double MulAdd(double a, double b, double c) {

@@ -1,8 +1,8 @@
-// math - several samples side by side as one scalar, so that a generated model runs on a host's vector unit; no target
-// includes it.
+// math - several samples side by side as one scalar, for the vector units of a PC; no firmware includes it.
 //
-// Pack<double, 8> and Pack<float, 16> fill one 512-bit register; narrower machines take two or four, with the same
-// bits. Every operation acts lane by lane and a comparison gives a lane mask, so nothing branches.
+// A generated model runs on a Pack as on any scalar. Pack<double, 8> and Pack<float, 16> fill one 512-bit register;
+// narrower machines use two or four registers and give the same bits. Every operation acts on each lane by itself, and
+// a comparison gives a mask for each lane, so nothing branches.
 #pragma once
 
 #include <cmath>
@@ -46,7 +46,7 @@ struct Pack {
   friend Mask operator>=(const Pack& a, const Pack& b) { return {a.lane >= b.lane}; }
   friend Pack Select(const Mask& mask, const Pack& yes, const Pack& no) { return Pack(mask.bits ? yes.lane : no.lane); }
 
-  // What elementary.hpp calls for a scalar that is not float.
+  // The functions that elementary.hpp calls for a scalar that is not float.
   friend Pack abs(const Pack& x) {
     return Each(x, [](T v) { return std::abs(v); });
   }
@@ -87,7 +87,8 @@ struct Pack {
     return y;
   }
 
-  // Reduction as in SinCos(float): three parts of pi/2, the first two of 33 bits, so k < 2^20 times them is exact.
+  // Reduces as SinCos(float) does, with three parts of pi/2. The first two have 33 bits, so k < 2^20 times them is
+  // exact.
   static void SinCosDouble(const Lanes& x, Lanes& s, Lanes& c) {
     constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: x + kRound holds round(x) in its low bits
     const Lanes shifted = x * 0.63661977236758138 + kRound;
@@ -106,7 +107,7 @@ struct Pack {
              z * (2.4801587298764561e-05 +
                   z * (-2.7557317271145144e-07 + z * (2.087614614655861e-09 + z * -1.1382623647474604e-11))));
     const Lanes sin_r = r + r * z * sin_p;
-    // 1 - z/2 loses the bits below 1; what was lost is known exactly and added with the small terms.
+    // 1 - z/2 loses some bits. The loss is known exactly, and is added together with the small terms.
     const Lanes half = 0.5 * z, one = 1.0 - half;
     const Lanes cos_r = one + (((1.0 - one) - half) + z * z * cos_p);
     const Bits odd = (quadrant & 1) != 0;

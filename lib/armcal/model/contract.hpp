@@ -1,4 +1,4 @@
-// model - what a generated model must supply; knows no filter, no register and no storage.
+// model - what a generated model consists of: its constants and its functions.
 //
 // A generated model is a struct of constants and static functions, `struct Er20Like { ... }`:
 //
@@ -7,9 +7,9 @@
 //                columns kFrontBegin[i] .. kFrontBegin[i+1]-1 belong to joint i   (int kFrontBegin[n+1])
 //   kRigid       base inertial columns (rotor inertias included)
 //   kDense       kRigid + columns of pair and arm effects (they touch several rows)
-//   kRowBegin[i] first dense column that is not structurally zero in row i        (int kRowBegin[n])
+//   kRowBegin[i] first dense column that is not structurally zero in row i         (int kRowBegin[n])
 //   kColumns     kFront + kDense: the filter coordinates, in the order [front, dense]
-//   kNonlinear   nonlinear effect parameters eta (frozen outside the extended Kalman filter)
+//   kNonlinear   nonlinear effect parameters eta (constant, but for the extended Kalman filter)
 //   kBodyParameters  11 n: per link m, m cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz (about the link-frame
 //                origin, in the link frame) and the rotor inertia on the joint side
 //   kParameters  the table: [body, front columns, dense effect columns, eta]
@@ -23,18 +23,19 @@
 //
 //   kStates      values that effects with memory carry from sample to sample (0 for most models)
 //   kSensitivities  d state / d eta, carried by the extended Kalman filter only
-//   kReadyState[i]  state that is 1 once row i's states no longer remember how they started; -1: row i is always ready
+//   kReadyState[i]  which state is 1 once the states of row i no longer depend on their start; -1: row i is always
+//   ready
 //
-// Functions; x: ModelInput<T, n>; committed[kColumns]: the committed parameters, read only by columns that depend on
-// the estimate; eta[kNonlinear]. Straight-line, no branch, no call; float in, float out. Context: any.
+// Functions. x: ModelInput<T, n>. committed[kColumns]: the committed parameters; only columns that depend on parameters
+// read them. eta[kNonlinear]. The code is straight-line: no branch, no call. Float in, float out. Context: any.
 //
 //   template <class T> static void InitialState(x, committed, eta, T* state);
 //     state[kStates] at the first sample of a stretch, x being that sample. Sensitivities start at zero.
 //   template <class T> static void Regressor(x, committed, eta, const T* state, T* next, T* front, T* dense);
-//     state[kStates]: what the sample before left in `next`. next[kStates] must be another array.
+//     state[kStates]: what this function wrote to `next` at the sample before. next[kStates] must be another array.
 //     front[kFront]: value of each front column in its own row.
-//     dense[kJoints * kDense]: row-major. Structural zeros are NOT written: arrays start as zero and stay with one
-//     model. tau_i = sum_{c in front(i)} front[c] p[c] + sum_d dense[i*kDense+d] p[kFront+d].
+//     dense[kJoints * kDense]: row-major. Structural zeros are NOT written: the caller sets the arrays to zero once and
+//     uses them for one model only. tau_i = sum_{c in front(i)} front[c] p[c] + sum_d dense[i*kDense+d] p[kFront+d].
 //   template <class T> static void Jacobian(x, committed, eta, const T* p, const T* state, T* next, T* jacobian);
 //     jacobian[kJoints * kNonlinear] = d tau / d eta at filter coordinates p[kColumns]; structural zeros as above.
 //     state and next have kStates + kSensitivities entries; only the sensitivities of `next` are written.
@@ -51,7 +52,7 @@ enum class ParameterState : std::uint8_t {
   kEstimated = 0,
   kConsidered = 1,  // its uncertainty counts, it is not updated (Kalman forms only)
   kFixed = 2,       // its torque is subtracted, its column zeroed
-  kStandby = 3,     // compiled in, amplitude zero, column zeroed
+  kStandby = 3,     // compiled in, but its amplitude is zero and its column is zeroed
 };
 
 // Index of a body parameter inside its link's block of 11.
@@ -68,8 +69,8 @@ struct ParameterInfo {
   std::uint8_t group;    // default forgetting group
 };
 
-// One motor axis. q_motor = counts_to_rad (counts - zero_counts), tau_motor = lsb_to_Nm current, both joint side
-// (gear ratio and sign inside); joint quantities follow by the coupling matrices.
+// One motor axis. q_motor = counts_to_rad (counts - zero_counts) and tau_motor = lsb_to_Nm current, both on the joint
+// side (gear ratio and sign are inside). The coupling matrices give the quantities of the joints.
 struct AxisInfo {
   float counts_to_rad;
   std::int32_t zero_counts;

@@ -1,7 +1,7 @@
-// model - the parameter table as numbers, and its one byte layout; knows no storage and no register.
+// model - the parameter table as numbers, and its byte layout.
 //
-// The byte layout is the same on the wire (Modbus registers), in storage and in the host's files:
-// big-endian 16-bit words, 32-bit values with the high word first. Layout version 1, in 16-bit words:
+// The byte layout is the same on the wire (Modbus registers), in storage and in the files of the PC: big-endian 16-bit
+// words, and 32-bit values with the high word first. Layout version 1, in 16-bit words:
 //   header  (16 words): schema u32, layout version u16, joints u16, parameters u16, flags u16 (bit 0: bumpless),
 //                       blend_ms u32, forgetting[4] f32 (per estimator sample, group 0..3, in (0, 1])
 //   joint   (8 words each): sigma f32, v_min f32, torque_limit f32, torque_scale f32
@@ -53,71 +53,67 @@ struct ParameterTable {
   ParameterEntry parameter[p] = {};
 };
 
-namespace words = core;  // PutU32, GetF32 ...: high word first
-
 // words: [ParameterTable<n,p>::kWords], native 16-bit values (the wire and the store put the high byte first).
 template <int n, int p>
 void Encode(const ParameterTable<n, p>& t, std::uint16_t* w) {
-  using namespace words;
-  PutU32(w, t.schema);
+  core::PutU32(w, t.schema);
   w[2] = kLayoutVersion;
   w[3] = n;
   w[4] = p;
   w[5] = t.flags;
-  PutU32(w + 6, t.blend_ms);
-  for (int g = 0; g < kForgettingGroups; ++g) PutF32(w + 8 + 2 * g, t.forgetting[g]);
+  core::PutU32(w + 6, t.blend_ms);
+  for (int g = 0; g < kForgettingGroups; ++g) core::PutF32(w + 8 + 2 * g, t.forgetting[g]);
   w += kHeaderWords;
   for (int j = 0; j < n; ++j, w += kJointWords) {
-    PutF32(w, t.joint[j].sigma_Nm);
-    PutF32(w + 2, t.joint[j].v_min_radps);
-    PutF32(w + 4, t.joint[j].torque_limit_Nm);
-    PutF32(w + 6, t.joint[j].torque_scale);
+    core::PutF32(w, t.joint[j].sigma_Nm);
+    core::PutF32(w + 2, t.joint[j].v_min_radps);
+    core::PutF32(w + 4, t.joint[j].torque_limit_Nm);
+    core::PutF32(w + 6, t.joint[j].torque_scale);
   }
   for (int k = 0; k < p; ++k, w += kParameterWords) {
-    PutF32(w, t.parameter[k].mean);
-    PutF32(w + 2, t.parameter[k].sd);
-    PutF32(w + 4, t.parameter[k].process_noise);
+    core::PutF32(w, t.parameter[k].mean);
+    core::PutF32(w + 2, t.parameter[k].sd);
+    core::PutF32(w + 4, t.parameter[k].process_noise);
     w[6] = static_cast<std::uint16_t>((static_cast<unsigned>(t.parameter[k].state) << 8) | t.parameter[k].group);
     w[7] = 0;
   }
 }
 
-// kWrongSchema, kWrongSize (layout version, joints or parameters differ), kNotFinite, kOutOfRange (sigma, v_min,
-// limit, scale, forgetting not positive, sd or noise negative, unknown state or group). On refusal `t` is unchanged.
-// Bodies are judged by physical::IsPhysical, not here. Context: background.
+// kWrongSchema; kWrongSize (layout version, joints or parameters differ); kNotFinite; kOutOfRange (sigma, v_min, limit,
+// scale or forgetting is not positive, sd or noise is negative, state or group is unknown). On refusal `t` is
+// unchanged. This does not check whether bodies can exist; see physical::IsPhysical. Context: background.
 template <int n, int p>
 core::Status Decode(const std::uint16_t* w, std::uint32_t schema, ParameterTable<n, p>& t) {
-  using namespace words;
   using core::Status;
-  if (GetU32(w) != schema) return Status::kWrongSchema;
+  if (core::GetU32(w) != schema) return Status::kWrongSchema;
   if (w[2] != kLayoutVersion || w[3] != n || w[4] != p) return Status::kWrongSize;
   const std::uint16_t* jw = w + kHeaderWords;
   const std::uint16_t* pw = jw + n * kJointWords;
   for (int g = 0; g < kForgettingGroups; ++g) {
-    const float f = GetF32(w + 8 + 2 * g);
+    const float f = core::GetF32(w + 8 + 2 * g);
     if (!std::isfinite(f)) return Status::kNotFinite;
     if (!(f > 0.0f && f <= 1.0f)) return Status::kOutOfRange;
   }
   for (int k = 0; k < 4 * n; ++k) {
-    const float v = GetF32(jw + 2 * k);
+    const float v = core::GetF32(jw + 2 * k);
     if (!std::isfinite(v)) return Status::kNotFinite;
     if (!(v > 0.0f)) return Status::kOutOfRange;
   }
   for (int k = 0; k < p; ++k) {
     const std::uint16_t* e = pw + k * kParameterWords;
-    const float mean = GetF32(e), sd = GetF32(e + 2), noise = GetF32(e + 4);
+    const float mean = core::GetF32(e), sd = core::GetF32(e + 2), noise = core::GetF32(e + 4);
     if (!std::isfinite(mean) || !std::isfinite(sd) || !std::isfinite(noise)) return Status::kNotFinite;
     if (sd < 0.0f || noise < 0.0f || (e[6] >> 8) > 3 || (e[6] & 0xFF) >= kForgettingGroups) return Status::kOutOfRange;
   }
   t.schema = schema;
   t.flags = w[5];
-  t.blend_ms = GetU32(w + 6);
-  for (int g = 0; g < kForgettingGroups; ++g) t.forgetting[g] = GetF32(w + 8 + 2 * g);
+  t.blend_ms = core::GetU32(w + 6);
+  for (int g = 0; g < kForgettingGroups; ++g) t.forgetting[g] = core::GetF32(w + 8 + 2 * g);
   for (int j = 0; j < n; ++j, jw += kJointWords)
-    t.joint[j] = {GetF32(jw), GetF32(jw + 2), GetF32(jw + 4), GetF32(jw + 6)};
+    t.joint[j] = {core::GetF32(jw), core::GetF32(jw + 2), core::GetF32(jw + 4), core::GetF32(jw + 6)};
   for (int k = 0; k < p; ++k, pw += kParameterWords)
-    t.parameter[k] = {GetF32(pw), GetF32(pw + 2), GetF32(pw + 4), static_cast<ParameterState>(pw[6] >> 8),
-                      static_cast<std::uint8_t>(pw[6] & 0xFF)};
+    t.parameter[k] = {core::GetF32(pw), core::GetF32(pw + 2), core::GetF32(pw + 4),
+                      static_cast<ParameterState>(pw[6] >> 8), static_cast<std::uint8_t>(pw[6] & 0xFF)};
   return Status::kOk;
 }
 

@@ -1,4 +1,4 @@
-// model - what one sample is, raw and processed; knows no robot and no filter.
+// model - one sample: as the hardware gives it, as the estimators use it, and as a model reads it.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ inline constexpr std::uint8_t kStale = 4;      // position or current is older t
 template <int n>
 struct RawSample {
   std::uint32_t tick = 0;          // control ticks since power-up, wraps
-  std::int32_t counts[n] = {};     // motor encoder, wraps; only differences are used
+  std::int32_t counts[n] = {};     // motor encoder; may wrap, because only differences are used
   std::int16_t current[n] = {};    // measured (not commanded) torque-producing current, LSB
   std::uint8_t flags[n] = {};      // kEnabled | kSaturated | kStale
   float temperature_degC[n] = {};  // joint or motor temperature; NaN where there is no sensor
@@ -25,8 +25,8 @@ inline constexpr std::uint8_t kValid = 1;   // enabled, not saturated, not stale
 inline constexpr std::uint8_t kMoving = 2;  // |qd| above v_min and of one sign over the whole window
 inline constexpr std::uint8_t kUsed = 4;    // set by the estimator: this row updated the estimate
 
-// One estimator sample: all quantities belong to the same instant, `tick` (the centre of the averaging window).
-// Joint side, SI: rad or m, N m or N. tau is measured torque x the table's torque scale.
+// One estimator sample. All quantities belong to one instant: the middle of the averaging window whose first tick is
+// `tick`. Joint side, SI: rad or m, N m or N. tau is the measured torque x the table's torque scale.
 template <int n>
 struct Sample {
   std::uint32_t tick = 0;

@@ -1,28 +1,28 @@
-// physical - the maximum a posteriori arm: bodies that can exist, from a filter's result; knows columns, no filter.
+// physical - the physical read-out: from a filter's result to the most probable bodies that can exist.
 //
 //   min over t of  (w(t) - w^)' P^-1 (w(t) - w^) / 2  -  w(t)' C^-1 w(t) / 2  +  |(t - t0) / sd|^2 / 2
 //                  - eps / 2 sum logdet J(t) - eps / 2 sum log rotor,                      eps = 1, 0.1, 0.01
-// t = (m, c, I about the centre, rotor) of each link, and the dense effects; w the dense columns, w^ and P the filter's
-// mean and covariance, C its prior's. The second term takes the filter's own prior off again: what counts is the
-// table's, which is quadratic in t and not in w. J: the 4 x 4 pseudo-inertia (Wensing, Kim, Slotine 2018). Front
-// columns (friction) are independent of the bodies in the prior, so they are minimised over by leaving them out of P,
-// and follow at the end.
+// t: (m, c, I about the centre, rotor) of each link, and the dense effects. w: the dense columns. w^ and P: the
+// filter's mean and covariance. C: the covariance of its prior. J: the 4 x 4 pseudo-inertia (Wensing, Kim, Slotine
+// 2018). The second term removes the filter's own prior, which is quadratic in w. The third term puts the table's prior
+// in its place, which is quadratic in t. In the prior, front columns (friction) are independent of the bodies. So
+// leaving them out of P is the same as minimising over them; they follow at the end.
 //
-// Newton's method; a step that leaves the cone or gains too little is halved. A step is straight in m, m c, I about the
-// origin, in which the data are exactly quadratic and the barrier is convex, so stiff data make no curved valley; only
-// the prior bends, and its curvature is neglected.
+// The method is Newton's. A step that leaves the cone or gains too little is halved. A step is straight in m, m c and I
+// about the origin. In these the data are exactly quadratic and the barrier is convex, so sharp data do not make a
+// curved valley. Only the prior is curved there; this is neglected.
 #pragma once
 
 #include "armcal/core/status.hpp"
-#include "armcal/math/cholesky.hpp"
-#include "armcal/physical/map_arm.hpp"
+#include "armcal/math/symmetric.hpp"
+#include "armcal/physical/map_problem.hpp"
 
 namespace armcal::physical {
 
-// T: double, on the host and on cores with a double FPU; float is too coarse for P^-1 - C^-1. Some 60 KB for six
-// joints. Use: Begin, AddSpread for every column of the filter's factor, Step until it answers true. From the first
-// Step on the filter may go on; the table's numbers must stay. A slice, AddSpread included, costs at most kFree^2
-// multiplications and additions. Context of every call: background.
+// T: double, on a PC and on cores with a double FPU; float is too coarse for P^-1 - C^-1. Takes some 60 KB for six
+// joints. Use: Begin, AddSpread for every column of the filter's factor, then Step until it answers true. From the
+// first Step on the filter may go on, but the table must stay. A slice costs at most kFree^2 multiplications and
+// additions; AddSpread is a slice, too. Context of every call: background.
 template <class Layout, class T>
 class MapReadOut {
  public:
@@ -33,8 +33,9 @@ class MapReadOut {
 
   using Result = MapResult<Layout, T>;
 
-  // x [kColumns]: the filter's mean in prior units, its prior inside. warm: start at the last solution and the last
-  // eps; the prior is the same. kUnphysical: see MapArm::Start. kNotFinite: x. When refused, the object is as before.
+  // x [kColumns]: the filter's mean in prior units, prior included. warm: start at the last solution with the last eps;
+  // only if the prior is the same. kUnphysical: see MapArm::Start. kNotFinite: x is not. On refusal the object is as
+  // before.
   core::Status Begin(const MapPrior<Layout>& prior, const float* x, bool warm = false) {
     bool good = true;
     for (int k = 0; k < kColumns; ++k) good &= math::IsFinite(x[k]);
@@ -52,8 +53,9 @@ class MapReadOut {
     return core::Status::kOk;
   }
 
-  // The filter's covariance in prior units: P += d column column'. Its factor's columns, in whatever order the filter
-  // keeps them. kNotFinite: a number, or d < 0; the read-out cannot go on, result() is the last one. column [kColumns].
+  // Adds to the filter's covariance in prior units: P += d column column'. Call it for every column of the filter's
+  // factor, in any order. column [kColumns]. kNotFinite: a number is not finite, or d < 0. Then the read-out cannot go
+  // on, and result() is the last one.
   core::Status AddSpread(float d, const float* column) {
     bool good = math::IsFinite(d) && d >= 0.0f;
     for (int k = 0; k < kColumns; ++k) {
@@ -66,7 +68,7 @@ class MapReadOut {
     return core::Status::kOk;
   }
 
-  // One bounded slice. True: result() is there.
+  // One bounded slice. True: done, result() is there.
   bool Step() {
     const int k = next_++;
     switch (stage_) {
@@ -130,7 +132,8 @@ class MapReadOut {
   };
   // clang-format on
   static constexpr int kLast = 2;  // of kBarrier
-  // The prior's curvature is 1 in every direction and data only add to it: a smaller pivot is the filter's rounding.
+  // The prior's curvature is 1 in every direction, and data only add to it. So a smaller pivot is the filter's
+  // rounding.
   static constexpr T kLeastPivot = T(0.5);
 
   void Enter(Stage stage) {
@@ -138,10 +141,10 @@ class MapReadOut {
     next_ = 0;
   }
 
-  // y of the point in work: what DataInformation is about.
+  // y of the point in work (see DataInformation).
   T Shift(int i) const { return i < kBodies ? point_.body[i] - T(arm_.prior().body[i]) : point_.u[i]; }
 
-  // Column k of the Hessian, worked into its factor, and minus the gradient's entry.
+  // Makes column k of the Hessian, works it into the factor, and sets entry k of minus the gradient.
   void MakeColumn(int k, T eps) {
     T* column = factor_ + math::UdIndex(0, k);
     const int begin = k < kBodies ? k / Arm::kBlock * Arm::kBlock : k;
@@ -160,10 +163,10 @@ class MapReadOut {
     math::CholeskyColumn(factor_, k, kLeastPivot, column);
   }
 
-  // The step halved `halvings` times: taken, or halved once more, or given up; and what to do then.
+  // Tries the step, halved `halvings` times. It is taken, or halved once more, or given up. Then enters the next stage.
   void Try(int halvings) {
-    constexpr T kGain = T(1e-4);                        // share of the expected decrease that counts as a gain
-    constexpr T kEnough = T(0.1), kNothing = T(1e-10);  // decrease still to be had where a barrier goes, and the last
+    constexpr T kGain = T(1e-4);                        // a gain is at least this share of the expected decrease
+    constexpr T kEnough = T(0.1), kNothing = T(1e-10);  // expected decrease at which an eps ends; the same, last eps
     constexpr T kConverged = T(1e-4);
     constexpr int kMostHalvings = 30;
     T expected = T(0), cost = T(0), share = T(1);
@@ -194,7 +197,7 @@ class MapReadOut {
     Enter(last ? Stage::kCurvature : Stage::kColumn);
   }
 
-  // Standard deviation of what has gradient g over u. g is overwritten.
+  // The standard deviation of a quantity with gradient g over u. g is overwritten.
   T Deviation(T* g) const {
     math::SolveLower<kFree>(factor_, g);
     T square = T(0);

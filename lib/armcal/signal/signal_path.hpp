@@ -1,4 +1,4 @@
-// signal - raw counts and currents to joint motion and torque of one instant; knows axes, no model and no filter.
+// signal - from raw counts and currents to joint motion and torque of one instant.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace armcal::signal {
 
-// What an arm is built with. Shapes: [n] motor axes, matrices [n x n] row-major. Joint side, see model::AxisInfo.
+// How the arm is built. Shapes: [n] motor axes, matrices [n x n] row-major. Joint side, see model::AxisInfo.
 template <int n>
 struct Axes {
   float counts_to_rad[n];
@@ -27,13 +27,13 @@ struct Settings {
   std::uint32_t generation;
 };
 
-// One sample from every kSampleTicks ticks. Counts, currents and temperatures are averaged over the same windows of
-// kSampleTicks ticks, so motion and torque have the same delay. Of the last five windows the CENTRE one is given out:
-// q, qd, qdd by five-point fourth-order formulas over the window averages, tau and temperature of that window.
-// Convention: Sample::tick is the FIRST tick of the centre window; the instant that all its quantities belong to is
-// (kSampleTicks - 1) / 2 ticks later. Windows start where tick % kSampleTicks == 0.
-// Differences are taken in integers before any float. Limit: counts over five windows x kSampleTicks < 2^31.
-// Context: tick, every member; constant time but for the tick that completes a window.
+// Makes one sample from every kSampleTicks ticks. Counts, currents and temperatures are averaged over the same windows
+// of kSampleTicks ticks, so motion and torque have the same delay. A sample describes the CENTRE one of the last five
+// windows: q, qd and qdd come from five-point fourth-order formulas over the window averages, tau and temperature from
+// the centre window. Sample::tick is the FIRST tick of the centre window; all quantities belong to the instant
+// (kSampleTicks - 1) / 2 ticks later. A window starts where tick % kSampleTicks == 0. Differences are taken in integers
+// before any float. Limit: counts over five windows x kSampleTicks < 2^31.
+// Context of every call: tick. The time is constant, but a tick that completes a window takes longer than the others.
 template <int n, int kSampleTicks>
 class SignalPath {
  public:
@@ -43,13 +43,13 @@ class SignalPath {
       if (axes.motor_to_joint[i] != 0.0f || axes.motor_torque_to_joint[i] != 0.0f) axes_of_joint_[i / n] |= 1u << i % n;
   }
 
-  // The history restarts, so that no sample mixes two settings.
+  // The history restarts, so that no sample is made with two settings.
   void SetSettings(const Settings<n>& settings) {
     settings_ = settings;
     Restart();
   }
 
-  // True when `sample()` is new. A tick that does not follow its predecessor restarts the history.
+  // True: sample() is new. A tick that does not follow the tick before restarts the history.
   bool PushTick(const model::RawSample<n>& raw) {
     if (running_ && raw.tick != last_tick_ + 1u) {
       Restart();
@@ -154,7 +154,7 @@ class SignalPath {
     }
   }
 
-  // Bit per axis. A stale axis spoils all: every row of a model reads every joint's motion.
+  // A bit for each axis. A stale axis spoils all axes, because every row of a model reads the motion of every joint.
   std::uint32_t GoodAxes() const {
     std::uint32_t good = ~0u;
     bool any_stale = false;

@@ -1,7 +1,5 @@
 // application - the example firmware, as the README shows it.
-#include "armcal/controller/controller.hpp"
-#include "armcal/filter/forgetting_filter.hpp"
-#include "armcal/link/rtu.hpp"
+#include "armcal/armcal.hpp"
 #include "board.hpp"           // yours: storage, clock, serial line and axes
 #include "selected_model.hpp"  // generated: the model that this program links
 
@@ -9,7 +7,7 @@ using Model = armcal::generated::SelectedModel;
 using Filter = armcal::filter::ForgettingFilter<Model>;
 static armcal::controller::Controller<Model, Filter> controller(board::Storage(), board::Clock());
 static armcal::link::RtuService modbus(controller.engine(), board::Serial(), board::Clock(), 1, board::kSilence_ms);
-static armcal::controller::RawTrace<Model, 16384> trace;  // 32 KB: a client may come four seconds late
+static armcal::controller::RawTrace<Model, 16384> trace;  // 32 KB: a client that records may be 4 s late
 
 extern "C" void TickInterrupt() {  // bounded time, the same whatever is measured
   armcal::model::RawSample<Model::kJoints> raw;

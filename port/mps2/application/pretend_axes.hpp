@@ -34,7 +34,7 @@ class PretendAxes {
       state.qdd[i] = set.qdd[i] = -kAmplitude_rad * w_radps * w_radps * s;
     }
     float tau_Nm[n];
-    feedforward::ModelTorque(arm_, state, memory_, rows_, tau_Nm);
+    model::ModelTorque(arm_, state, memory_, rows_, tau_Nm);
     raw.tick = tick;
     for (int i = 0; i < n; ++i) {
       const model::AxisInfo& axis = Model::kAxes[i];
@@ -47,9 +47,9 @@ class PretendAxes {
   }
 
  private:
-  feedforward::Committed<Model> arm_;
-  feedforward::Rows<Model> rows_ = {};
-  feedforward::Memory<Model> memory_ = {};
+  model::Committed<Model> arm_;
+  model::Rows<Model> rows_ = {};
+  model::Memory<Model> memory_ = {};
 };
 
 }  // namespace armcal::application

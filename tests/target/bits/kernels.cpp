@@ -1,7 +1,7 @@
 // tests - triangular kernels and body coordinates on random numbers.
-#include "armcal/math/givens.hpp"
-#include "armcal/math/ud.hpp"
-#include "armcal/physical/physical.hpp"
+#include "armcal/math/columns.hpp"
+#include "armcal/math/symmetric.hpp"
+#include "armcal/physical/body.hpp"
 #include "port/runner/line.hpp"
 #include "tests/target/numbers.hpp"
 

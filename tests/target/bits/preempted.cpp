@@ -17,8 +17,8 @@ namespace {
 constexpr std::uint32_t kTicks = 8000;
 
 TraceTick trace[kTicks];
-estimator::ImageWork<Model> work;
-estimator::Image<Model> image;
+estimator::RigidPrior<Model, float> rigid;
+estimator::AdoptedTable<Model> adopted;
 std::uint32_t next;
 
 template <class Filter>
@@ -40,7 +40,7 @@ bool Run(const char* name, std::uint32_t period) {
   auto& estimator = arm<Filter>;
   const auto background = [] { return arm<Filter>.Step(); };
   estimator.SetPublishEvery(1000000);  // at the end only: the first publication is the adopted table's
-  estimator.Adopt(image, 0);
+  estimator.Adopt(adopted, 0);
   while (background()) {
   }
   next = 0;
@@ -62,7 +62,7 @@ bool Run(const char* name, std::uint32_t period) {
 
 int Program() {
   if (port::runner::Read(trace, sizeof trace) != sizeof trace) return 1;
-  if (!core::IsOk(estimator::BuildImage(estimator::DefaultTable<Model>(), 1, work, image))) return 1;
+  if (!core::IsOk(estimator::BuildAdoptedTable(estimator::DefaultTable<Model>(), 1, rigid, adopted))) return 1;
   const bool forgetting = Run<filter::ForgettingFilter<Model>>("forgetting", 8009);
   const bool kalman = Run<filter::KalmanFilter<Model, filter::Form::kBlock>>("kalman_block", 16001);
   return forgetting && kalman ? 0 : 2;

@@ -1,4 +1,4 @@
-// tests - an image that must not pass: a double slipped in.
+// tests - a firmware that must not pass: a double slipped in.
 #include "port/runner/runner.hpp"
 
 int Program() {

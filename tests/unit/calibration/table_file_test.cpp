@@ -1,7 +1,7 @@
 // calibration tests - the table file: text, words and names keep every value; foreign ones are refused.
 #include <gtest/gtest.h>
 
-#include "armcal/estimator/image.hpp"
+#include "armcal/estimator/adopted_table.hpp"
 #include "codegen/generated/er20_like/model.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"

@@ -130,7 +130,7 @@ TEST(Controller, ATableFlashed_IsInForceAndStaysSoAfterPowerUp) {
   EXPECT_EQ(bench->torque, Status::kOk);
   EXPECT_EQ((bench->Value<reg::kFeedForwardState>()), 1);
   EXPECT_EQ((bench->Value<reg::kGeneration>()), 2u);
-  EXPECT_EQ(bench->controller.in_force().committed.generation, 2u);
+  EXPECT_EQ(bench->controller.adopted().committed.generation, 2u);
 
   controller::Controller<Model, Forgetting> again(bench->flash.storage(), bench->clock);
   EXPECT_EQ(again.Boot(), Status::kOk);
@@ -148,7 +148,7 @@ TEST(Controller, OfTablesCheckedOneAfterTheOther_TheOneThatIsSavedComesIntoForce
   ASSERT_EQ(bench->Flash(table(1.0f)), Status::kOk);
   std::uint32_t crc = 0;
   ASSERT_EQ(bench->Check(table(2.0f), crc), Status::kOk);
-  EXPECT_EQ(bench->controller.in_force().sigma_Nm[0], 1.0f) << "checked is not adopted";
+  EXPECT_EQ(bench->controller.adopted().sigma_Nm[0], 1.0f) << "checked is not adopted";
   auto unphysical = table(3.0f);
   unphysical.parameter[0].mean = -1.0f;
   EXPECT_EQ(bench->Check(unphysical, crc), Status::kUnphysical);
@@ -157,14 +157,14 @@ TEST(Controller, OfTablesCheckedOneAfterTheOther_TheOneThatIsSavedComesIntoForce
   ASSERT_EQ(bench->Check(table(5.0f), crc), Status::kOk);
   ASSERT_EQ(bench->Command(reg::kSave, crc), Status::kOk);
   bench->Idle();
-  EXPECT_EQ(bench->controller.in_force().sigma_Nm[0], 5.0f);
+  EXPECT_EQ(bench->controller.adopted().sigma_Nm[0], 5.0f);
   EXPECT_EQ(bench->controller.generation(), 3u);  // the defaults, and two tables
   EXPECT_EQ(core::GetF32(&bench->Read(SpanOf(reg::kActiveTable, Bench<Forgetting>::kWords))[model::kHeaderWords]),
             5.0f);
 
   controller::Controller<Model, Forgetting> again(bench->flash.storage(), bench->clock);
   ASSERT_EQ(again.Boot(), Status::kOk);
-  EXPECT_EQ(again.in_force().sigma_Nm[0], 5.0f);
+  EXPECT_EQ(again.adopted().sigma_Nm[0], 5.0f);
 }
 
 TEST(Controller, WhileAxesAreEnabled_AdoptsABumplessTableOnly) {
@@ -202,7 +202,7 @@ TEST(Controller, OnHold_UsesNoRowUntilReleased) {
 TEST(Controller, AJointReset_IsAsUncertainAsBeforeIt) {
   const auto bench = std::make_unique<Bench<Forgetting>>();
   const auto deviations = [&] {
-    bench->controller.filter<0>().RequestReadOut();
+    bench->controller.estimator<0>().RequestReadOut();
     bench->Idle();
     std::vector<float> sd;
     const auto words = bench->Read(SpanOf(reg::kDeviationA, Model::kFrontBegin[3]));
@@ -240,7 +240,7 @@ TEST(Controller, ATraceThatAClientStarts_HoldsWhatTheTickWasGiven) {
   w.Set<reg::kTraceMode>(link::TraceMode::kStreaming);
   w.Set<reg::kTraceDecimation>(kTicks);
   w.Set<reg::kTraceStartTick>(start);
-  w.Set<reg::kTraceChannelMask>(estimator::kRawAll);
+  w.Set<reg::kTraceChannelMask>(controller::kRawAll);
   ASSERT_EQ(bench->Write(w), Status::kOk);
   bench->Run(10 + 3 * kTicks);
   const auto page = bench->Read<reg::kTracePageBlock>();
@@ -273,6 +273,60 @@ TEST(Controller, NoiseFarBeyondTheTables_IsServedAsTheFiltersHealth) {
   bench->disturbance_LSB = 3000;
   bench->Run(9000);
   EXPECT_EQ((bench->Value<reg::kHealth>()), 3);
+}
+
+TEST(Controller, FiltersBesideEachOther_GiveBitForBitWhatEachGivesAlone) {
+  const auto both = std::make_unique<Bench<Forgetting, Block>>();
+  const auto first = std::make_unique<Bench<Forgetting>>();
+  const auto second = std::make_unique<Bench<Block>>();
+  const auto work = [](auto& bench) {
+    bench.Run(4000);
+    bench.controller.template estimator<0>().RequestReadOut();
+    bench.Idle();
+  };
+  work(*first);
+  work(*second);
+  both->Run(4000);
+  both->controller.estimator<0>().RequestReadOut();
+  both->controller.estimator<1>().RequestReadOut();
+  both->Idle();
+  const auto floats = [](auto& bench, const auto& estimates) { return bench.Read(SpanOf(estimates, Model::kColumns)); };
+  EXPECT_EQ(floats(*both, reg::kEstimateA), floats(*first, reg::kEstimateA));
+  EXPECT_EQ(floats(*both, reg::kDeviationA), floats(*first, reg::kDeviationA));
+  EXPECT_EQ(floats(*both, reg::kEstimateB), floats(*second, reg::kEstimateA));
+  EXPECT_EQ(floats(*both, reg::kDeviationB), floats(*second, reg::kDeviationA));
+}
+
+// The example arm, which counts how often its regressor is asked for.
+struct CountedModel : Model {
+  static inline int calls = 0;
+  template <class T>
+  static void Regressor(const model::ModelInput<T, n>& x, const T* committed, const T* eta, const T* state, T* next,
+                        T* front, T* dense) {
+    ++calls;
+    Model::Regressor(x, committed, eta, state, next, front, dense);
+  }
+};
+
+TEST(Controller, WithTwoFilters_EvaluatesTheModelOnceASample) {
+  using Two = controller::Controller<CountedModel, filter::ForgettingFilter<CountedModel>,
+                                     filter::KalmanFilter<CountedModel, filter::Form::kBlock>>;
+  test::NorFlash flash{{2, 16384, 8, 0xFF}};
+  std::uint32_t now = 0;
+  const auto count = [](void* t) { return *static_cast<std::uint32_t*>(t); };
+  const auto two = std::make_unique<Two>(flash.storage(), hardware::Clock{&now, count, count});
+  EXPECT_EQ(two->Boot(), Status::kBlank);
+  Axes axes;
+  CountedModel::calls = 0;
+  for (; now < 800; ++now) {
+    model::RawSample<n> raw;
+    controller::SetPoint<n> set;
+    (void)axes.Read(now, raw, set);
+    ASSERT_EQ(two->Push(raw), Status::kOk);
+    while (two->Step()) {
+    }
+  }
+  EXPECT_EQ(CountedModel::calls, 800 / 8 - 4);  // a sample is the middle one of five averages
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// estimator - float32 estimates against dense double oracles over 40 s at 125 Hz; knows no filter's inside.
+// estimator - float32 estimates against dense double oracles over 40 s at 125 Hz.
 #include <gtest/gtest.h>
 
 #include "armcal/filter/forgetting_filter.hpp"
@@ -52,7 +52,7 @@ TEST(Accuracy, Forgetting_IsTheGatedQrRecursionWithinATenthOfSigma) {
   host->table.forgetting[0] = 0.9995f;
   host->table.forgetting[1] = 0.998f;
   ASSERT_EQ(host->Adopt(), core::Status::kOk);
-  std::vector<double> lambda(host->image.prior.lambda, host->image.prior.lambda + kColumns);
+  std::vector<double> lambda(host->adopted.prior.lambda, host->adopted.prior.lambda + kColumns);
   const std::vector<Sample> samples = Record(kFortySeconds);
   for (const Sample& s : samples) ASSERT_EQ(host->Feed(s), core::Status::kOk);
   const Oracle<TwoLink> oracle(host->table, host->b0(), samples, lambda);

@@ -1,4 +1,4 @@
-// estimator - what a table brings into force, and when; knows no filter's inside.
+// estimator - what a table brings into force, and when.
 #include <gtest/gtest.h>
 
 #include "armcal/filter/forgetting_filter.hpp"

@@ -1,4 +1,4 @@
-// estimator - rest, partial motion and a picked-up load, on a small and on a six-axis arm; knows no filter's inside.
+// estimator - rest, partial motion and a picked-up load, on a small and on a six-axis arm.
 #include <gtest/gtest.h>
 
 #include "armcal/filter/forgetting_filter.hpp"
@@ -73,17 +73,17 @@ struct PlainForgetting {
   Matrix information = Matrix::Zero(Model::kColumns, Model::kColumns);
   Vector right = Vector::Zero(Model::kColumns);
   Matrix prior;
-  const Image<Model>& image;
-  explicit PlainForgetting(const Table<Model>& table, const Image<Model>& i) : image(i) {
+  const AdoptedTable<Model>& adopted;
+  explicit PlainForgetting(const Table<Model>& table, const AdoptedTable<Model>& i) : adopted(i) {
     prior = PriorCovariance<Model>(table);
   }
   void Add(const model::Sample<Model::kJoints>& s, const Vector& b0, double lambda) {
     const Matrix y = Regressor<Model>(s);
     for (int i = 0; i < Model::kJoints; ++i) {
       if ((s.flags[i] & model::kMoving) == 0) continue;
-      const Vector h = y.row(i).transpose() / image.sigma_Nm[i];
+      const Vector h = y.row(i).transpose() / adopted.sigma_Nm[i];
       information += h * h.transpose();
-      right += h * ((s.tau[i] - y.row(i) * b0) / image.sigma_Nm[i]);
+      right += h * ((s.tau[i] - y.row(i) * b0) / adopted.sigma_Nm[i]);
     }
     information *= lambda;
     right *= lambda;
@@ -97,11 +97,11 @@ struct PlainForgetting {
 
 // Noise-free torque error over two seconds of motion, in the table's noise, all joints together.
 template <class Model>
-double TorqueError(MovingArm<Model> arm, const Image<Model>& image, const Vector& value) {
+double TorqueError(MovingArm<Model> arm, const AdoptedTable<Model>& adopted, const Vector& value) {
   double sum = 0;
   for (int k = 0; k < 2 * kPerSecond; ++k) {
     const Matrix y = Regressor<Model>(arm.Next());
-    for (int i = 0; i < Model::kJoints; ++i) sum += std::pow(y.row(i).dot(value - arm.truth) / image.sigma_Nm[i], 2);
+    for (int i = 0; i < Model::kJoints; ++i) sum += std::pow(y.row(i).dot(value - arm.truth) / adopted.sigma_Nm[i], 2);
   }
   return std::sqrt(sum / (2 * kPerSecond * Model::kJoints));
 }
@@ -125,7 +125,7 @@ struct Racing {
     for (float& lambda : host->table.forgetting) lambda = kLambda;
     EXPECT_EQ(host->Adopt(), Status::kOk);
     b0 = host->b0();
-    plain = std::make_unique<PlainForgetting<Model>>(host->table, host->image);
+    plain = std::make_unique<PlainForgetting<Model>>(host->table, host->adopted);
   }
   void Move(int seconds, std::uint32_t moving) {
     for (int k = 0; k < seconds * kPerSecond; ++k) {
@@ -136,9 +136,9 @@ struct Racing {
   }
   double OurError() {
     const Eigen::VectorXf value = Eigen::Map<const Eigen::VectorXf>(host->Read().value, Model::kColumns);
-    return TorqueError<Model>(arm, host->image, value.template cast<double>());
+    return TorqueError<Model>(arm, host->adopted, value.template cast<double>());
   }
-  double PlainError() { return TorqueError<Model>(arm, host->image, plain->Solve(b0)); }
+  double PlainError() { return TorqueError<Model>(arm, host->adopted, plain->Solve(b0)); }
   // Both errors, summed over half a minute of which all joints move.
   std::pair<double, double> Relearn() {
     double ours = 0, others = 0;

@@ -1,4 +1,4 @@
-// estimator - clocks that pass 2^24, 2^31 and 2^32; knows no filter's inside.
+// estimator - clocks that pass 2^24, 2^31 and 2^32.
 #include <gtest/gtest.h>
 
 #include "armcal/filter/forgetting_filter.hpp"
@@ -35,8 +35,8 @@ struct Clock : testing::Test {
     auto host = std::make_unique<Host<Drifting, Filter>>();
     host->table.parameter[kOffset].state = model::ParameterState::kEstimated;
     host->estimator.SetResiduals(statistics);
-    EXPECT_EQ(BuildImage<Drifting>(host->table, 1, host->work, host->image), Status::kOk);
-    host->estimator.Adopt(host->image, start);
+    EXPECT_EQ(BuildAdoptedTable<Drifting>(host->table, 1, host->rigid, host->adopted), Status::kOk);
+    host->estimator.Adopt(host->adopted, start);
     Motion run;
     for (int k = 0; k < kAround; ++k) {
       Sample s = run.Next();

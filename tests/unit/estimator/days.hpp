@@ -42,8 +42,8 @@ template <class Filter>
 std::unique_ptr<Host<TwoLink, Filter>> Adopted(std::uint32_t tick) {
   auto host = std::make_unique<Host<TwoLink, Filter>>();
   for (float& lambda : host->table.forgetting) lambda = 0.999f;
-  EXPECT_EQ(BuildImage<TwoLink>(host->table, 1, host->work, host->image), core::Status::kOk);
-  host->estimator.Adopt(host->image, tick);
+  EXPECT_EQ(BuildAdoptedTable<TwoLink>(host->table, 1, host->rigid, host->adopted), core::Status::kOk);
+  host->estimator.Adopt(host->adopted, tick);
   host->estimator.SetPublishEvery(1u << 30);
   return host;
 }

@@ -1,4 +1,4 @@
-// estimator - what enters, what is refused, what is told; knows no filter's inside.
+// estimator - what enters an estimator, what it refuses, and what it publishes.
 #include "armcal/estimator/estimator.hpp"
 
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <cstring>
 #include <limits>
 
-#include "armcal/filter/extended_kalman_filter.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
+#include "armcal/filter/kalman_filter.hpp"
 #include "armcal/filter/model_bank.hpp"
 #include "tests/unit/estimator/motion.hpp"
 
@@ -40,8 +40,8 @@ TYPED_TEST(Both, AfterAdoption_ReadsThePrior) {
   const auto& e = this->host->Read();
   EXPECT_EQ(e.generation, 4u);
   for (int k = 0; k < kColumns; ++k) {
-    EXPECT_EQ(e.value[k], this->host->image.committed.p[k]);
-    EXPECT_NEAR(e.sd[k], this->host->image.scale[k], 2e-5f * this->host->image.scale[k]);
+    EXPECT_EQ(e.value[k], this->host->adopted.committed.p[k]);
+    EXPECT_NEAR(e.sd[k], this->host->adopted.scale[k], 2e-5f * this->host->adopted.scale[k]);
   }
 }
 
@@ -228,20 +228,20 @@ TYPED_TEST(Both, PublishesByItselfEverySoManySamples) {
 // What a form cannot hold is said before it is adopted.
 TEST(Forms, BlockAndBankRefuseNoiseOnSharedColumns_TheOthersDoNot) {
   Table<TwoLink> table = DefaultTable<TwoLink>();
-  auto work = std::make_unique<ImageWork<TwoLink>>();
-  auto image = std::make_unique<Image<TwoLink>>();
+  auto rigid = std::make_unique<RigidPrior<TwoLink, float>>();
+  auto adopted = std::make_unique<AdoptedTable<TwoLink>>();
   using Block = Estimator<TwoLink, KalmanFilter<TwoLink, filter::Form::kBlock>>;
   using Bank = Estimator<TwoLink, filter::ModelBank<TwoLink>>;
-  ASSERT_EQ(BuildImage<TwoLink>(table, 1, *work, *image), Status::kOk);
-  EXPECT_TRUE(Block::Suits(*image));
-  EXPECT_TRUE(Bank::Suits(*image));
+  ASSERT_EQ(BuildAdoptedTable<TwoLink>(table, 1, *rigid, *adopted), Status::kOk);
+  EXPECT_TRUE(Block::Suits(*adopted));
+  EXPECT_TRUE(Bank::Suits(*adopted));
   table.parameter[29].state = model::ParameterState::kEstimated;  // coupling friction, on both joints
   table.parameter[29].process_noise = 1e-6f;
-  ASSERT_EQ(BuildImage<TwoLink>(table, 1, *work, *image), Status::kOk);
-  EXPECT_FALSE(Block::Suits(*image));
-  EXPECT_FALSE(Bank::Suits(*image));
-  EXPECT_TRUE((Estimator<TwoLink, KalmanFilter<TwoLink>>::Suits(*image)));
-  EXPECT_TRUE((Estimator<TwoLink, ForgettingFilter<TwoLink>>::Suits(*image)));
+  ASSERT_EQ(BuildAdoptedTable<TwoLink>(table, 1, *rigid, *adopted), Status::kOk);
+  EXPECT_FALSE(Block::Suits(*adopted));
+  EXPECT_FALSE(Bank::Suits(*adopted));
+  EXPECT_TRUE((Estimator<TwoLink, KalmanFilter<TwoLink>>::Suits(*adopted)));
+  EXPECT_TRUE((Estimator<TwoLink, ForgettingFilter<TwoLink>>::Suits(*adopted)));
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <with_presliding_dahl/model.hpp>
 #include <with_stribeck/model.hpp>
 
-#include "armcal/filter/extended_kalman_filter.hpp"
+#include "armcal/filter/kalman_filter.hpp"
 #include "tests/unit/estimator/motion.hpp"
 
 namespace armcal::estimator {

@@ -27,7 +27,7 @@ class Memory : public testing::Test {
   }
   // The counter's part of joint 2's torque: measured at the same sample with the plain model.
   void See(const Sample& s, const float* tau) {
-    const auto& p = host_->image.committed.p;
+    const auto& p = host_->adopted.committed.p;
     const double plain =
         Regressor<TwoLink>(s).row(1) * host_->b0() - p[3] * static_cast<float>((s.qd[1] > 0) - (s.qd[1] < 0));
     seen_.push_back({static_cast<float>((tau[1] - plain) / p[3]), (s.flags[1] & model::kUsed) != 0});

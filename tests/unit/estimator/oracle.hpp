@@ -154,18 +154,18 @@ std::vector<unsigned char> Bits(const T& result) {
   return bytes;
 }
 
-// An estimator with its image, fed sample by sample until idle, as a host does.
+// An estimator with its adopted, fed sample by sample until idle, as a host does.
 template <class Model, class Filter>
 struct Host {
   Table<Model> table = DefaultTable<Model>();
-  ImageWork<Model> work;
-  Image<Model> image;
+  RigidPrior<Model, float> rigid;
+  AdoptedTable<Model> adopted;
   Estimator<Model, Filter> estimator;
   Estimates<Model> estimates;
 
   core::Status Adopt(std::uint32_t generation = 1) {
-    const core::Status status = BuildImage<Model>(table, generation, work, image);
-    if (core::IsOk(status)) estimator.Adopt(image, 0);
+    const core::Status status = BuildAdoptedTable<Model>(table, generation, rigid, adopted);
+    if (core::IsOk(status)) estimator.Adopt(adopted, 0);
     return status;
   }
   void Drain() {
@@ -185,7 +185,7 @@ struct Host {
     return estimates;
   }
   Vector b0() const {
-    return Eigen::Map<const Eigen::VectorXf>(image.committed.p, Model::kColumns).template cast<double>();
+    return Eigen::Map<const Eigen::VectorXf>(adopted.committed.p, Model::kColumns).template cast<double>();
   }
 };
 

@@ -1,4 +1,4 @@
-// estimator - the residual statistics that it fills, against the model in double; knows no register.
+// estimator - the residual statistics that it fills, against the model in double.
 #include "armcal/monitor/residual_statistics.hpp"
 
 #include <gtest/gtest.h>

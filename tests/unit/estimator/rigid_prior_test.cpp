@@ -1,4 +1,4 @@
-// estimator - base coordinates against the standard-parameter Kalman filter, in double; knows no robot.
+// estimator - base coordinates against the standard-parameter Kalman filter, in double.
 #include "armcal/estimator/rigid_prior.hpp"
 
 #include <gtest/gtest.h>

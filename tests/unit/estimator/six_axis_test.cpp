@@ -1,4 +1,4 @@
-// estimator - both filters on a generated six-axis model, float32 against the dense double oracle; knows no effect.
+// estimator - both filters on a generated six-axis model, float32 against the dense double oracle.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -94,7 +94,7 @@ TEST(SixAxis, PhysicalReadOut_OfBothFilters_IsTheSameArmAndNearerToTheTruthThanT
   auto one = std::make_unique<ReadOut>(), two = std::make_unique<ReadOut>();
   const auto begin = [](auto& host, ReadOut& out) {
     host.Read();
-    return BeginPhysical(host.image, host.work.rigid, host.estimator, false, out);
+    return BeginPhysical(host.adopted, host.rigid, host.estimator, false, out);
   };
   ASSERT_EQ(begin(*kalman, *one), core::Status::kOk);
   ASSERT_EQ(begin(*forgetting, *two), core::Status::kOk);
@@ -104,7 +104,7 @@ TEST(SixAxis, PhysicalReadOut_OfBothFilters_IsTheSameArmAndNearerToTheTruthThanT
   ASSERT_TRUE(a.converged && b.converged);
   for (int k = 0; k < Model::kBodyParameters; ++k) {
     EXPECT_NEAR(a.body_sd[k], b.body_sd[k], 0.02 * a.body_sd[k]) << k;
-    EXPECT_LE(a.body_sd[k], 1.001 * kalman->work.rigid.sd[k]) << k;
+    EXPECT_LE(a.body_sd[k], 1.001 * kalman->rigid.sd[k]) << k;
   }
   double before = 0, after = 0;
   for (int k = 0; k < Model::kColumns; ++k) {

@@ -76,7 +76,7 @@ struct Drift {
       EXPECT_EQ(host->Feed(samples[k]), core::Status::kOk);
       for (int i = 0; i < kJoints && k >= kSettled; ++i) {
         const double found =
-            host->image.committed.p[Fv(i)] + host->image.scale[Fv(i)] * host->estimator.filter().x(Fv(i));
+            host->adopted.committed.p[Fv(i)] + host->adopted.scale[Fv(i)] * host->estimator.filter().x(Fv(i));
         square += std::pow(found / viscous[k](i) - 1, 2) / (kJoints * (kRun - kSettled));
       }
     }

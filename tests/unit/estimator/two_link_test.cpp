@@ -1,4 +1,4 @@
-// estimator - the tests' own model against Lagrange's equation by finite differences; knows no filter.
+// estimator - the tests' own model against Lagrange's equation by finite differences.
 #include <gtest/gtest.h>
 
 #include <cmath>

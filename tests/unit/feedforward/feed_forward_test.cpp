@@ -1,4 +1,4 @@
-// feedforward - set-point torque against the same sum in double; knows no table.
+// feedforward - set-point torque against the same sum in double.
 #include "armcal/feedforward/feed_forward.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace armcal::feedforward {
 namespace {
 
 using test::TwoLink;
-using Set = Committed<TwoLink>;
+using Set = model::Committed<TwoLink>;
 using core::Status;
 
 Set Example(std::uint32_t generation) {
@@ -159,11 +159,11 @@ TEST_F(FeedForwardTest, NextTable_BringsItsLimitsInTheSameTick) {
 TEST_F(FeedForwardTest, ModelTorque_IsTheSameSumUnclamped) {
   Set c = Example(1);
   c.limit_Nm[0] = 1.0f;
-  Rows<TwoLink> rows;
-  Memory<TwoLink> memory;
+  model::Rows<TwoLink> rows;
+  model::Memory<TwoLink> memory;
   float model_tau[2];
   const model::ModelInput<float, 2> x{{q[0], q[1]}, {qd[0], qd[1]}, {qdd[0], qdd[1]}, {30, 30}, 0, 0};
-  ModelTorque(c, x, memory, rows, model_tau);
+  model::ModelTorque(c, x, memory, rows, model_tau);
   for (int i = 0; i < 2; ++i) EXPECT_NEAR(model_tau[i], Exact(c, i), 1e-5 * 50);
 }
 

@@ -1,4 +1,4 @@
-// feedforward - models with memory, and with a pair effect that may be no number; knows no table.
+// feedforward - models with memory, and with a pair effect that may be no number.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -25,8 +25,8 @@ struct WithoutSensor : TwoLink {
 };
 
 template <class Model>
-Committed<Model> Table(int column, float value) {
-  Committed<Model> c;
+model::Committed<Model> Table(int column, float value) {
+  model::Committed<Model> c;
   c.valid = true;
   c.p[column] = value;
   c.eta[0] = 0.1f;

@@ -1,4 +1,4 @@
-// filter - the instructions of an update, counted by single-stepping a child process; knows no clock.
+// filter - the instructions of an update, counted by single-stepping a child process.
 #include <gtest/gtest.h>
 #include <sys/ptrace.h>
 #include <sys/wait.h>

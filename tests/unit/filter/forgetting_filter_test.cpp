@@ -1,4 +1,4 @@
-// filter - the forgetting form against re-triangularised double QR; knows no model.
+// filter - the forgetting form against re-triangularised double QR.
 #include "armcal/filter/forgetting_filter.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// filter - the Kalman form against dense double algebra; knows no model.
+// filter - the Kalman form against dense double algebra.
 #include "armcal/filter/kalman_filter.hpp"
 
 #include <gtest/gtest.h>

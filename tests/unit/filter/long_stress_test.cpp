@@ -1,4 +1,4 @@
-// filter - a million samples of collinear rows, float32 against the same recursions in double; knows no model.
+// filter - a million samples of collinear rows, float32 against the same recursions in double.
 #include "tests/unit/filter/stress.hpp"
 
 namespace armcal::filter {

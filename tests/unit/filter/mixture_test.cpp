@@ -1,4 +1,4 @@
-// filter - the bank's prediction and mixture against dense algebra in double; knows no model.
+// filter - the bank's prediction and mixture against dense algebra in double.
 #include <gtest/gtest.h>
 
 #include "armcal/filter/model_bank.hpp"

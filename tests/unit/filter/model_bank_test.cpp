@@ -1,4 +1,4 @@
-// filter - the bank: what it may not change, whom it believes; how well it follows is tested with a model.
+// filter - the bank: what it may not change, and which member it believes.
 #include "armcal/filter/model_bank.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// filter - what stands still, and motion that teaches nothing; knows no model.
+// filter - motion that teaches nothing, and columns that must not move at rest.
 #include <gtest/gtest.h>
 
 #include <limits>

@@ -1,4 +1,4 @@
-// filter - 10 000 samples of collinear rows, float32 against the same recursions in double; knows no model.
+// filter - 10 000 samples of collinear rows, float32 against the same recursions in double.
 #include "tests/unit/filter/stress.hpp"
 
 namespace armcal::filter {

@@ -1,4 +1,4 @@
-// math - the elementary functions against long double; knows no kernel.
+// math - the elementary functions against long double.
 #include "armcal/math/elementary.hpp"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
-// math - every float kernel of lib in one object, to see what it links; computes nothing.
+// math - every float kernel of lib in one object, to see what it links.
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/feedforward/feed_forward.hpp"
-#include "armcal/filter/extended_kalman_filter.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
+#include "armcal/filter/kalman_filter.hpp"
 #include "armcal/filter/model_bank.hpp"
 #include "tests/unit/estimator/two_link_model.hpp"
 
@@ -20,8 +20,9 @@ template class estimator::Estimator<Model, filter::KalmanFilter<Model>>;
 template class estimator::Estimator<Model, filter::ForgettingFilter<Model>>;
 template class estimator::Estimator<Model, filter::ExtendedKalmanFilter<Model>>;
 template class estimator::Estimator<Model, filter::ModelBank<Model>>;
-template core::Status estimator::BuildImage<Model>(const estimator::Table<Model>&, std::uint32_t,
-                                                   estimator::ImageWork<Model>&, estimator::Image<Model>&);
+template core::Status estimator::BuildAdoptedTable<Model>(const estimator::Table<Model>&, std::uint32_t,
+                                                          estimator::RigidPrior<Model, float>&,
+                                                          estimator::AdoptedTable<Model>&);
 template void estimator::ReadBodies<Model, float>(const estimator::RigidPrior<Model, float>&, const float*, float*);
 
 void Elementary(const float* x, float* y) {

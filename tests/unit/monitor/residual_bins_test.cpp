@@ -1,5 +1,5 @@
-// monitor - residual statistics of random rows against sums in double; knows no model.
-#include "armcal/monitor/residual_bins.hpp"
+// monitor - residual statistics of random rows against sums in double.
+#include "armcal/monitor/residual_statistics.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// monitor - slices of time against plain sums, and the arm's clock; knows no model.
-#include "armcal/monitor/residual_history.hpp"
+// monitor - slices of time against plain sums, and the arm's clock.
+#include "armcal/monitor/residual_statistics.hpp"
 
 #include <gtest/gtest.h>
 

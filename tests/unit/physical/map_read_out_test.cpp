@@ -1,4 +1,4 @@
-// physical - the read-out against dense algebra, the linear read-out and its stated objective; knows no filter.
+// physical - the read-out against dense algebra, the linear read-out and its stated objective.
 #include "armcal/physical/map_read_out.hpp"
 
 #include <gtest/gtest.h>
@@ -19,14 +19,14 @@ TEST(MapReadOut, WithoutData_IsThePriorCountedOnce) {
   const auto c = Draw<Six>(1, 0, 0);
   auto read_out = std::make_unique<ReadOut<Six>>();
   const auto& got = Solve(*read_out, *c);
-  std::vector<double> mean(c->work->rigid.mean, c->work->rigid.mean + 66);
+  std::vector<double> mean(c->rigid->mean, c->rigid->mean + 66);
   EXPECT_LT(Distance(*c, got.body, mean.data()), 0.02);  // the barrier's pull: eps / 2 of order 1
   EXPECT_NEAR(got.learned, 0, 0.01);
   EXPECT_NEAR(got.moved, 0, 0.01);
   // Counted twice, the deviations would be smaller by sqrt(2).
-  for (int k = 0; k < 66; ++k) EXPECT_NEAR(got.body_sd[k], c->work->rigid.sd[k], 1e-3 * c->work->rigid.sd[k]) << k;
+  for (int k = 0; k < 66; ++k) EXPECT_NEAR(got.body_sd[k], c->rigid->sd[k], 1e-3 * c->rigid->sd[k]) << k;
   for (int k = 0; k < Six::kColumns; ++k)
-    EXPECT_NEAR(got.column_sd[k], c->image->scale[k], 1e-2 * c->image->scale[k]) << k;
+    EXPECT_NEAR(got.column_sd[k], c->adopted->scale[k], 1e-2 * c->adopted->scale[k]) << k;
 }
 
 TEST(MapReadOut, NearAPriorThatIsNarrow_IsTheLinearReadOut) {
@@ -37,27 +37,27 @@ TEST(MapReadOut, NearAPriorThatIsNarrow_IsTheLinearReadOut) {
   std::normal_distribution<double> normal;
   Matrix h = Matrix::Zero(100, Six::kColumns);
   for (int k = 0; k < Six::kColumns; ++k)
-    for (int r = 0; r < h.rows(); ++r) h(r, k) = c.image->prior.active[k] ? normal(random) : 0;
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c.adopted->prior.active[k] ? normal(random) : 0;
   c.Take(h, Vector::NullaryExpr(h.rows(), [&] { return 10 * normal(random); }));
   auto read_out = std::make_unique<ReadOut<Six>>();
   const auto& got = Solve(*read_out, c);
 
   auto linear = std::make_unique<estimator::RigidPrior<Six, double>>();
-  std::copy(c.work->rigid.mean, c.work->rigid.mean + 66, linear->mean);
-  std::copy(c.work->rigid.sd, c.work->rigid.sd + 66, linear->sd);
+  std::copy(c.rigid->mean, c.rigid->mean + 66, linear->mean);
+  std::copy(c.rigid->sd, c.rigid->sd + 66, linear->sd);
   estimator::SpreadPrior(*linear);
   estimator::FactorPrior(*linear);
   std::vector<double> base(Six::kRigid), expected(66);
   estimator::MapBodies<Six>(linear->mean, base.data());
   for (int r = 0; r < Six::kRigid; ++r)
-    base[r] += static_cast<double>(c.image->scale[Six::kFront + r]) * c.x[Six::kFront + r];
+    base[r] += static_cast<double>(c.adopted->scale[Six::kFront + r]) * c.x[Six::kFront + r];
   estimator::ReadBodies(*linear, base.data(), expected.data());
   EXPECT_LT(Distance(c, got.body, expected.data()), 0.01);
   // Columns, friction too, are then the filter's own.
   const Matrix p = Covariance(c.ud.data(), Six::kColumns);
   for (int k = 0; k < Six::kColumns; ++k) {
-    const double scale = c.image->scale[k], sd = scale * std::sqrt(p(k, k));
-    EXPECT_NEAR(got.column[k], c.image->committed.p[k] + scale * c.x[k], 0.01 * scale) << k;
+    const double scale = c.adopted->scale[k], sd = scale * std::sqrt(p(k, k));
+    EXPECT_NEAR(got.column[k], c.adopted->committed.p[k] + scale * c.x[k], 0.01 * scale) << k;
     EXPECT_NEAR(got.column_sd[k], sd, 1e-2 * sd) << k;
   }
 }
@@ -149,17 +149,17 @@ double Objective(const Case<Two>& c, const Vector& t) {
         b[3], b[0];
     cost -= 0.005 * (std::log(j.determinant()) + std::log(t(at + 10)));
     double mean[11], central[11];
-    std::copy(c.work->rigid.mean + at, c.work->rigid.mean + at + 11, mean);
+    std::copy(c.rigid->mean + at, c.rigid->mean + at + 11, mean);
     ToCentral(mean, central);
     central[10] = mean[10];
-    for (int k = 0; k < 11; ++k) cost += 0.5 * std::pow((t(at + k) - central[k]) / c.work->rigid.sd[at + k], 2);
+    for (int k = 0; k < 11; ++k) cost += 0.5 * std::pow((t(at + k) - central[k]) / c.rigid->sd[at + k], 2);
   }
-  const Vector shift = body - Eigen::Map<const Eigen::VectorXf>(c.work->rigid.mean, 22).cast<double>();
+  const Vector shift = body - Eigen::Map<const Eigen::VectorXf>(c.rigid->mean, 22).cast<double>();
   estimator::MapBodies<Two>(shift.data(), rigid.data());
-  for (int r = 0; r < 7; ++r) w(r) = rigid(r) / c.image->scale[Two::kFront + r];
+  for (int r = 0; r < 7; ++r) w(r) = rigid(r) / c.adopted->scale[Two::kFront + r];
   w(7) = t(22);
   const Matrix p = Covariance(c.ud.data(), Two::kColumns).bottomRightCorner(kDense, kDense);
-  const Matrix p0 = Covariance(c.image->prior.dense_ud, 7);
+  const Matrix p0 = Covariance(c.adopted->prior.dense_ud, 7);
   const Vector d = w - Eigen::Map<const Eigen::VectorXf>(c.x.data() + Two::kFront, kDense).cast<double>();
   return cost + 0.5 * d.dot(p.ldlt().solve(d)) - 0.5 * w.head(7).dot(p0.ldlt().solve(w.head(7)));
 }
@@ -172,7 +172,7 @@ TEST(MapReadOut, WithAnEffectOfTheWholeArm_StandsWhereTheStatedObjectiveIsLeast)
   std::normal_distribution<double> normal;
   Matrix h = Matrix::Zero(60, Two::kColumns);
   for (int k = 0; k < Two::kColumns; ++k)
-    for (int r = 0; r < h.rows(); ++r) h(r, k) = c->image->prior.active[k] ? 0.5 * normal(random) : 0;
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c->adopted->prior.active[k] ? 0.5 * normal(random) : 0;
   c->Take(h, Vector::NullaryExpr(h.rows(), [&] { return 2 * normal(random); }));
   ReadOut<Two> read_out;
   const auto& got = Solve(read_out, *c);
@@ -182,10 +182,10 @@ TEST(MapReadOut, WithAnEffectOfTheWholeArm_StandsWhereTheStatedObjectiveIsLeast)
   for (int at = 0; at < 22; at += 11) {
     ToCentral(got.body + at, t.data() + at);
     t(at + 10) = got.body[at + 10];
-    for (int k = 0; k < 11; ++k) size(at + k) = c->work->rigid.sd[at + k];
+    for (int k = 0; k < 11; ++k) size(at + k) = c->rigid->sd[at + k];
   }
   const int effect = Two::kFront + 7;
-  t(22) = (got.column[effect] - c->image->committed.p[effect]) / c->image->scale[effect];
+  t(22) = (got.column[effect] - c->adopted->committed.p[effect]) / c->adopted->scale[effect];
   size(22) = 1;
   for (int k = 0; k < 23; ++k) {
     const Vector step = 1e-3 * size(k) * Vector::Unit(23, k);
@@ -204,7 +204,7 @@ TEST(MapReadOut, HeldParameters_KeepTheTablesValues) {
   for (const int k : {0, 12, 26, 40, 54, 65}) {
     double mean[11], body[11];
     const int at = k / 11 * 11;
-    std::copy(c.work->rigid.mean + at, c.work->rigid.mean + at + 11, mean);
+    std::copy(c.rigid->mean + at, c.rigid->mean + at + 11, mean);
     double expected[11], found[11];
     ToCentral(mean, expected), expected[10] = mean[10];
     std::copy(got.body + at, got.body + at + 11, body);
@@ -224,11 +224,11 @@ TEST(MapReadOut, RefusedInput_LeavesTheLastResult) {
   c->ud[math::UdIndex(30, 30)] = -1e-9f;
   EXPECT_EQ(c->HandOver(*read_out), core::Status::kNotFinite);
   c->ud[math::UdIndex(30, 30)] = 0.5f;
-  const float rotor = c->work->rigid.mean[10];
-  c->work->rigid.mean[10] = 0;  // and uncertain
+  const float rotor = c->rigid->mean[10];
+  c->rigid->mean[10] = 0;  // and uncertain
   EXPECT_EQ(c->HandOver(*read_out), core::Status::kUnphysical);
-  c->work->rigid.mean[10] = rotor;
-  c->work->rigid.mean[0] = -1;
+  c->rigid->mean[10] = rotor;
+  c->rigid->mean[0] = -1;
   EXPECT_EQ(c->HandOver(*read_out), core::Status::kUnphysical);
   EXPECT_TRUE(read_out->Step());
   EXPECT_TRUE(std::equal(before.begin(), before.end(), read_out->result().body));

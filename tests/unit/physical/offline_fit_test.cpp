@@ -1,4 +1,4 @@
-// physical - the read-out against the offline fit, and of many draws of data; knows no filter.
+// physical - the read-out against the offline fit, and of many draws of data.
 #include <gtest/gtest.h>
 
 #include "codegen/generated/er20_like/model.hpp"
@@ -16,8 +16,8 @@ calibration::BarrierFit Offline(const codegen::Model& model, const Case<Six>& c)
   const int size = Six::kColumns;
   std::vector<int> active;
   for (int k = 0; k < size; ++k)
-    if (c.image->prior.active[k]) active.push_back(k);
-  const Vector scale = Eigen::Map<const Eigen::VectorXf>(c.image->scale, size).cast<double>();
+    if (c.adopted->prior.active[k]) active.push_back(k);
+  const Vector scale = Eigen::Map<const Eigen::VectorXf>(c.adopted->scale, size).cast<double>();
   const Matrix p = Covariance(c.ud.data(), size)(active, active),
                p0 = Covariance(c.Before().data(), size)(active, active);
   const Vector x = Eigen::Map<const Eigen::VectorXf>(c.x.data(), size).cast<double>()(active);
@@ -30,9 +30,9 @@ calibration::BarrierFit Offline(const codegen::Model& model, const Case<Six>& c)
   at.hessian(active, active) = inverse.asDiagonal() * information * inverse.asDiagonal();
 
   problem.model = &model;
-  problem.bodies = Eigen::Map<const Eigen::VectorXf>(c.work->rigid.mean, 66).cast<double>();
-  problem.bodies_sd = Eigen::Map<const Eigen::VectorXf>(c.work->rigid.sd, 66).cast<double>();
-  problem.x = Eigen::Map<const Eigen::VectorXf>(c.image->committed.p, size).cast<double>();
+  problem.bodies = Eigen::Map<const Eigen::VectorXf>(c.rigid->mean, 66).cast<double>();
+  problem.bodies_sd = Eigen::Map<const Eigen::VectorXf>(c.rigid->sd, 66).cast<double>();
+  problem.x = Eigen::Map<const Eigen::VectorXf>(c.adopted->committed.p, size).cast<double>();
   problem.x_sd = scale;
   problem.data = [at](const Vector&, bool) { return at; };
   return calibration::FitWithBarrier(problem);
@@ -49,9 +49,9 @@ TEST(MapReadOut, OfAnyAmountOfData_IsTheOfflineFit) {
     ASSERT_TRUE(got.converged && expected.converged) << weight;
     // The offline fit stops where 1e-7 of chi^2 is left: 3e-4 standard deviations.
     EXPECT_LT(Distance(*c, got.body, expected.bodies.data()), 2e-3) << weight;
-    for (int k = 0; k < 66; ++k) EXPECT_NEAR(got.body_sd[k], expected.bodies_sd(k), 1e-3 * c->work->rigid.sd[k]) << k;
+    for (int k = 0; k < 66; ++k) EXPECT_NEAR(got.body_sd[k], expected.bodies_sd(k), 1e-3 * c->rigid->sd[k]) << k;
     for (int k = 0; k < Six::kColumns; ++k) {
-      const double sd = std::sqrt(expected.covariance(k, k)), scale = c->image->scale[k];
+      const double sd = std::sqrt(expected.covariance(k, k)), scale = c->adopted->scale[k];
       EXPECT_NEAR(got.column[k], expected.x(k), 2e-3 * scale + 1e-5 * std::abs(expected.x(k))) << weight << " " << k;
       EXPECT_NEAR(got.column_sd[k], sd, 1e-2 * sd) << weight << " " << k;
     }

@@ -7,7 +7,7 @@
 #include <memory>
 #include <random>
 
-#include "armcal/estimator/image.hpp"
+#include "armcal/estimator/adopted_table.hpp"
 #include "armcal/physical/map_read_out.hpp"
 
 namespace armcal::physical::test {
@@ -31,12 +31,12 @@ template <class Model>
 struct Case {
   static constexpr int kColumns = Model::kColumns;
   estimator::Table<Model> table = estimator::DefaultTable<Model>();
-  std::unique_ptr<estimator::ImageWork<Model>> work = std::make_unique<estimator::ImageWork<Model>>();
-  std::unique_ptr<estimator::Image<Model>> image = std::make_unique<estimator::Image<Model>>();
+  std::unique_ptr<estimator::RigidPrior<Model, float>> rigid = std::make_unique<estimator::RigidPrior<Model, float>>();
+  std::unique_ptr<estimator::AdoptedTable<Model>> adopted = std::make_unique<estimator::AdoptedTable<Model>>();
   std::vector<float> x = std::vector<float>(kColumns), ud = std::vector<float>(math::UdSize(kColumns));
 
   core::Status Build() {
-    const core::Status status = estimator::BuildImage<Model>(table, 1, *work, *image);
+    const core::Status status = estimator::BuildAdoptedTable<Model>(table, 1, *rigid, *adopted);
     ud = Before();
     std::fill(x.begin(), x.end(), 0.0f);
     return status;
@@ -44,10 +44,10 @@ struct Case {
   // The prior's factor of all columns.
   std::vector<float> Before() const {
     std::vector<float> whole(math::UdSize(kColumns));
-    for (int k = 0; k < Model::kFront; ++k) whole[math::UdIndex(k, k)] = image->prior.active[k] ? 1.0f : 0.0f;
+    for (int k = 0; k < Model::kFront; ++k) whole[math::UdIndex(k, k)] = adopted->prior.active[k] ? 1.0f : 0.0f;
     for (int j = 0; j < Model::kDense; ++j)
       for (int i = 0; i <= j; ++i)
-        whole[math::UdIndex(Model::kFront + i, Model::kFront + j)] = image->prior.dense_ud[math::UdIndex(i, j)];
+        whole[math::UdIndex(Model::kFront + i, Model::kFront + j)] = adopted->prior.dense_ud[math::UdIndex(i, j)];
     return whole;
   }
   // Rows h' x = y of variance 1 in prior units, by Bierman's update in double.
@@ -76,7 +76,7 @@ struct Case {
     for (int k = 0; k < kColumns; ++k) x[k] = static_cast<float>(mean(k));
   }
   MapPrior<Model> prior() const {
-    return {work->rigid.mean, work->rigid.sd, image->committed.p, image->scale, image->prior.dense_ud};
+    return {rigid->mean, rigid->sd, adopted->committed.p, adopted->scale, adopted->prior.dense_ud};
   }
   template <class ReadOut>
   core::Status HandOver(ReadOut& out, bool warm = false) const {
@@ -108,7 +108,7 @@ std::unique_ptr<Case<Model>> Draw(unsigned seed, double weight, double size) {
   const Vector truth = size * prior.eigenvectors() * (root.asDiagonal() * z);
   Matrix h(300, Model::kColumns);
   for (int k = 0; k < Model::kColumns; ++k)
-    for (int r = 0; r < h.rows(); ++r) h(r, k) = c->image->prior.active[k] ? weight * normal(random) : 0;
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c->adopted->prior.active[k] ? weight * normal(random) : 0;
   c->Take(h, h * truth + Vector::NullaryExpr(h.rows(), [&] { return normal(random); }));
   return c;
 }
@@ -120,7 +120,7 @@ void TakeNoise(Case<Model>& c, unsigned seed) {
   std::normal_distribution<double> normal;
   Matrix h = Matrix::Zero(100, Model::kColumns);
   for (int k = 0; k < Model::kColumns; ++k)
-    for (int r = 0; r < h.rows(); ++r) h(r, k) = c.image->prior.active[k] ? 0.3 * normal(random) : 0;
+    for (int r = 0; r < h.rows(); ++r) h(r, k) = c.adopted->prior.active[k] ? 0.3 * normal(random) : 0;
   c.Take(h, Vector::NullaryExpr(h.rows(), [&] { return normal(random); }));
 }
 
@@ -142,7 +142,7 @@ double Distance(const Case<Model>& c, const double* a, const double* b) {
     ToCentral(b + at, cb);
     ca[10] = a[at + 10], cb[10] = b[at + 10];
     for (int k = 0; k < 11; ++k)
-      if (const double sd = c.work->rigid.sd[at + k]; sd > 0) worst = std::max(worst, std::abs(ca[k] - cb[k]) / sd);
+      if (const double sd = c.rigid->sd[at + k]; sd > 0) worst = std::max(worst, std::abs(ca[k] - cb[k]) / sd);
   }
   return worst;
 }

@@ -1,4 +1,4 @@
-// signal - everything in a sample belongs to the same ticks and the same settings; knows no model.
+// signal - everything in a sample belongs to the same ticks and the same settings.
 #include <gtest/gtest.h>
 
 #include "armcal/signal/signal_path.hpp"

@@ -1,4 +1,4 @@
-// signal - the signal path against analytic motion; knows no model.
+// signal - the signal path against analytic motion.
 #include "armcal/signal/signal_path.hpp"
 
 #include <gtest/gtest.h>

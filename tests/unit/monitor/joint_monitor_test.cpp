@@ -1,5 +1,5 @@
-// monitor - statistics of known sequences; knows no filter.
-#include "armcal/monitor/monitor.hpp"
+// monitor - statistics of known sequences.
+#include "armcal/monitor/innovations.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,23 +1,24 @@
-// estimator - what one trace record holds: averaged raw samples, or processed samples; knows no ring and no register.
+// controller - what one record of the two traces holds: averaged raw samples, or processed samples.
 #pragma once
 
 #include <cstdint>
 
-#include "armcal/math/elementary.hpp"
-#include "armcal/model/parameters.hpp"
+#include "armcal/core/words.hpp"
+#include "armcal/link/trace.hpp"
 #include "armcal/model/sample.hpp"
 
-namespace armcal::estimator {
+namespace armcal::controller {
 
-// Trace 0, averaged over the arm's decimation. Per joint and channel, in this order; 32-bit values high word first:
+// Trace 0: raw samples, averaged over the decimation that the client asked for. Per joint and channel, in this order;
+// 32-bit values high word first:
 //   bit 0  motor counts, int32 in 1/16 count (wraps) and current, int32 in 1/16 LSB
 //   bit 1  temperature, f32, deg C
 //   bit 2  flags, u16: RawSample flags of all ticks (enabled: and; saturated, stale: or)
 //   bit 3  set-point position, f32, and feed-forward torque, f32, joint side
 inline constexpr std::uint32_t kRawMotion = 1, kRawTemperature = 2, kRawFlags = 4, kRawSetPoint = 8, kRawAll = 15;
 
-// Trace 1, one record an estimator sample. Per joint: q, qd, qdd, tau, temperature f32, flags u16 (kUsed tells whether
-// the row updated filter A), committed model torque at this state f32.
+// Trace 1: one record for each estimator sample. Per joint: q, qd, qdd, tau and temperature as f32, flags as u16
+// (kUsed: the row changed the estimate of filter A), and the committed model's torque at this state as f32.
 inline constexpr std::uint32_t kSampleAll = 1;
 inline constexpr int kSampleWordsPerJoint = 13;
 
@@ -33,7 +34,7 @@ constexpr std::uint16_t SampleRecordWords(std::uint32_t channels) {
   return channels == kSampleAll ? static_cast<std::uint16_t>(n * kSampleWordsPerJoint) : std::uint16_t{0};
 }
 
-// Sums ticks of one record. Context: tick.
+// Sums up the ticks of one record. Context: tick.
 template <int n>
 class RawRecord {
  public:
@@ -58,24 +59,24 @@ class RawRecord {
     const float share = 1.0f / static_cast<float>(count_ > 0 ? count_ : 1);
     for (int j = 0; j < n; ++j) {
       if (channels & kRawMotion) {
-        model::words::PutU32(w, first_[j] * 16u + static_cast<std::uint32_t>(Sixteenths(counts_[j])));
-        model::words::PutU32(w + 2, static_cast<std::uint32_t>(Sixteenths(current_[j])));
+        core::PutU32(w, first_[j] * 16u + static_cast<std::uint32_t>(Sixteenths(counts_[j])));
+        core::PutU32(w + 2, static_cast<std::uint32_t>(Sixteenths(current_[j])));
         w += 4;
       }
-      if (channels & kRawTemperature) model::words::PutF32(w, temperature_[j] * share), w += 2;
+      if (channels & kRawTemperature) core::PutF32(w, temperature_[j] * share), w += 2;
       if (channels & kRawFlags)
         *w++ = static_cast<std::uint16_t>((enabled_[j] & model::kEnabled) |
                                           (any_[j] & (model::kSaturated | model::kStale)));
       if (channels & kRawSetPoint) {
-        model::words::PutF32(w, reference_[j] * share);
-        model::words::PutF32(w + 2, feedforward_[j] * share);
+        core::PutF32(w, reference_[j] * share);
+        core::PutF32(w + 2, feedforward_[j] * share);
         w += 4;
       }
     }
   }
 
  private:
-  // 16 x mean, rounded to nearest; in 32 bits, which the core divides itself.
+  // 16 x mean, rounded to nearest. In 32 bits, because the core has an instruction for that division.
   std::int32_t Sixteenths(std::int32_t sum) const {
     if (count_ == 0) return 0;
     const std::int32_t whole = sum / count_, rest = sum % count_;
@@ -93,7 +94,7 @@ class RawRecord {
 // words [SampleRecordWords<n>(kSampleAll)]. Context: background.
 template <int n>
 void WriteSampleRecord(const model::Sample<n>& s, const float* tau_model_Nm, std::uint16_t* w) {
-  using model::words::PutF32;
+  using core::PutF32;
   for (int j = 0; j < n; ++j, w += kSampleWordsPerJoint) {
     PutF32(w, s.q[j]);
     PutF32(w + 2, s.qd[j]);
@@ -107,7 +108,7 @@ void WriteSampleRecord(const model::Sample<n>& s, const float* tau_model_Nm, std
 
 template <int n>
 void ReadSampleRecord(const std::uint16_t* w, model::Sample<n>& s, float* tau_model_Nm) {
-  using model::words::GetF32;
+  using core::GetF32;
   for (int j = 0; j < n; ++j, w += kSampleWordsPerJoint) {
     s.q[j] = GetF32(w);
     s.qd[j] = GetF32(w + 2);
@@ -119,4 +120,14 @@ void ReadSampleRecord(const std::uint16_t* w, model::Sample<n>& s, float* tau_mo
   }
 }
 
-}  // namespace armcal::estimator
+// The ring of the raw trace. kWords: of 16 bits. A record of six joints takes 33 words (motion and flags) to 69.
+template <class Model, std::uint32_t kWords = link::kDefaultTraceWords>
+class RawTrace : public link::TraceRing<kWords> {
+ public:
+  RawTrace() : link::TraceRing<kWords>(1, RecordWords, nullptr) {}
+
+ private:
+  static std::uint16_t RecordWords(void*, std::uint32_t channels) { return RawRecordWords<Model::kJoints>(channels); }
+};
+
+}  // namespace armcal::controller

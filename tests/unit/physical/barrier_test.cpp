@@ -1,5 +1,5 @@
-// physical - steps and barrier of one body against dense 4 x 4 algebra and differences; knows no robot.
-#include "armcal/physical/central.hpp"
+// physical - steps and barrier of one body against dense 4 x 4 algebra and differences.
+#include "armcal/physical/body.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
-// math - the packed kernels against dense Eigen algebra in double; knows no filter.
-#include "armcal/math/ud.hpp"
+// math - the packed kernels against dense Eigen algebra in double.
+#include "armcal/math/symmetric.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <random>
 
-#include "armcal/math/givens.hpp"
+#include "armcal/math/columns.hpp"
 
 namespace armcal::math {
 namespace {

@@ -1,4 +1,4 @@
-// feedforward - the committed parameters and the torque they predict; knows no filter and no table layout.
+// model - evaluates a generated model: the regressor of one sample, and the torque of the parameters in force.
 #pragma once
 
 #include <cstdint>
@@ -6,14 +6,15 @@
 #include "armcal/math/elementary.hpp"
 #include "armcal/model/contract.hpp"
 
-namespace armcal::feedforward {
+namespace armcal::model {
 
-// Filter coordinates of one adopted table. All zero: no valid table.
+// The committed parameters: what the adopted table says, in filter coordinates. Feed-forward predicts torque with them,
+// and every filter's estimate starts from them. All zero: no table is valid.
 template <class Model>
 struct Committed {
   static constexpr int n = Model::kJoints;
   bool valid = false;
-  bool bumpless = false;         // may be adopted while axes are enabled, cross-faded over blend_ticks
+  bool bumpless = false;         // may be adopted while axes are enabled; the torque cross-fades over blend_ticks
   std::uint32_t generation = 0;  // every adoption has its own
   std::uint32_t blend_ticks = 0;
   float p[Model::kColumns] = {};
@@ -23,25 +24,26 @@ struct Committed {
   float torque_scale[n] = {};
 };
 
-// The regressor at one sample; room for it belongs to whoever asks. Starts as zero: structural zeros are never written.
+// The regressor at one sample. It starts as zero, because a model never writes its structural zeros.
 template <class Model>
 struct Rows {
   float front[Model::kFront > 0 ? Model::kFront : 1] = {};
   float dense[Model::kJoints * Model::kDense] = {};
 };
 
-// What a model's effects carry from sample to sample, for one stream of samples.
+// The states of effects with memory. Each stream of samples has a Memory of its own.
 template <class Model>
 struct Memory {
   float now[Model::kStates > 0 ? Model::kStates : 1] = {};
   float next[Model::kStates > 0 ? Model::kStates : 1] = {};
-  bool running = false;  // false: the next sample starts anew
+  bool running = false;  // false: the next sample sets the initial states
 };
 
-// Evaluates the rows at x and steps the memory. A step that is not finite (a sample was not) starts it anew.
+// Evaluates the regressor at x and steps the memory once. If a new state is not finite (because a number of the sample
+// was not), the next sample sets the initial states again. Context: any.
 template <class Model>
-void EvaluateRows(const Committed<Model>& committed, const model::ModelInput<float, Model::kJoints>& x,
-                  Memory<Model>& memory, Rows<Model>& rows) {
+void EvaluateRows(const Committed<Model>& committed, const ModelInput<float, Model::kJoints>& x, Memory<Model>& memory,
+                  Rows<Model>& rows) {
   if constexpr (Model::kStates > 0)
     if (!memory.running) Model::InitialState(x, committed.p, committed.eta, memory.now);
   Model::Regressor(x, committed.p, committed.eta, memory.now, memory.next, rows.front, rows.dense);
@@ -52,7 +54,7 @@ void EvaluateRows(const Committed<Model>& committed, const model::ModelInput<flo
   }
 }
 
-// Committed torque of the links alone, without the joint's own friction and effects; RowTorque continues it.
+// Torque of one joint from the dense columns alone, without the joint's own friction and effects. Context: any.
 template <class Model>
 float LoadTorque(const float* p, const Rows<Model>& rows, int joint) {
   float sum = 0.0f;
@@ -63,8 +65,8 @@ float LoadTorque(const float* p, const Rows<Model>& rows, int joint) {
   return sum;
 }
 
-// Committed torque of one joint; load_Nm: its LoadTorque. A column whose parameter is zero adds nothing, even if its
-// value is not finite (an effect in standby may read a sensor that is not there). Context: any.
+// Torque of one joint; load_Nm is its LoadTorque. A column whose parameter is zero adds nothing, even if its value is
+// not finite: an effect in standby may read a sensor that the machine does not have. Context: any.
 template <class Model>
 float RowTorque(const float* p, const Rows<Model>& rows, int joint, float load_Nm) {
   float sum = load_Nm;
@@ -77,12 +79,13 @@ float RowTorque(const float* p, const Rows<Model>& rows, int joint) {
   return RowTorque(p, rows, joint, LoadTorque(p, rows, joint));
 }
 
-// Torque of all joints at a state, unclamped. Shape: tau_Nm [kJoints]. Not finite where the model is not. Context: any.
+// Torque of all joints at a state, without limits. Shape: tau_Nm [kJoints]. Not finite where the model is not.
+// Context: any.
 template <class Model>
-void ModelTorque(const Committed<Model>& committed, const model::ModelInput<float, Model::kJoints>& state,
+void ModelTorque(const Committed<Model>& committed, const ModelInput<float, Model::kJoints>& state,
                  Memory<Model>& memory, Rows<Model>& rows, float* tau_Nm) {
   EvaluateRows(committed, state, memory, rows);
   for (int i = 0; i < Model::kJoints; ++i) tau_Nm[i] = RowTorque(committed.p, rows, i);
 }
 
-}  // namespace armcal::feedforward
+}  // namespace armcal::model

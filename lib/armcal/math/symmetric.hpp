@@ -1,8 +1,9 @@
-// math - symmetric matrices as P = U D U', U unit upper triangular, packed; knows no filter and no parameter.
+// math - symmetric matrices, packed, and their factors U D U' and R' R.
 //
-// Packed by columns: element (i, j), i <= j, at j (j + 1) / 2 + i; the diagonal holds D. Size n (n + 1) / 2.
-// Every kernel takes the same instructions whatever the numbers are, allocates nothing and calls nothing. What rows and
-// noise do to a filter's factor is filter/factor_work.hpp's. Context: any.
+// Packed by columns: element (i, j) with i <= j is number j (j + 1) / 2 + i, and the size is n (n + 1) / 2. P = U D U'
+// with a unit upper triangular U; the diagonal of the packed factor holds D. Every kernel takes the same instructions
+// whatever the numbers are, and allocates nothing. filter/factor.hpp has what rows and noise do to a filter's factor,
+// in slices. Context: any.
 #pragma once
 
 #include "armcal/math/elementary.hpp"
@@ -84,6 +85,41 @@ template <int n, class T>
 void UdSolveUpper(const T* ud, T* x) {
   for (int j = n - 1; j >= 0; --j)
     for (int i = 0; i < j; ++i) x[i] -= ud[UdIndex(i, j)] * x[j];
+}
+
+// A = R' R with R upper triangular (Cholesky), in place and one column a call. A caller that makes column j of A just
+// before this call needs no second matrix. Turns column [j + 1] of A into that of R; `before` are R's columns before
+// it. False if the pivot would be smaller than `least`: the pivot is then `least`, so that R' R is larger than A.
+template <class T>
+bool CholeskyColumn(const T* before, int j, T least, T* column) {
+  T pivot = column[j];
+  for (int i = 0; i < j; ++i) {
+    T sum = column[i];
+    for (int k = 0; k < i; ++k) sum -= before[k] * column[k];
+    column[i] = sum / before[i];
+    pivot -= column[i] * column[i];
+    before += i + 1;
+  }
+  column[j] = Sqrt(Max(pivot, least));
+  return pivot >= least;
+}
+
+// x = R'^-1 b, and x = R^-1 b, in place. Shapes: r [n (n + 1) / 2], x [n].
+template <int n, class T>
+void SolveLower(const T* r, T* x) {
+  for (int i = 0; i < n; ++i) {
+    for (int k = 0; k < i; ++k) x[i] -= r[k] * x[k];
+    x[i] /= r[i];
+    r += i + 1;
+  }
+}
+template <int n, class T>
+void SolveUpper(const T* r, T* x) {
+  for (int j = n - 1; j >= 0; --j) {
+    const T* column = r + j * (j + 1) / 2;
+    x[j] /= column[j];
+    for (int i = 0; i < j; ++i) x[i] -= column[i] * x[j];
+  }
 }
 
 }  // namespace armcal::math

@@ -1,5 +1,5 @@
-// physical - bodies against point masses and Eigen's eigenvalues; knows no robot.
-#include "armcal/physical/physical.hpp"
+// physical - bodies against point masses and Eigen's eigenvalues.
+#include "armcal/physical/body.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// monitor - the consistency verdict on drawn innovations and against chi^2 itself; knows no filter.
-#include "armcal/monitor/consistency.hpp"
+// monitor - the consistency verdict on drawn innovations and against chi^2 itself.
+#include "armcal/monitor/innovations.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace {
 struct Rows {
   std::mt19937 random{5};
   std::normal_distribution<float> normal;
-  Consistency verdict;
+  InnovationTest verdict;
 
   void Add(int count, float size) {
     for (int k = 0; k < count; ++k) verdict.Add(1.7f * size * normal(random), 1.7f * 1.7f);
@@ -24,9 +24,9 @@ double ShareBeyond(double freedom, double limit) {
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(freedom), limit));
 }
 
-TEST(Consistency, Limit_IsPassedOnceInAMillion) {
-  const double rows = Consistency::kBlockRows;
-  EXPECT_NEAR(ShareBeyond(rows, static_cast<double>(Consistency::kLimit) * rows), 1e-6, 2e-8);
+TEST(InnovationTest, Limit_IsPassedOnceInAMillion) {
+  const double rows = InnovationTest::kBlockRows;
+  EXPECT_NEAR(ShareBeyond(rows, static_cast<double>(InnovationTest::kLimit) * rows), 1e-6, 2e-8);
 }
 
 TEST(ChiSquareLimit, OfAnyFreedom_IsPassedAsOftenAsStated) {
@@ -37,27 +37,27 @@ TEST(ChiSquareLimit, OfAnyFreedom_IsPassedAsOftenAsStated) {
   EXPECT_LT(ShareBeyond(1, ChiSquareLimit(1, 3.719f)), 1e-4);  // of few degrees it is passed less often
 }
 
-TEST(Consistency, OfAConsistentFilter_StaysSilent) {
+TEST(InnovationTest, OfAConsistentFilter_StaysSilent) {
   Rows rows;
   for (int block = 0; block < 200; ++block) {
-    rows.Add(Consistency::kBlockRows, 1.0f);
+    rows.Add(InnovationTest::kBlockRows, 1.0f);
     EXPECT_FALSE(rows.verdict.inconsistent()) << block;
   }
 }
 
-TEST(Consistency, OfATorqueThatComesAndGoes_FollowsTheLastBlock) {
+TEST(InnovationTest, OfATorqueThatComesAndGoes_FollowsTheLastBlock) {
   Rows rows;
-  rows.Add(Consistency::kBlockRows, 1.0f);
-  rows.Add(Consistency::kBlockRows, 1.1f);  // a fifth more variance: nine standard deviations of the mean
+  rows.Add(InnovationTest::kBlockRows, 1.0f);
+  rows.Add(InnovationTest::kBlockRows, 1.1f);  // a fifth more variance: nine standard deviations of the mean
   EXPECT_TRUE(rows.verdict.inconsistent());
-  rows.Add(Consistency::kBlockRows, 1.0f);
+  rows.Add(InnovationTest::kBlockRows, 1.0f);
   EXPECT_FALSE(rows.verdict.inconsistent());
 }
 
-TEST(Consistency, RowsThatAreNoNumbers_AreKeptOut) {
+TEST(InnovationTest, RowsThatAreNoNumbers_AreKeptOut) {
   Rows rows;
   for (int k = 0; k < 10000; ++k) rows.verdict.Add(std::numeric_limits<float>::quiet_NaN(), 1.0f);
-  rows.Add(Consistency::kBlockRows, 1.0f);
+  rows.Add(InnovationTest::kBlockRows, 1.0f);
   EXPECT_FALSE(rows.verdict.inconsistent());
 }
 

@@ -1,45 +1,50 @@
-// estimator - from a decoded parameter table to what tick and background run on; knows no storage, no register.
+// estimator - from a decoded parameter table to the numbers that tick and background work with.
 #pragma once
 
 #include "armcal/estimator/rigid_prior.hpp"
-#include "armcal/feedforward/committed.hpp"
 #include "armcal/filter/prior.hpp"
+#include "armcal/model/evaluate.hpp"
 #include "armcal/model/parameters.hpp"
 
 namespace armcal::estimator {
 
-// D of link columns in the Kalman form stays above this (prior units), a conditional standard deviation of a thousandth
-// of the prior's. Rows must go on to move U by more than its rounding, or it wanders: after a million samples at a
-// regressor condition of 1e4 the estimate is 0.3 standard deviations off with a floor of 1e-9, 0.01 with this one.
+// D of a dense column in the Kalman form stays above this (prior units): the conditional standard deviation of a column
+// stays above a thousandth of the prior's. Rows must go on to move U by more than its rounding, or U wanders. After a
+// million samples at a regressor condition of 1e4, the estimate is 0.3 standard deviations off with a floor of 1e-9,
+// and 0.01 with this one.
 inline constexpr float kLinkFloor = 1e-6f;
-// A column whose prior standard deviation is below this (its own unit) is taken as known.
+// A column whose prior standard deviation is below this (in its own unit) is taken as known.
 inline constexpr float kSmallestSd = 1e-12f;
 
 template <class Model>
 using Table = model::ParameterTable<Model::kJoints, Model::kParameters>;
 
-// One adopted table. Two of them live in the application; the active one must outlive its use.
+// What one table means for feed-forward and filters. It must stay as it is while an estimator works with it.
 template <class Model>
-struct Image {
-  feedforward::Committed<Model> committed;  // b0 and all that the tick needs
+struct AdoptedTable {
+  model::Committed<Model> committed;  // b0, and all that the tick needs
   filter::Prior<Model> prior;
-  // s: estimate b = b0 + s x; of a logarithmic eta ln b = ln b0 + s x
+  // s: an estimate is b = b0 + s x; of a logarithmic eta, ln b = ln b0 + s x.
   float scale[Model::kColumns + Model::kNonlinear] = {};
   float eta_low[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // bounds of x
   float eta_high[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
   float sigma_Nm[Model::kJoints] = {};
 };
 
-// Room for BuildImage; afterwards `rigid` serves ReadBodies.
-template <class Model>
-struct ImageWork {
-  RigidPrior<Model, float> rigid;
-};
-
-// A nonlinear parameter whose range excludes zero is positive, and estimated as its logarithm.
+// A nonlinear parameter whose range excludes zero is positive, and is estimated as its logarithm.
 template <class Model>
 constexpr bool IsLogarithmic(int e) {
   return Model::kInfo[Model::kParameters - Model::kNonlinear + e].lower > 0.0f;
+}
+// The value of eta at x in prior units, and its derivative by x.
+template <class Model>
+float EtaAt(const AdoptedTable<Model>& table, int e, float x) {
+  const float step = table.scale[Model::kColumns + e] * x;
+  return IsLogarithmic<Model>(e) ? table.committed.eta[e] * math::Exp(step) : table.committed.eta[e] + step;
+}
+template <class Model>
+float EtaSlope(const AdoptedTable<Model>& table, int e, float eta) {
+  return table.scale[Model::kColumns + e] * (IsLogarithmic<Model>(e) ? eta : 1.0f);
 }
 
 namespace internal {
@@ -51,7 +56,7 @@ inline float Amplitude(const model::ParameterEntry& e) {
 }
 inline float Spread(const model::ParameterEntry& e) { return Uncertain(e.state) ? e.sd : 0.0f; }
 
-// Rigid column r is `considered` if all uncertain body parameters behind it are.
+// A rigid column is `considered` if every uncertain body parameter that it depends on is.
 template <class Model>
 bool RigidConsidered(const Table<Model>& table, const float* w_row) {
   bool any = false, all = true;
@@ -63,53 +68,53 @@ bool RigidConsidered(const Table<Model>& table, const float* w_row) {
   return any && all;
 }
 
-// The dense block in prior units: the rigid columns correlated, the effects after them on their own.
+// The prior of the dense columns in prior units: rigid columns are correlated with each other, effects with nothing.
 template <class Model>
-void ScaleCorrelation(const RigidPrior<Model, float>& rigid, Image<Model>& image) {
+void ScaleCorrelation(const RigidPrior<Model, float>& rigid, AdoptedTable<Model>& adopted) {
   constexpr int kRigid = Model::kRigid;
-  filter::Prior<Model>& prior = image.prior;
+  filter::Prior<Model>& prior = adopted.prior;
   for (float& u : prior.dense_ud) u = 0.0f;
   for (int k = 0; k < math::UdSize(kRigid); ++k) prior.dense_ud[k] = rigid.ud[k];
   for (int j = kRigid; j < Model::kDense; ++j)
     prior.dense_ud[math::UdIndex(j, j)] = math::Masked(1.0f, prior.active[Model::kFront + j]);
-  const float* scale = image.scale + Model::kFront;
+  const float* scale = adopted.scale + Model::kFront;
   float inverse[kRigid];
   for (int r = 0; r < kRigid; ++r) inverse[r] = math::Divide(1.0f, scale[r]);
   math::UdScale<kRigid>(prior.dense_ud, inverse, scale);
 }
 
-// Columns of the extended filter, and the range of x that keeps eta in its own.
+// The columns of the extended filter, and the range of x that keeps each eta in the range of its record.
 template <class Model>
-void PriorOfEta(const Table<Model>& table, Image<Model>& image) {
+void PriorOfEta(const Table<Model>& table, AdoptedTable<Model>& adopted) {
   for (int e = 0; e < Model::kNonlinear; ++e) {
     const int k = Model::kColumns + e, entry = Model::kParameters - Model::kNonlinear + e;
     const model::ParameterEntry& given = table.parameter[entry];
     const model::ParameterInfo& info = Model::kInfo[entry];
     const bool log = IsLogarithmic<Model>(e);
-    image.committed.eta[e] = given.mean;
+    adopted.committed.eta[e] = given.mean;
     const float scale = log ? math::Divide(Spread(given), given.mean) : Spread(given);
     const bool active = scale > kSmallestSd && given.mean >= info.lower && given.mean <= info.upper;
-    image.scale[k] = active ? scale : 0.0f;
-    image.prior.active[k] = math::MaskOf(active);
-    image.prior.considered[k] = active && given.state == model::ParameterState::kConsidered;
-    image.prior.any_considered |= image.prior.considered[k];
-    image.prior.lambda[k] = 1.0f;
+    adopted.scale[k] = active ? scale : 0.0f;
+    adopted.prior.active[k] = math::MaskOf(active);
+    adopted.prior.considered[k] = active && given.state == model::ParameterState::kConsidered;
+    adopted.prior.any_considered |= adopted.prior.considered[k];
+    adopted.prior.lambda[k] = 1.0f;
     const bool noisy = active && given.state == model::ParameterState::kEstimated;
-    image.prior.noise[k] = noisy ? given.process_noise / given.sd / given.sd : 0.0f;
+    adopted.prior.noise[k] = noisy ? given.process_noise / given.sd / given.sd : 0.0f;
     const float low = log ? math::Log(info.lower / given.mean) : info.lower - given.mean;
     const float high = log ? math::Log(info.upper / given.mean) : info.upper - given.mean;
-    image.eta_low[e] = active ? low / scale : 0.0f;
-    image.eta_high[e] = active ? high / scale : 0.0f;
+    adopted.eta_low[e] = active ? low / scale : 0.0f;
+    adopted.eta_high[e] = active ? high / scale : 0.0f;
   }
 }
 }  // namespace internal
 
-// kWrongSchema; kUnphysical (a link's body, or a negative rotor inertia); kNotFinite (the map overflows). On refusal
-// `image` is unchanged. Longest call of lib, once per table and apart from the tick's budget: see FactorPrior.
-// Context: background.
+// Fills in `adopted`. `rigid` is work space; afterwards ReadBodies and BeginPhysical may read it. kWrongSchema;
+// kUnphysical (a link's body, or a negative rotor inertia); kNotFinite (the map overflows). On refusal `adopted` is
+// unchanged. This is the longest call of lib (see FactorPrior), once for each table. Context: background.
 template <class Model>
-core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, ImageWork<Model>& work,
-                        Image<Model>& image) {
+core::Status BuildAdoptedTable(const Table<Model>& table, std::uint32_t generation, RigidPrior<Model, float>& rigid,
+                               AdoptedTable<Model>& adopted) {
   using core::Status;
   constexpr int kRigid = Model::kRigid, kColumns = Model::kColumns, kBlock = model::kBodyBlock;
   if (table.schema != Model::kSchema) return Status::kWrongSchema;
@@ -119,8 +124,7 @@ core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, Ima
     if (!physical::CanExist(body)) return Status::kUnphysical;
   }
 
-  // Bodies to base: mean, covariance, which columns are only considered.
-  RigidPrior<Model, float>& rigid = work.rigid;
+  // From bodies to base parameters: mean, covariance, and which columns are only considered.
   for (int k = 0; k < Model::kBodyParameters; ++k) {
     rigid.mean[k] = internal::Amplitude(table.parameter[k]);
     rigid.sd[k] = internal::Spread(table.parameter[k]);
@@ -140,13 +144,13 @@ core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, Ima
   if (!finite) return Status::kNotFinite;
 
   const auto is_rigid = [](int k) { return k >= Model::kFront && k < Model::kFront + kRigid; };
-  // Entries of the table: bodies, front columns, dense effect columns, eta. The last three follow each other.
+  // The table holds bodies, front columns, dense effect columns and eta, in this order.
   const auto entry = [&](int k) -> const model::ParameterEntry& {
     return table.parameter[Model::kBodyParameters + (k < Model::kFront ? k : k - kRigid)];
   };
 
-  feedforward::Committed<Model>& c = image.committed;
-  filter::Prior<Model>& prior = image.prior;
+  model::Committed<Model>& c = adopted.committed;
+  filter::Prior<Model>& prior = adopted.prior;
   prior.any_considered = false;
   for (int k = 0; k < kColumns; ++k) {
     const bool body = is_rigid(k);
@@ -154,7 +158,7 @@ core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, Ima
     c.p[k] = body ? base[r] : internal::Amplitude(entry(k));
     const float sd = body ? math::Sqrt(variance[r]) : internal::Spread(entry(k));
     const bool active = sd > kSmallestSd;
-    image.scale[k] = active ? sd : 0.0f;
+    adopted.scale[k] = active ? sd : 0.0f;
     prior.active[k] = math::MaskOf(active);
     prior.considered[k] = active && (body ? considered[r] : entry(k).state == model::ParameterState::kConsidered);
     prior.any_considered |= prior.considered[k];
@@ -162,10 +166,10 @@ core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, Ima
     const bool noisy = active && !body && entry(k).state == model::ParameterState::kEstimated;
     prior.noise[k] = noisy ? entry(k).process_noise / sd / sd : 0.0f;
   }
-  internal::PriorOfEta<Model>(table, image);
+  internal::PriorOfEta<Model>(table, adopted);
   prior.link_floor = kLinkFloor;
   prior.gate_sigma = 0.0f;
-  internal::ScaleCorrelation(rigid, image);
+  internal::ScaleCorrelation(rigid, adopted);
 
   c.valid = true;
   c.generation = generation;
@@ -175,12 +179,12 @@ core::Status BuildImage(const Table<Model>& table, std::uint32_t generation, Ima
     c.limit_Nm[i] = table.joint[i].torque_limit_Nm;
     c.v_min_radps[i] = table.joint[i].v_min_radps;
     c.torque_scale[i] = table.joint[i].torque_scale;
-    image.sigma_Nm[i] = table.joint[i].sigma_Nm;
+    adopted.sigma_Nm[i] = table.joint[i].sigma_Nm;
   }
   return Status::kOk;
 }
 
-// The table that the model's own numbers make: every default of kInfo and kAxes.
+// The table that holds every default of the model's kInfo and kAxes.
 template <class Model>
 Table<Model> DefaultTable() {
   Table<Model> table;

@@ -1,4 +1,4 @@
-// generate - emits the files and reports their cost.
+// generate - writes the files of a model and prints what they cost.
 #include "codegen/src/generate/generate.hpp"
 
 #include <cstdio>

@@ -1,4 +1,4 @@
-// generate - robot file -> C++ model: the work of armcal-generate and of armcal generate.
+// generate - makes the C++ model of a robot file, for armcal-generate and armcal generate.
 #pragma once
 
 #include <CLI/CLI.hpp>

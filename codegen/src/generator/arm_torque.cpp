@@ -1,4 +1,4 @@
-// generator - the parts of the rigid torque as roots of one tape, so that what they share is computed once.
+// generator - evaluates the parts of the rigid torque together, so that common terms are computed once.
 #include "codegen/src/generator/arm_torque.hpp"
 
 #include "codegen/src/generator/dynamics.hpp"

@@ -1,5 +1,4 @@
-// generator - rigid torque, gravity's part, mass matrix and the torque of tilted gravity over whole logs; knows no
-// effect.
+// generator - the rigid torque, its gravity part, the mass matrix and the slope over gravity, over whole logs.
 #pragma once
 
 #include <set>

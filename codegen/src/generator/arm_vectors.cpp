@@ -1,4 +1,4 @@
-// generator - the outward recursion of accelerations and screws, and reading a vector in other axes.
+// generator - carries accelerations and screws outward along the arm, and reads a vector in other axes.
 #include "codegen/src/generator/arm_vectors.hpp"
 
 #include <cmath>

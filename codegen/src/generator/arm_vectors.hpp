@@ -1,4 +1,4 @@
-// generator - the arm's motion and its joints' screws as vectors that can be read in any axes; knows no parameter.
+// generator - the arm's motion and its joints' screws as vectors that can be read in any link's axes.
 //
 // A vector of space is one thing; its three numbers depend on the axes it is read in. Here a vector is made in the axes
 // where that is cheap and carried, joint by joint, to where somebody reads it; nothing is carried that nobody reads.

@@ -1,4 +1,4 @@
-// generator - rank decision on unscaled random columns: a column that is rounding noise must not pass as a parameter.
+// generator - decides the rank from random states, in long double and without scaling the columns.
 #include "codegen/src/generator/base_parameters.hpp"
 
 #include <algorithm>

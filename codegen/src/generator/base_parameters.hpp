@@ -1,4 +1,4 @@
-// generator - which body parameters the torque can see, and how the others merge into them; knows no effect.
+// generator - finds which body parameters the torque shows, and how the other ones merge into them.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// generator - one rule an operation; sensitivities by the chain rule through the states.
+// generator - the rule of each operation, and the chain rule through the states.
 #include "codegen/src/generator/derivative.hpp"
 
 namespace armcal::codegen {

@@ -1,4 +1,4 @@
-// generator - derivatives and substitution on the graph; results share nodes with what they come from.
+// generator - derivatives and substitution on an expression graph.
 #pragma once
 
 #include <unordered_map>

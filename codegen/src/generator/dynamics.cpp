@@ -1,4 +1,4 @@
-// generator - M, V and G from the body rows at chosen speeds and accelerations.
+// generator - makes M, V and G from the body rows at chosen speeds and accelerations.
 #include "codegen/src/generator/dynamics.hpp"
 
 #include "codegen/src/generator/derivative.hpp"

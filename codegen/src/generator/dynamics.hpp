@@ -1,4 +1,4 @@
-// generator - M, V and G of (1) as expressions; knows no effect and no output format.
+// generator - M, V and G of (1) as expressions.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// generator - reads effect records. No kind is known by name.
+// generator - reads an effect record and checks every key.
 #include "codegen/src/generator/effect.hpp"
 
 #include <algorithm>

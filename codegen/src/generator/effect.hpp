@@ -1,4 +1,4 @@
-// generator - one effect record as read from its file.
+// generator - an effect record as its file says it.
 #pragma once
 
 #include <filesystem>

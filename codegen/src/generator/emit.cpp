@@ -1,4 +1,4 @@
-// generator - which files a model becomes, and the hash of what its table means.
+// generator - collects the files of a model, and computes the schema of its table.
 #include "codegen/src/generator/emit.hpp"
 
 #include <sstream>

@@ -1,4 +1,4 @@
-// generator - prints a model as C++, its register and column description; knows no file system.
+// generator - prints a model as C++ files, with a description for people and programs.
 #pragma once
 
 #include <filesystem>

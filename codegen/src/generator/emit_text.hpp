@@ -1,4 +1,4 @@
-// generator - the pieces of text that the emitted files share; knows no file.
+// generator - the pieces of text that the generated files share.
 #pragma once
 
 #include <functional>
@@ -6,11 +6,26 @@
 #include <vector>
 
 #include "codegen/src/generator/emit.hpp"
-#include "codegen/src/generator/emit_body.hpp"
 
 namespace armcal::codegen {
 
 inline constexpr int kGeneratorVersion = 2;
+
+std::string NumberText(double value);  // shortest text that reads back to the same double
+
+struct Assignment {
+  std::string target;  // "front[3]"
+  Expr value;
+  std::string heading;  // a comment line before it where it differs from the one before; may be empty
+};
+
+// The C++ text of a graph input.
+using InputWriter = std::function<std::string(const InputId& input)>;
+
+// Statements that compute all assignments, in their order: each value just before its first use, so that few are alive
+// at a time. input: C++ text of a graph input by name.
+std::string EmitStatements(const Graph& graph, const std::vector<Assignment>& assignments, const InputWriter& input,
+                           Passport& passport);
 
 std::string TypeName(const std::string& robot);               // er20_like -> Er20Like
 std::string Float(double value);                              // as a float literal

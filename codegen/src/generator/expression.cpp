@@ -1,4 +1,4 @@
-// generator - a precedence-climbing parser; every error names its column.
+// generator - the parser of expressions. Every error names its column.
 #include "codegen/src/generator/expression.hpp"
 
 #include <cctype>

@@ -1,4 +1,4 @@
-// generator - the text of an expression -> graph; knows no effect kind and no robot.
+// generator - reads the text of an expression into a graph.
 //
 // Grammar: + - * / ^ ( ), numbers, names, name[index], functions. Total: division by zero gives zero, log and sqrt see
 // only what is above zero, pow(x, y) needs x >= 0 (x^2, x^3, x^4 take any x). Functions:

@@ -1,4 +1,4 @@
-// generator - building and normalising the expression graph; knows no robot and no text.
+// generator - builds an expression graph in its normal form.
 #include "codegen/src/generator/graph.hpp"
 
 #include <cstring>

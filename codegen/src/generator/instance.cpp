@@ -1,4 +1,4 @@
-// generator - binds a record's names to a robot's joints; the scopes joint, pair, arm and body differ only here.
+// generator - binds a record's names to a robot's joints and parses its expressions.
 #include "codegen/src/generator/instance.hpp"
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// generator - an effect record applied to given joints of a robot: columns as graph expressions; knows no output
-// format.
+// generator - an effect record on given joints of a robot: its columns as expressions.
 #pragma once
 
 #include <functional>

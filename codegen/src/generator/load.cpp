@@ -1,4 +1,4 @@
-// generator - looks for the checkout, then for the file.
+// generator - looks for the checkout and for files in it.
 #include "codegen/src/generator/load.hpp"
 
 #include <cstdlib>

@@ -1,4 +1,4 @@
-// generator - where robot files and effect records lie, and a model made of them.
+// generator - finds robot files and effect records, and makes a model of them.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,4 @@
-// generator - a robot and its effects as one graph with the table's parameters; the host's model and the emitter's
-// input.
+// generator - a robot and its effects as one graph with a parameter table.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// generator - a model over whole logs: inputs bound to columns, states run first; knows no output format.
+// generator - evaluates a model over whole logs.
 #include <map>
 
 #include "codegen/src/generator/model.hpp"

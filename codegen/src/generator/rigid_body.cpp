@@ -1,4 +1,4 @@
-// generator - a link's wrench per unit of each parameter, dotted with the joints' screws.
+// generator - dots each link's wrench per unit of a parameter with the joints' screws.
 //
 // Body j's wrench is linear in its parameters: f = m a + U mc, n = I alpha + w x (I w) + mc x a, with
 // U = [alpha]x + [w]x[w]x. Joint i sees tau_i = z_i . n + v_i . f, where (z_i, v_i) is its screw about the body's

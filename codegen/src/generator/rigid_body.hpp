@@ -1,4 +1,4 @@
-// generator - the rigid arm's torque, linear in the body parameters, as a graph; knows no effect and no output format.
+// generator - the rigid arm's torque as expressions, linear in the body parameters.
 #pragma once
 
 #include <array>

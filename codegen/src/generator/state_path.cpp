@@ -1,4 +1,4 @@
-// generator - states sample by sample, since each needs the one before; all else in blocks.
+// generator - runs the states sample by sample and everything else in blocks of samples.
 #include "codegen/src/generator/state_path.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// generator - runs a graph's states over a log; knows no robot.
+// generator - runs a graph's states over a log.
 #pragma once
 
 #include <span>

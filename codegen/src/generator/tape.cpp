@@ -1,4 +1,4 @@
-// generator - block evaluation of a graph; the inner loops run over samples so that the compiler vectorises them.
+// generator - evaluates a graph in blocks. The inner loops run over samples so that the compiler vectorises them.
 #include "codegen/src/generator/tape.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// generator - evaluates a graph: at one point in any scalar, or over a whole log in blocks; knows no robot.
+// generator - evaluates a graph at one point or over a whole log.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
-// generator - one binary for every PC: a function compiled for several vector units, the machine's widest chosen when
-// the program starts. Without contraction all give the same bits.
+// generator - compiles a function for several vector units; the program takes the widest one of its machine.
+// All of them give the same bits, because nothing is contracted.
 #pragma once
 
 #if defined(__x86_64__) && defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)

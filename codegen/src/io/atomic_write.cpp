@@ -1,4 +1,4 @@
-// io - write beside the target, then rename.
+// io - writes a file beside its target and renames it.
 #include "codegen/src/io/atomic_write.hpp"
 
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// io - the one exception that means "bad input"; knows no room.
+// io - the one exception that means bad input.
 #pragma once
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// io - typed access to one TOML file with one-line errors; knows no key of its own.
+// io - reads one TOML table with one-line errors.
 #pragma once
 
 #include <toml++/toml.h>

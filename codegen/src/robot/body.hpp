@@ -1,4 +1,4 @@
-// robot - a rigid body in any frame, and two of them as one; knows no file.
+// robot - a rigid body in any frame, and two bodies as one.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-// robot - rotations whose quarter turns are exact, and modified DH frames; knows no file.
+// robot - rotations with exact quarter turns, and modified DH frames.
 #pragma once
 
 #include <Eigen/Geometry>

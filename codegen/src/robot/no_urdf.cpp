@@ -1,4 +1,4 @@
-// robot - stands in for the URDF reader where the program was built without urdfdom.
+// robot - replaces the URDF reader where the program is built without urdfdom.
 #include "codegen/src/io/input_error.hpp"
 #include "codegen/src/robot/urdf.hpp"
 

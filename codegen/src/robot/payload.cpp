@@ -1,4 +1,4 @@
-// robot - reads [payload] and makes a link carry it; knows no other table.
+// robot - reads a [payload] table and puts the payload on a link.
 #include "codegen/src/robot/payload.hpp"
 
 #include "codegen/src/io/toml_reader.hpp"

@@ -1,4 +1,4 @@
-// robot - the [payload] table: a body clamped to the flange; knows no dynamics.
+// robot - the [payload] table: a body clamped to the flange.
 //
 //   [payload]                 # flange axes (tool_frame), inertia about the centre
 //   mass_kg = 5.0

@@ -1,4 +1,4 @@
-// robot - what a robot file says, as numbers; no dynamics, no expressions.
+// robot - what a robot file says, as numbers.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// robot - walks a URDF tree, merges what is fixed, lays modified DH frames on the joint axes.
+// robot - walks a URDF tree, merges fixed links and lays modified DH frames on the joint axes.
 #include "codegen/src/robot/urdf.hpp"
 
 #include <console_bridge/console.h>

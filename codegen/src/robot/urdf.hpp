@@ -1,4 +1,4 @@
-// robot - a serial chain from a URDF file as modified DH frames; knows no TOML and no dynamics.
+// robot - reads a serial chain from a URDF file as modified DH frames.
 #pragma once
 
 #include <Eigen/Geometry>

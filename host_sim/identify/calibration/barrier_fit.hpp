@@ -1,16 +1,17 @@
-// calibration - parameters that fit, stay near a prior given in table coordinates and are real bodies; knows no log.
+// calibration - fits parameters to data so that they stay near a prior and every body can exist.
 //
-// min over t of  C(x(t)) + 1/2 |(t - t0) / sd|^2 - eps/2 sum_links logdet J_link(t) - eps/2 sum log rotor,
-// eps = 1, 0.1, 0.01; t = (m, c, I about the centre, rotor) per link and the remaining coordinates as they are; J the
-// 4x4 pseudo-inertia (Wensing, Kim, Slotine 2018); C half the weighted sum of squares of the data. Levenberg-Marquardt;
-// a step that leaves the cone is rejected. The prior must lie inside the cone. It works for any choice of filter
-// coordinates: x's rigid part is base_map times the bodies.
+// FitWithBarrier does this for a whole arm. It minimises over t
+//   C(x(t)) + 1/2 |(t - t0) / sd|^2 - eps/2 sum_links logdet J_link(t) - eps/2 sum log rotor,   eps = 1, 0.1, 0.01.
+// t holds (m, c, I about the centre, rotor) of each link and the other coordinates as they are. J is the 4x4
+// pseudo-inertia (Wensing, Kim, Slotine 2018). C is half the weighted sum of squares of the data. The steps are those
+// of Levenberg and Marquardt; a step that leaves the cone of possible bodies is rejected. The prior must lie inside the
+// cone. Any choice of filter coordinates will do: x's rigid part is base_map times the bodies.
+// NearestBody does the same for one body.
 #pragma once
 
+#include <Eigen/Core>
 #include <atomic>
 #include <functional>
-
-#include <Eigen/Core>
 
 #include "codegen/src/generator/model.hpp"
 
@@ -48,5 +49,13 @@ BarrierFit FitWithBarrier(const BarrierProblem& problem);
 
 // Throws io::InputError naming the first link of the robot file that cannot exist; or if it has prior = "none".
 void RequirePhysicalPrior(const codegen::Model& model);
+
+// Minimum over p = (m, m c, I about the origin) of (p - estimate)' information (p - estimate) / 2 - eps / 2 logdet
+// J(p), eps falling to 0.01, J the 4x4 pseudo-inertia (Wensing, Kim, Slotine 2018). Both parts are convex, so Newton's
+// method with step halving finds it from any body; information: positive definite.
+Eigen::VectorXd NearestBody(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& information);
+
+// The ten parameters of a body in a frame -> in the frame in which that one has this pose [4x4]: a linear map, 10 x 10.
+Eigen::MatrixXd BodyMap(const Eigen::Matrix4d& pose);
 
 }  // namespace armcal::calibration

@@ -1,12 +1,13 @@
-// calibration - derives speeds and accelerations and decides which rows count.
+// calibration - derives speeds and accelerations, decides which rows count, and delays a log's motion.
 #include "host_sim/identify/calibration/dataset.hpp"
-
+#include <algorithm>
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::calibration {
+
 namespace {
 constexpr double kUnscored_s = 0.5;  // design: the first and last half second of a log are not scored
 constexpr int kFlagSaturated = 2, kFlagStale = 4;
@@ -132,6 +133,33 @@ std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& da
 std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data) {
   std::vector<const Dataset*> out;
   for (const auto& d : data) out.push_back(&d);
+  return out;
+}
+
+Dataset Delayed(const Dataset& data, double delay_s) {
+  Dataset out = data;
+  const Eigen::VectorXd& t = data.s.t;
+  const Eigen::Index last = t.size() - 1;
+  Eigen::Index k = 0;  // t[k] <= time < t[k + 1]
+  for (Eigen::Index i = 0; i <= last; ++i) {
+    const double time = std::clamp(t[i] - delay_s, t[0], t[last]);
+    k = std::min(k, last - 1);
+    while (k + 1 < last && t[k + 1] <= time) ++k;
+    while (k > 0 && t[k] > time) --k;
+    out.used.row(i) = data.used.row(i).cwiseMin(data.used.row(k).cwiseMin(data.used.row(k + 1)));
+    const Eigen::Index first = std::clamp<Eigen::Index>(k - 1, 0, last - 3);
+    double weight[4];
+    for (int a = 0; a < 4; ++a) {
+      weight[a] = 1;
+      for (int b = 0; b < 4; ++b)
+        if (b != a) weight[a] *= (time - t[first + b]) / (t[first + a] - t[first + b]);
+    }
+    for (const auto& [from, to] :
+         {std::pair{&data.s.q, &out.s.q}, std::pair{&data.s.qd, &out.s.qd}, std::pair{&data.s.qdd, &out.s.qdd}}) {
+      to->row(i).setZero();
+      for (int a = 0; a < 4; ++a) to->row(i) += weight[a] * from->row(first + a);
+    }
+  }
   return out;
 }
 

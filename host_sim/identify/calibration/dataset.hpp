@@ -1,4 +1,4 @@
-// calibration - a log made ready for estimation: signals of one instant, and which rows may be used; knows no method.
+// calibration - makes a log ready for estimation: the signals of each sample, and which rows may be used.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,5 +37,10 @@ Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool movi
 std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& data);
 
 std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data);
+
+// The same log with position, speed and acceleration of delay_s before each torque sample (cubic between samples, held
+// at the ends): what a torque that is read late belongs to. A row stays in use if those that its motion is read between
+// are.
+Dataset Delayed(const Dataset& data, double delay_s);
 
 }  // namespace armcal::calibration

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/calibration/body_barrier.hpp"
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 
 namespace armcal::calibration {

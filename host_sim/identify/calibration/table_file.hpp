@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/identify/calibration/map_readout.hpp"
+#include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::calibration {
 

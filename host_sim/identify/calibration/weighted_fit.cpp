@@ -1,10 +1,11 @@
-// calibration - normal equations in prior-scaled coordinates; weights are re-estimated until they settle.
+// calibration - solves the normal equations in units of the prior, and estimates the weights again until they settle.
 #include "host_sim/identify/calibration/weighted_fit.hpp"
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 
 namespace armcal::calibration {
 
@@ -130,6 +131,33 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
   fit.prior_sd = prior.covariance.diagonal().cwiseSqrt();
   if (!prior.informative) fit.prior_sd.setConstant(std::numeric_limits<double>::infinity());
   return fit;
+}
+
+PhysicalReadOut ReadOutPhysical(const codegen::Model& model, const Fit& fit) {
+  RequirePhysicalPrior(model);
+  const Prior prior = MakePrior(model);
+  const Eigen::Index size = prior.mean.size();
+  BarrierProblem problem;
+  problem.model = &model;
+  problem.bodies = BodyMean(model);
+  problem.bodies_sd = VectorXd::Zero(problem.bodies.size());
+  for (int k = 0; k < problem.bodies.size(); ++k)
+    if (model.table()[k].state == "estimated") problem.bodies_sd[k] = model.table()[k].sd;
+  problem.x = prior.mean;
+  problem.x_sd = VectorXd::Zero(size);
+  for (const int c : fit.active) problem.x_sd[c] = std::sqrt(prior.covariance(c, c));
+  problem.data = [&](const VectorXd& x, bool) {
+    DataTerm term{0, VectorXd::Zero(size), MatrixXd::Zero(size, size)};
+    for (std::size_t j = 0; j < fit.information.gram.size(); ++j) {
+      const double weight = 1 / (fit.sigma[j] * fit.sigma[j] * fit.inflation[j]);
+      term.hessian += weight * fit.information.gram[j];
+      term.gradient -= weight * fit.information.right[j];
+    }
+    term.gradient += term.hessian * x;
+    return term;
+  };
+  BarrierFit found = FitWithBarrier(problem);
+  return {std::move(found.bodies), std::move(found.bodies_sd), std::move(found.x), found.iterations, found.converged};
 }
 
 }  // namespace armcal::calibration

@@ -1,4 +1,5 @@
-// calibration - weighted least squares with prior in double; the reference that every other estimate is compared with.
+// calibration - weighted least squares with a prior, in double, and the standard parameters that follow from it.
+// Every other estimate is compared with this one.
 #pragma once
 
 #include <vector>
@@ -35,5 +36,16 @@ Eigen::VectorXd SolveWithPrior(const Information& info, const Eigen::VectorXd& w
 // 1 + 2 sum of autocorrelations up to the first negative one: what a sum over these residuals varies more than over
 // white ones.
 double VarianceInflation(const Eigen::VectorXd& residual, const Eigen::VectorXi& used);
+
+struct PhysicalReadOut {
+  Eigen::VectorXd bodies;     // [11n] about link origins
+  Eigen::VectorXd bodies_sd;  // [11n] posterior standard deviation of (m, c, I about the centre, rotor)
+  Eigen::VectorXd x;          // [columns + n] the consistent filter coordinates
+  int iterations = 0;
+  bool converged = false;
+};
+
+// Throws io::InputError if a link of the prior is not physical (names it), or if the robot has prior = "none".
+PhysicalReadOut ReadOutPhysical(const codegen::Model& model, const Fit& fit);
 
 }  // namespace armcal::calibration

@@ -1,15 +1,77 @@
-// excitation - the whole trajectory: blend in, periods of a series, slow moves, back to the first pose. Knows no
-// search.
+// excitation - builds the whole trajectory: a blend in, periods of a series, slow moves, and back to the first pose.
 #pragma once
 
+#include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "codegen/src/robot/robot.hpp"
 #include "host_sim/data/trajectory/trajectory.hpp"
+#include "host_sim/identify/excitation/observation.hpp"
 #include "host_sim/identify/excitation/peaks.hpp"
 #include "host_sim/identify/excitation/series.hpp"
 
 namespace armcal::excitation {
+
+// Position, speed and acceleration of all joints at one instant.
+struct State {
+  Eigen::VectorXd q, qd, qdd;
+};
+State AtRest(const Eigen::VectorXd& q);
+
+// The polynomial of degree 5 between two states: position, speed and acceleration are met at both ends.
+class Blend {
+ public:
+  Blend(const State& from, const State& to, double duration_s);
+
+  double duration_s() const { return duration_s_; }
+  Eigen::VectorXd Position(double t_s) const;
+  codegen::Signals At(const Eigen::VectorXd& t) const;
+
+ private:
+  double duration_s_;
+  Eigen::MatrixXd power_;  // [joints x 6], in t / duration
+};
+
+// The shortest blend of those tried (0.5 s to 20 s) whose shares of all limits are at most `share`; none: not found.
+std::optional<Blend> ShortestBlend(const Observation& observation, const State& from, const State& to, double share);
+
+// The same with one end at rest wherever suits: half way of the moving end's speed ahead, inside the position limits.
+std::optional<Blend> ShortestStart(const Observation& observation, const State& to, double share);
+std::optional<Blend> ShortestStop(const Observation& observation, const State& from, double share);
+
+// One joint out and back, `strokes` times (even): from rest at home, at constant speed +v, -v, .., to rest at home.
+// Speed changes are quintic, so the acceleration is continuous.
+class Strokes {
+ public:
+  // speed: signed; blend_s: duration of each change of speed, at most (duration_s - blend_s) / strokes.
+  Strokes(double duration_s, int strokes, double speed_radps, double blend_s);
+
+  double Offset(double t_s) const;  // from home, rad
+  double reach_rad() const;         // the farthest offset's size
+
+ private:
+  double duration_s_, speed_radps_, blend_s_;
+  int strokes_;
+};
+
+// Cells of equal duration, one after the other; every joint runs through the same kinds of cells, each joint from
+// another one on, so that the arm's joints move at different speeds at any time.
+class SlowMoves {
+ public:
+  // home: where every cell starts and ends. speeds: cells at constant speed, logarithmically from 3 v_min to 0.3 of the
+  // speed limit times `reach` (0..1), less where position or acceleration limits, used up to `share`, leave no room;
+  // one more cell is small reversals at 5 v_min.
+  SlowMoves(const codegen::Robot& robot, const Eigen::VectorXd& home, int speeds, double share, double reach);
+
+  double duration_s() const;
+  Eigen::VectorXd Position(double t_s) const;
+
+ private:
+  Eigen::VectorXd home_;
+  std::vector<std::vector<Strokes>> cell_;  // [joint][cell]
+};
 
 struct ComposeSettings {
   int periods = 4;

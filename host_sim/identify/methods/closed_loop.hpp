@@ -11,6 +11,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "host_sim/identify/methods/effect_point.hpp"
 #include "host_sim/identify/methods/method.hpp"
@@ -58,5 +59,27 @@ class LoopSimulator {
 // For Problem::closed_loop: one simulation a call, reference by the log's `source`. InputError for a log without one.
 ClosedLoop MakeClosedLoop(const codegen::Model& model, std::map<std::string, Eigen::MatrixXd> reference,
                           const LoopSettings& settings = {});
+
+// The training logs with their signals replaced by those of a simulated arm.
+class LoopLogs {
+ public:
+  // Simulates the arm of problem.start. InputError naming the method where the problem has no closed loop, or where
+  // not even that arm can be simulated.
+  LoopLogs(const Problem& problem, const char* method);
+
+  // At problem.start + share (z - start): at z itself (1), or, where that arm does not follow the start's within a
+  // tenth of each joint's motion (an estimate of noise may have a negative inertia), at the largest share tried that
+  // does. Under one control law two arms take nearly the same path. The share never grows again from call to call: a
+  // method that iterates would go back and forth between two shares.
+  double Simulate(const Eigen::VectorXd& z);
+  const std::vector<Dataset>& logs() const { return logs_; }  // of the last call
+
+ private:
+  bool Run(const Eigen::VectorXd& z);
+
+  const Problem& problem_;
+  std::vector<Dataset> start_, logs_;
+  double share_ = 1;
+};
 
 }  // namespace armcal::calibration

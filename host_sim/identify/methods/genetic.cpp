@@ -1,10 +1,9 @@
 // methods - (25) by a genetic algorithm within ranges and among bodies that can exist.
-#include "host_sim/identify/search/genetic.hpp"
+#include "host_sim/identify/search/minimise.hpp"
 
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/objective.hpp"
-#include "host_sim/identify/methods/search_space.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/search_problem.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 

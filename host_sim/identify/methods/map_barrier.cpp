@@ -8,8 +8,8 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/information.hpp"
-#include "host_sim/identify/methods/better_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 

@@ -6,8 +6,7 @@
 #include <limits>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/better_methods.hpp"
-#include "host_sim/identify/methods/classic_methods.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
 
 namespace armcal::calibration {
 

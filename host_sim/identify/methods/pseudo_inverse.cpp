@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/minimum_norm.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 

@@ -1,5 +1,4 @@
-// survey - methods over draws: fresh prior, fresh noise, fresh truth where asked, with and without noise; knows no
-// table.
+// survey - draws priors and truths at random, and runs methods over many draws, with and without noise.
 #pragma once
 
 #include <atomic>
@@ -7,12 +6,31 @@
 #include <functional>
 #include <memory>
 
+#include "host_sim/study/survey/arm.hpp"
 #include "host_sim/study/survey/data_files.hpp"
-#include "host_sim/study/survey/draw.hpp"
-#include "host_sim/study/survey/trajectories.hpp"
+#include "host_sim/study/survey/platform.hpp"
 #include "host_sim/study/survey/trial.hpp"
 
 namespace armcal::survey {
+
+// How far the CAD values lie from the truth. kWorst: each entry times 1 + width or 1 - width; kUniform: anywhere
+// between.
+struct PriorError {
+  enum Kind { kWorst, kUniform } kind = kUniform;
+  double width = 0.2;
+};
+std::string PriorName(const PriorError& error);  // "uniform +-20 %"
+// Relative standard deviation of such an error: what a method is told.
+double RelativeDeviation(const PriorError& error);
+
+// The robot as CAD knows it: m, c, I about the centre of every link, its friction and effects' means, each off by the
+// error. A body that cannot exist is drawn again. Its [prior] deviations are those of the error, without floors.
+codegen::Robot DrawPrior(const codegen::Robot& truth, const PriorError& error, std::uint64_t seed);
+
+// A truth for (4): qs log-uniform in 0.05 .. 0.2 rad/s, Fs / Fc in 1.1 .. 1.5, per joint.
+Stribeck DrawStribeck(int joints, std::uint64_t seed);
+// The middle of that range: what is believed before the draw.
+Stribeck BelievedStribeck(int joints);
 
 struct Settings {
   codegen::Robot robot;        // its CAD and friction are the set parameters phi_s

@@ -4,7 +4,8 @@
 #include <string>
 
 #include "host_sim/data/report/table.hpp"
-#include "host_sim/study/survey/survey.hpp"
+#include "host_sim/study/survey/draws.hpp"
+#include "host_sim/study/survey/sheet.hpp"
 
 namespace armcal::survey {
 

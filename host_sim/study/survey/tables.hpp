@@ -1,4 +1,4 @@
-// survey - Tables 5 to 12 and Figures 1 to 4; each function fills in what it found.
+// survey - fills all of the survey's tables and figures from one robot file: Tables 5 to 12, Figures 1 to 4.
 #pragma once
 
 #include "host_sim/study/survey/draws.hpp"
@@ -43,5 +43,10 @@ void ShowModels(const Settings& settings, const Motions& motions, Findings& out)
 void ShowArm(const Settings& settings, Findings& out);
 // Where the survey slips, and what was done about it.
 Sheet Slips();
+
+// Searches the trajectories and fills every table asked for, printed figures beside ours. Stops early, with what it
+// has, when settings.stop is set. io::InputError: a robot without motion within its limits, measured logs that cannot
+// be read.
+Findings RunSurvey(const Settings& settings);
 
 }  // namespace armcal::survey

@@ -8,7 +8,6 @@
 #include <Eigen/SVD>
 #include <cmath>
 
-#include "host_sim/identify/excitation/objective.hpp"
 #include "host_sim/identify/excitation/optimise.hpp"
 #include "host_sim/identify/excitation/peaks.hpp"
 #include "host_sim/identify/excitation/target.hpp"

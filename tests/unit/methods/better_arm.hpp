@@ -4,10 +4,10 @@
 #include <Eigen/Eigenvalues>
 #include <random>
 
-#include "host_sim/identify/methods/better_methods.hpp"
 #include "host_sim/identify/methods/closed_loop.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
 #include "host_sim/identify/methods/method.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::tests {

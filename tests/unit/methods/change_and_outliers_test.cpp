@@ -1,8 +1,8 @@
 // calibration tests - friction that changes, outliers, ripple: multiple model, robust weights, parallel decimation.
 #include <gtest/gtest.h>
 
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/parallel_decimation.hpp"
+#include "host_sim/identify/methods/prefilter.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/methods/better_arm.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 

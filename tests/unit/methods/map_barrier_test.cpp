@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/methods/better_arm.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 

@@ -6,8 +6,7 @@
 #include <Eigen/LU>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/online_filter.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 
 namespace armcal::tests {

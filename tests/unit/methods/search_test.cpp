@@ -5,9 +5,8 @@
 #include <random>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/objective.hpp"
-#include "host_sim/identify/methods/search_space.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/search_problem.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 
 namespace armcal::tests {

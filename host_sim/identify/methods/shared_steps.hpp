@@ -1,5 +1,4 @@
-// methods - what gradient-like methods share: the model about an estimate, its regularised solution, the
-// read-out; knows no single method.
+// methods - the steps that several methods share: linearise the model, solve with a prior, read out the bodies.
 #pragma once
 
 #include "host_sim/identify/methods/method.hpp"
@@ -38,5 +37,16 @@ double CpuSeconds();
 
 // Fills bodies (unless there are some), physical, from_prior, seconds since `began`.
 void Finish(const Problem& problem, double began, Solution& solution);
+
+// InputError unless every nonlinear parameter is held (its range is a point).
+void ExpectLinear(const Problem& problem, const char* method);
+
+// Column c of joint j reads a nonlinear parameter.
+bool Varies(const codegen::Model& model, int joint, int column);
+
+// The bodies of smallest norm that give the filter coordinates of z: B^+ p. With independent columns as with all
+// columns this is what the pseudo-inverse over all columns gives, because (A B)^+ = B^+ A^+ where A has full column
+// and B full row rank.
+Eigen::VectorXd SmallestBodies(const codegen::Model& model, const Eigen::VectorXd& z);
 
 }  // namespace armcal::calibration

@@ -1,8 +1,7 @@
 // survey - the order of the tables; what each needs is computed once.
-#include "host_sim/study/survey/survey.hpp"
+#include "host_sim/study/survey/tables.hpp"
 
 #include "host_sim/study/survey/platform.hpp"
-#include "host_sim/study/survey/tables.hpp"
 
 namespace armcal::survey {
 

@@ -16,8 +16,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-// y = [bodies about origins, x]: the data's part in y is linear-quadratic where it is in x, and d y / d t is block
-// diagonal. t = [bodies about centres, x]; x's rigid places are unused in both. u: free entries of t in prior units.
+// Three sets of coordinates. t = [bodies about centres, x] is the table's. y = [bodies about origins, x]: the data term
+// is quadratic in y where it is in x, and d y / d t is block diagonal. x's rigid places are unused in both. u holds the
+// free entries of t in units of the prior.
 class TableFit {
  public:
   explicit TableFit(const BarrierProblem& problem)
@@ -304,7 +305,7 @@ VectorXd NearestBody(const VectorXd& estimate, const MatrixXd& information) {
   p[0] = std::max(std::abs(estimate[0]), 1e-6);
   p[4] = p[7] = p[9] = p[0] * kStartRadius_m * kStartRadius_m;
   const Barrier barrier(estimate, information);
-  // From where the barrier weighs as much as the data down to where it hardly does: Newton's steps stay few all along.
+  // The barrier first weighs as much as the data, and in the end hardly anything: so few Newton steps are needed.
   double eps = std::max(1.0, barrier.Cost(p, 0));
   while (eps > kWeight) {
     Descend(barrier, eps, p);

@@ -28,11 +28,11 @@ struct BarrierProblem {
   const codegen::Model* model = nullptr;
   Eigen::VectorXd bodies;        // [11 n] prior mean about link origins, physical
   Eigen::VectorXd bodies_sd;     // [11 n] of (m, c, I about the centre, rotor); 0: held
-  Eigen::VectorXd x, x_sd;       // [x] prior of the coordinates that are no rigid ones; sd 0: held, infinite: no prior
+  Eigen::VectorXd x, x_sd;       // [x] prior of the coordinates that are not rigid; sd 0: held, infinite: no prior
   Eigen::VectorXd lower, upper;  // [x] or empty: a step ends there
   // derivatives = false: cost alone is read.
   std::function<DataTerm(const Eigen::VectorXd& x, bool derivatives)> data;
-  bool quadratic = true;  // the data term is: asked once
+  bool quadratic = true;  // the data term is quadratic; it is then asked once
   const std::atomic<bool>* stop = nullptr;
 };
 
@@ -47,15 +47,18 @@ struct BarrierFit {
 
 BarrierFit FitWithBarrier(const BarrierProblem& problem);
 
-// Throws io::InputError naming the first link of the robot file that cannot exist; or if it has prior = "none".
+// Throws io::InputError if a link of the robot file cannot exist (names the first), or if it has prior = "none".
 void RequirePhysicalPrior(const codegen::Model& model);
 
-// Minimum over p = (m, m c, I about the origin) of (p - estimate)' information (p - estimate) / 2 - eps / 2 logdet
-// J(p), eps falling to 0.01, J the 4x4 pseudo-inertia (Wensing, Kim, Slotine 2018). Both parts are convex, so Newton's
-// method with step halving finds it from any body; information: positive definite.
+// The body that can exist nearest to an estimate that perhaps cannot. With p = (m, m c, I about the origin) it
+// minimises
+//   (p - estimate)' information (p - estimate) / 2 - eps / 2 logdet J(p)
+// with eps falling to 0.01. Both parts are convex, so Newton's method with step halving finds the minimum from any
+// body. information: positive definite.
 Eigen::VectorXd NearestBody(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& information);
 
-// The ten parameters of a body in a frame -> in the frame in which that one has this pose [4x4]: a linear map, 10 x 10.
+// The linear map [10 x 10] of a body's ten parameters from one frame to another. pose [4x4]: of the first frame in the
+// second.
 Eigen::MatrixXd BodyMap(const Eigen::Matrix4d& pose);
 
 }  // namespace armcal::calibration

@@ -9,10 +9,10 @@
 namespace armcal::calibration {
 
 namespace {
-constexpr double kUnscored_s = 0.5;  // design: the first and last half second of a log are not scored
+constexpr double kUnscored_s = 0.5;  // the first and last half second of a log are not scored
 constexpr int kFlagSaturated = 2, kFlagStale = 4;
-// A joint that has just stopped or is about to turn may stick while its smoothed speed is already above v_min: rows
-// this close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
+// A joint that has just stopped or is about to turn may stick although its smoothed speed is above v_min. So rows this
+// close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
 constexpr int kTurn = 2;
 constexpr int kPoses = 8;  // at a single one an entry of the mass matrix may vanish
 // Signals and masks for given inertias.
@@ -39,7 +39,7 @@ Dataset Derive(const codegen::Model& model, const logs::Log& log, const Eigen::M
       if (d.s.qd(m, j) * d.s.qd(k, j) <= 0 || std::abs(d.s.qd(m, j)) <= model.robot().joint[j].v_min_radps) return true;
     return false;
   };
-  // A sign law that is smooth over more than v_min says that the joint does not stick: its friction is a function of
+  // A sign law that is smooth over more than v_min says that the joint does not stick. Then friction is a function of
   // speed at rest and near a turn, too.
   const auto sticks = [&robot = model.robot()](int j) {
     return robot.sign_law != "tanh" || robot.joint[j].v_min_radps > robot.sign_width_radps;
@@ -60,7 +60,8 @@ Dataset Derive(const codegen::Model& model, const logs::Log& log, const Eigen::M
 
 Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& base) {
   const int n = model.joints(), per_pose = n + 1;
-  codegen::Signals s;  // unit accelerations, one joint a sample, at each pose; the last sample, at rest, is gravity
+  codegen::Signals
+      s;  // at each pose: a unit acceleration of one joint a sample, then a sample at rest, which is gravity
   s.q.resize(kPoses * per_pose, n), s.qd.setZero(kPoses * per_pose, n), s.qdd = s.qd;
   for (int pose = 0; pose < kPoses; ++pose)
     for (int j = 0; j < n; ++j) {
@@ -94,7 +95,8 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
     for (int k = 0; k < bodies.size(); ++k) bodies[k] = model.table()[k].mean;
     inertia = TypicalMass(model, model.base_map() * bodies);
   } else {
-    // A joint's torque limit over its acceleration limit is a heavy guess: a low cut-off, good enough for a first fit.
+    // A joint's torque limit over its acceleration limit is a heavy guess. It gives a low cut-off, which is good enough
+    // for a first fit.
     for (int j = 0; j < n; ++j)
       inertia(j, j) = model.robot().joint[j].torque_limit_Nm / model.robot().joint[j].acceleration_limit_radps2;
     const Dataset rough = Derive(model, log, inertia, {});

@@ -24,7 +24,7 @@ struct Dataset {
   int joints() const { return static_cast<int>(tau.cols()); }
 };
 
-// A chosen cut-off depends on the arm's inertia: from the prior, or, without one, from a first fit of this very log.
+// The cut-off depends on the arm's inertia. That comes from the prior or, without one, from a first fit of this log.
 Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::Bandwidth& bandwidth = {});
 
 // RMS over some poses of each entry of the mass matrix [n x n], for given base parameters.
@@ -38,9 +38,9 @@ std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& da
 
 std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data);
 
-// The same log with position, speed and acceleration of delay_s before each torque sample (cubic between samples, held
-// at the ends): what a torque that is read late belongs to. A row stays in use if those that its motion is read between
-// are.
+// The same log for a torque that is read late: position, speed and acceleration are those of delay_s before each torque
+// sample, cubic between samples and held at the ends. A row stays in use if the rows are in use between which its
+// motion is read.
 Dataset Delayed(const Dataset& data, double delay_s);
 
 }  // namespace armcal::calibration

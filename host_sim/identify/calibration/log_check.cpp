@@ -14,12 +14,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kShortest_s = 3;         // one is lost at the ends; less than two cannot be fitted and judged
-constexpr double kMissingShare = 0.1;     // of the samples
-constexpr double kOutside = 0.5;          // of a joint's range, beyond it: limits may be soft, not that soft
-constexpr double kOverTorque = 3;         // times the limit; peaks above the rated torque are normal, this is not
-constexpr double kJumpSpeed = 3;          // times the speed limit between two samples
-constexpr double kStopAcceleration = 20;  // times the acceleration limit: no motor stops a joint so
+constexpr double kShortest_s = 3;      // a second is lost at the ends, and two are needed to fit and judge
+constexpr double kMissingShare = 0.1;  // of the samples
+constexpr double kOutside = 0.5;   // of a joint's range: how far a position may lie beyond it, since limits may be soft
+constexpr double kOverTorque = 3;  // times the limit; smaller peaks above the rated torque are normal
+constexpr double kJumpSpeed = 3;   // times the speed limit between two samples
+constexpr double kStopAcceleration = 20;  // times the acceleration limit: no motor stops a joint that fast
 constexpr double kHeld_s = 0.1, kSilent_s = 0.5;
 constexpr double kDegPerRad = 57.29577951308232;
 
@@ -29,8 +29,8 @@ constexpr double kDegPerRad = 57.29577951308232;
 
 std::string Joint(int j) { return fmt::format("joint {}: ", j + 1); }
 
-// At a gap in time the joints have moved on by as many samples as are missing; if they have moved on by one, the clock
-// jumped.
+// At a true gap in time the joints move on by as many samples as are missing. If they move on by one sample only, the
+// clock jumped.
 void CheckClock(const logs::Log& log) {
   const double step = log.step_s();
   for (const int k : log.gaps) {
@@ -39,7 +39,7 @@ void CheckClock(const logs::Log& log) {
     const VectorXd before = (log.q.row(k) - log.q.row(k - 5)) / 5, after = (log.q.row(k + 6) - log.q.row(k + 1)) / 5;
     const VectorXd speed = 0.5 * (before + after), moved = log.q.row(k + 1) - log.q.row(k);
     const double bend = (after - before).norm();
-    if (speed.norm() < 1e-6 || bend > 0.5 * speed.norm()) continue;  // too slow or turning: nothing to tell it by
+    if (speed.norm() < 1e-6 || bend > 0.5 * speed.norm()) continue;  // too slow or turning: the motion does not tell
     const double passed = moved.dot(speed) / speed.squaredNorm();
     if (passed > 0.5 * (1 + std::min(steps, 5.0))) continue;
     Fail(log,
@@ -145,8 +145,8 @@ constexpr int kRows = 600;        // of a log: enough to tell columns apart
 constexpr double kExchanged = 2;  // by how much an exchange of two columns must cut the sum of log residual variances
 constexpr double kScale = 20;     // a torque this much larger or smaller than the bodies need is in another unit
 constexpr double kTelling =
-    0.5;  // of a torque without friction must be explained by the bodies before its scale is judged
-constexpr double kTiny = 0.01;  // of the torque limit: what the bodies need of less, a cable may need, too
+    0.5;  // share of the torque without friction that the bodies must explain before its scale is judged
+constexpr double kTiny = 0.01;  // of the torque limit: a cable may need as much
 
 struct Match {
   double log_left = 0;  // log of the share of variance left

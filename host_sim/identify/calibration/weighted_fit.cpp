@@ -48,7 +48,8 @@ VectorXd SolveWithPrior(const Information& info, const VectorXd& weight, const P
   VectorXd step(a);
   MatrixXd P(a, a);
   if (prior.informative) {
-    // x = S z with P0 = S C S: (S H S + C^-1) z = S g, written as C^(1/2) so that a singular prior does no harm.
+    // x = S z with P0 = S C S: (S H S + C^-1) z = S g. It is solved with C^(1/2), so that a singular prior does no
+    // harm.
     const MatrixXd P0 = Pick(prior.covariance, active);
     scale = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
     const MatrixXd C = scale.cwiseInverse().asDiagonal() * P0 * scale.cwiseInverse().asDiagonal();
@@ -107,7 +108,7 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
   fit.sigma.resize(n);
   for (int j = 0; j < n; ++j) fit.sigma[j] = model.robot().joint[j].torque_noise_Nm;
   fit.inflation = VectorXd::Ones(n);
-  // The first pass has no estimate to take gain columns at; the weights settle within three.
+  // The first pass has no estimate at which to take the gain columns. The weights settle within three passes.
   for (fit.iterations = 1; fit.iterations <= 4; ++fit.iterations) {
     fit.information = Information(n, columns + n);
     for (const Dataset* d : data) fit.information += Accumulate(model, *d, fit.x.head(columns), fit.eta);
@@ -126,7 +127,7 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
   }
   const VectorXd weight = (fit.sigma.cwiseAbs2().cwiseProduct(fit.inflation)).cwiseInverse();
   SolveWithPrior(fit.information, weight, prior, fit.active,
-                 &fit.covariance);  // what the data determine, honestly weighted
+                 &fit.covariance);  // the covariance under weights that count residuals which are not white
   fit.sd = fit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   fit.prior_sd = prior.covariance.diagonal().cwiseSqrt();
   if (!prior.informative) fit.prior_sd.setConstant(std::numeric_limits<double>::infinity());

@@ -24,8 +24,9 @@ struct Fit {
   double ratio(int c) const { return prior_sd[c] > 0 ? sd[c] / prior_sd[c] : 1; }
 };
 
-// Iterates: weights from the residuals, gain and estimate-dependent columns from the estimate. `held`: coordinates kept
-// at the prior mean. Directions that no data and no prior determine stay at the prior mean.
+// Iterates: the weights come from the residuals, the gain columns and those that depend on the estimate from the
+// estimate. `held`: coordinates kept at the prior mean. Directions that neither data nor prior determine stay there,
+// too.
 Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& data,
                 const std::vector<int>& held = {});
 
@@ -33,8 +34,8 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
 Eigen::VectorXd SolveWithPrior(const Information& info, const Eigen::VectorXd& weight, const Prior& prior,
                                const std::vector<int>& active, Eigen::MatrixXd* covariance);
 
-// 1 + 2 sum of autocorrelations up to the first negative one: what a sum over these residuals varies more than over
-// white ones.
+// How much more a sum over these residuals varies than one over white residuals: 1 + 2 times the sum of the
+// autocorrelations up to the first negative one.
 double VarianceInflation(const Eigen::VectorXd& residual, const Eigen::VectorXi& used);
 
 struct PhysicalReadOut {

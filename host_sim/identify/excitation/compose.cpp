@@ -14,15 +14,16 @@ namespace armcal::excitation {
 namespace {
 
 constexpr double kShortest_s = 0.5, kLongest_s = 20, kGrowth = 1.15;
-constexpr int kCheckPoints = 200;  // a polynomial of degree 5: its peaks between these differ by less than 1e-3
+constexpr int kCheckPoints =
+    200;  // the peaks of a polynomial of degree 5 between these points differ by less than 1e-3
 
 bool Keeps(const Observation& observation, const Blend& blend, double share) {
   const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(kCheckPoints, 0, blend.duration_s());
   return Keeps(FindPeaks(observation, blend.At(t)), share);
 }
 
-// Where a joint rests before (direction -1) or after (+1) a blend of this duration from or to the state: the average of
-// zero and its speed, for the duration; kept inside the position limits.
+// Where a joint rests before (direction -1) or after (+1) a blend of this duration from or to the state. It moves at
+// the average of zero and its speed for the duration. The place is kept inside the position limits.
 State RestNear(const codegen::Robot& robot, const State& moving, double direction, double duration_s, double share) {
   Eigen::VectorXd q = moving.q + direction * duration_s / 2 * moving.qd;
   for (int j = 0; j < robot.joints(); ++j) {
@@ -48,7 +49,7 @@ Blend::Blend(const State& from, const State& to, double duration_s)
     : duration_s_(duration_s), power_(from.q.size(), 6) {
   const double T = duration_s;
   const Eigen::VectorXd v0 = T * from.qd, a0 = T * T * from.qdd, a1 = T * T * to.qdd;
-  // What the end still needs beyond the start's parabola, in position, speed and acceleration.
+  // The difference between the end and the start's parabola there, in position, speed and acceleration.
   const Eigen::VectorXd q = to.q - from.q - v0 - a0 / 2, v = T * to.qd - v0 - a0, a = a1 - a0;
   power_ << from.q, v0, a0 / 2, 10 * q - 4 * v + a / 2, -15 * q + 7 * v - a, 6 * q - 3 * v + a / 2;
 }
@@ -98,7 +99,7 @@ constexpr double kSlowest = 3, kReversal = 5;  // times v_min
 constexpr double kFastest = 0.3;               // of the speed limit
 constexpr int kReversals = 8;                  // strokes of the cell of small reversals
 constexpr double kShortestBlend_s = 0.15;      // keeps the jerk of slow strokes small
-constexpr double kAccelerationShare = 0.5;     // of the limit: friction shows best while inertia is quiet
+constexpr double kAccelerationShare = 0.5;     // of the limit: friction shows best while inertia needs little torque
 
 // A smooth step 10 x^3 - 15 x^4 + 6 x^5 rises with a slope of at most 15/8.
 constexpr double kSteepest = 1.875;
@@ -110,7 +111,7 @@ double StepIntegral(double x) {
   return x * x * x * x * (2.5 + x * (x - 3));
 }
 
-// Out into `direction` if the room there allows the reach, else the other way.
+// `direction` if the room there is enough for the reach, else the other one.
 double Toward(double direction, double reach, double room_up, double room_down) {
   return reach <= (direction > 0 ? room_up : room_down) ? direction : -direction;
 }
@@ -140,7 +141,7 @@ SlowMoves::SlowMoves(const codegen::Robot& robot, const Eigen::VectorXd& home, i
     const double middle = (low + high) / 2, half = share * (high - low) / 2;
     const double room_up = middle + half - home[j], room_down = home[j] - middle + half;
     const double acceleration = kAccelerationShare * share * joint.acceleration_limit_radps2;
-    // The change from +v to -v must fit into a quarter of the cell, the way out into the room.
+    // The change from +v to -v must fit into a quarter of the cell, and the way out must fit into the room.
     const double fastest =
         std::min({reach * kFastest * joint.speed_limit_radps, acceleration * kCell_s / 4 / (2 * kSteepest),
                   std::max(room_up, room_down) / (kCell_s / 2)});
@@ -188,7 +189,7 @@ State StateAt(const Series& series, double t_s) {
   return {s.q.row(0), s.qd.row(0), s.qdd.row(0)};
 }
 
-// Instants of the period, those at which the arm is slow and hardly accelerated first.
+// Instants of the period, sorted: first those at which speed and acceleration are small.
 std::vector<double> QuietInstants(const codegen::Robot& robot, const Series& series) {
   constexpr int kInstants = 100;
   const double period = series.period_s;
@@ -210,7 +211,7 @@ std::vector<double> QuietInstants(const codegen::Robot& robot, const Series& ser
   throw io::InputError(observation.model().robot().path + ": " + what);
 }
 
-// In, the periods, out; ends at rest.
+// The blend in, the periods, and the blend out, which ends at rest.
 std::vector<Part> SeriesParts(const Observation& observation, const Series& series, int periods, double share) {
   for (const double begin : QuietInstants(observation.model().robot(), series)) {
     const State state = StateAt(series, begin);
@@ -244,7 +245,7 @@ Part Transfer(const Observation& observation, const std::string& name, const Eig
   return AsPart(name, *blend);
 }
 
-// One point each step_s of the parts in a row; the end pose is added once more where it falls between two points.
+// One point each step_s of the parts in a row. Where the end falls between two points, its pose is added once more.
 Composed OnGrid(const std::vector<Part>& parts, double step_s) {
   Composed composed;
   double end = 0;

@@ -20,7 +20,7 @@ struct State {
 };
 State AtRest(const Eigen::VectorXd& q);
 
-// The polynomial of degree 5 between two states: position, speed and acceleration are met at both ends.
+// The polynomial of degree 5 between two states. It meets position, speed and acceleration at both ends.
 class Blend {
  public:
   Blend(const State& from, const State& to, double duration_s);
@@ -34,15 +34,17 @@ class Blend {
   Eigen::MatrixXd power_;  // [joints x 6], in t / duration
 };
 
-// The shortest blend of those tried (0.5 s to 20 s) whose shares of all limits are at most `share`; none: not found.
+// The shortest blend of those tried (0.5 s to 20 s) whose shares of all limits are at most `share`. Empty: none found.
 std::optional<Blend> ShortestBlend(const Observation& observation, const State& from, const State& to, double share);
 
-// The same with one end at rest wherever suits: half way of the moving end's speed ahead, inside the position limits.
+// The same with one end at rest. The place of rest is where the moving end's speed, falling to zero, leads; it is kept
+// inside the position limits.
 std::optional<Blend> ShortestStart(const Observation& observation, const State& to, double share);
 std::optional<Blend> ShortestStop(const Observation& observation, const State& from, double share);
 
-// One joint out and back, `strokes` times (even): from rest at home, at constant speed +v, -v, .., to rest at home.
-// Speed changes are quintic, so the acceleration is continuous.
+// Slow strokes of one joint. They show friction near standstill (Stribeck, presliding, backlash), which a Fourier
+// series hardly does. The joint starts at rest at home, moves at constant speed +v, -v, .., and ends at rest at home.
+// `strokes` is even. Speed changes are quintic, so the acceleration is continuous.
 class Strokes {
  public:
   // speed: signed; blend_s: duration of each change of speed, at most (duration_s - blend_s) / strokes.
@@ -56,13 +58,13 @@ class Strokes {
   int strokes_;
 };
 
-// Cells of equal duration, one after the other; every joint runs through the same kinds of cells, each joint from
-// another one on, so that the arm's joints move at different speeds at any time.
+// Cells of equal duration, one after the other. Every joint runs through the same kinds of cells, but each starts with
+// another one. So the joints move at different speeds at any time.
 class SlowMoves {
  public:
-  // home: where every cell starts and ends. speeds: cells at constant speed, logarithmically from 3 v_min to 0.3 of the
-  // speed limit times `reach` (0..1), less where position or acceleration limits, used up to `share`, leave no room;
-  // one more cell is small reversals at 5 v_min.
+  // home: where every cell starts and ends. speeds: the number of cells at constant speed. These speeds are spaced
+  // logarithmically from 3 v_min to 0.3 of the speed limit times `reach` (0..1); they are lower where position or
+  // acceleration limits, used up to `share`, leave no room. One more cell has small reversals at 5 v_min.
   SlowMoves(const codegen::Robot& robot, const Eigen::VectorXd& home, int speeds, double share, double reach);
 
   double duration_s() const;
@@ -91,7 +93,8 @@ struct Composed {
   std::vector<JointPeaks> peaks;  // of the spline through the trajectory, on the check grid
 };
 
-// Starts and ends at rest in the same pose, so that it may be repeated. The series is entered where it is slowest.
+// The trajectory starts and ends at rest in the same pose, so it may be repeated. The series is entered where it is
+// slowest.
 // InputError: no blend or slow part within the limits.
 Composed Compose(const Observation& observation, const Series& series, const ComposeSettings& settings);
 

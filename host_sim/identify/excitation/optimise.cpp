@@ -15,7 +15,8 @@ namespace armcal::excitation {
 
 namespace {
 
-constexpr double kPenalty = 100;  // per sample and unit of squared excess: 1 % too far costs what 1 % of cond gains
+constexpr double kPenalty =
+    100;  // per sample and unit of squared excess: 1 % too far costs as much as 1 % of cond gains
 constexpr double kRelativeShift = 1e-7;  // of a joint's limit, for the derivative of the regressor by its state
 
 // kPenalty * excess^2 of |x - middle| / half over `share`; adds the derivative by x.
@@ -132,8 +133,8 @@ double Objective::operator()(const Eigen::VectorXd& u, Eigen::VectorXd& gradient
   if (!std::isfinite(figure)) return figure;
   const double value = figure + Penalties(s, adjoint) + TorquePenalty(d_torque);
 
-  // Each state variable moves the rows of its own sample only: value's derivative by the rows, times the rows'
-  // quotient.
+  // A state variable changes the rows of its own sample only. So the derivative is that of the value by the rows, times
+  // the difference quotient of the rows.
   for (int i = 0; i < n; ++i) {
     const auto here = row_[i].topRows(samples);
     const Eigen::MatrixXd d_row =
@@ -167,8 +168,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kRange = 2;  // of the genes, in units of u: beyond, some limit is passed
-constexpr int kTries = 50;    // starts without a series within the limits, when time is up, before giving up
+constexpr double kRange = 2;  // of the genes, in units of u: beyond it some limit is passed
+constexpr int kTries = 50;    // starts without a series within the limits before it gives up, when time is up
 
 Eigen::VectorXd RandomStart(int size, std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -185,7 +186,7 @@ std::uint64_t StartSeed(std::uint64_t seed, int start) {
   return (static_cast<std::uint64_t>(word[1]) << 32) | word[0];
 }
 
-// The best series so far; equal ones in favour of the earlier start, so that threads do not decide.
+// The best series so far. Of equal ones the earlier start wins, so that the order of threads does not matter.
 class Best {
  public:
   Best() { found_.figure = std::numeric_limits<double>::infinity(); }
@@ -256,7 +257,7 @@ Optimum Optimise(const Observation& observation, const OptimiseSettings& setting
 
   search::InParallel(settings.threads, settings.threads, [&](int) {
     Objective objective(observation, settings.criterion, settings.shape, 1 - settings.margin);
-    // Out of time, starts are still scaled to the limits until one keeps them: there is an answer whatever the time.
+    // When time is up, starts are still scaled to the limits until one keeps them, so there is always an answer.
     for (int start; (start = next++) < settings.starts && (!stop() || (start < kTries && best.empty()));) {
       Series series = objective.Series(SearchFrom(objective, settings.search, StartSeed(settings.seed, start), stop));
       if (ScaleToLimits(observation, 1 - settings.margin, series))

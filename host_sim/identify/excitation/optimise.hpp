@@ -17,11 +17,12 @@ struct SeriesShape {
   Family family = Family::kFourier;
   double period_s = 10;  // as in the survey
   int terms = 10;        // coefficients a joint beside its offset; kFourier: two a harmonic
-  int samples = 80;      // of one period, at which K is looked at; a model with exponentials needs 250 or more
+  int samples = 80;      // of one period, at which K is evaluated; a model with exponentials needs 250 or more
 };
 
-// Unknowns u: the series' coefficients, joint after joint, in units of what the joint's limits allow (order 1).
-// It keeps its working memory: one objective a thread.
+// What a series is searched for: a criterion of K, and penalties on the limits, with gradient. The unknowns u are the
+// series' coefficients, joint after joint, in units of what the joint's limits allow (order 1). The object keeps its
+// working memory: one a thread.
 class Objective {
  public:
   // share: how much of each limit may be used (1 - margin). The observation must outlive the objective.
@@ -54,12 +55,12 @@ class Objective {
   Eigen::MatrixXd basis_[3];     // derivative 0, 1, 2
   Eigen::MatrixXd unit_, zero_;  // coefficient = zero + unit * u, [terms + 1 x joints]
   codegen::Signals perturbed_;
-  std::vector<Eigen::MatrixXd> row_;  // of the perturbed motion; the first `samples` rows are the motion's own
+  std::vector<Eigen::MatrixXd> row_;  // of the perturbed motion; the first `samples` rows belong to the motion itself
 };
 
 enum class Search {
   kGradient,  // local searches from random series
-  kGenetic    // the survey's genetic algorithm, again and again
+  kGenetic    // the survey's genetic algorithm, repeated
 };
 
 struct OptimiseSettings {
@@ -69,7 +70,7 @@ struct OptimiseSettings {
   double margin = 0.05;  // of every limit, kept free
   double seconds = 20;   // of wall clock
   int starts =
-      std::numeric_limits<int>::max();  // random starts at most: with time enough the result follows from the seed
+      std::numeric_limits<int>::max();  // random starts at most; given enough time, the seed decides the result
   int threads = 2;
   std::uint64_t seed = 1;
   const std::atomic<bool>* stop = nullptr;  // set: return the best so far

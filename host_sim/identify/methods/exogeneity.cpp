@@ -31,12 +31,12 @@ struct JointRows {
 };
 
 constexpr int kOrder = 10;            // of the residual's autoregressive model
-constexpr int kRounds = 2;            // of fitting it anew
-constexpr double kSameColumn = 1e-5;  // share of a column's norm below which a direction of the columns repeats others
-constexpr double kNegligible = 1e-3;  // ... of what instruments leave: noise so small biases by its square
-constexpr double kTold = 0.1;         // share of such a direction that must lie outside the columns: below, instruments
-                                      // explain so little of it that nothing can be said
-constexpr double kExact = 1e-8;       // share of the torque: a residual this small is rounding, no error
+constexpr int kRounds = 2;            // in which it is fitted again
+constexpr double kSameColumn = 1e-5;  // share of a column's norm: a shorter direction repeats others
+constexpr double kNegligible = 1e-3;  // the same for what instruments leave: so small a noise biases by its square
+constexpr double kTold = 0.1;         // share of such a direction that must lie outside the columns; below, instruments
+                                      // explain too little of it
+constexpr double kExact = 1e-8;       // share of the torque: a smaller residual is rounding
 constexpr double kRowsPerColumn = 3;
 
 MatrixXd UnitColumns(const MatrixXd& M) {
@@ -52,7 +52,8 @@ MatrixXd Directions(const MatrixXd& M, double floor) {
               eigen.eigenvalues().tail(keep).cwiseSqrt().cwiseInverse().asDiagonal());
 }
 
-// What the directions Q do not explain of Y; twice, since those of a long Gram matrix are orthogonal to six digits.
+// What the directions Q do not explain of Y. It is taken off twice, since directions from a long Gram matrix are
+// orthogonal to six digits only.
 MatrixXd Outside(const MatrixXd& Q, const MatrixXd& Y) {
   const MatrixXd once = Y - Q * (Q.transpose() * Y);
   return once - Q * (Q.transpose() * once);
@@ -104,8 +105,8 @@ struct LeastSquares {
   double explained;  // of the last column's squares
 };
 
-// tau = X x + V g + e with V what Z leaves of X, whitened: F and p of g = 0, and by what x differs without V.
-// `exogenous` is not judged.
+// tau = X x + V g + e, whitened; V is what Z leaves of X. Gives F and p of g = 0, and how much x differs without V.
+// Leaves `exogenous` as it is.
 JointExogeneity AugmentedRegression(const JointRows& rows) {
   JointExogeneity out;
   const MatrixXd scaled = UnitColumns(rows.X), X = Directions(scaled, kSameColumn);
@@ -119,8 +120,8 @@ JointExogeneity AugmentedRegression(const JointRows& rows) {
   const auto samples = static_cast<double>(residual.size());
   out.left_Nm = residual.norm() / std::sqrt(samples);
   if (residual.norm() <= kExact * rows.tau.norm()) return out;
-  // Least squares takes slow noise for slow columns, so that its residual looks faster than the noise is; the whitened
-  // rows' solution does not (Cochrane and Orcutt).
+  // Least squares takes slow noise for slow columns, so its residual looks faster than the noise is. The solution of
+  // the whitened rows does not (Cochrane and Orcutt).
   VectorXd a = Autoregression(residual, rows.pieces);
   for (int round = 0; round < kRounds; ++round) {
     const MatrixXd white = Whiten(plain_part, a, rows.pieces);
@@ -144,9 +145,9 @@ JointExogeneity AugmentedRegression(const JointRows& rows) {
 }
 
 constexpr double kLevel = 0.05;
-constexpr double kMatters = 0.05;   // bias over residual; with rows enough any test finds less than any use would
+constexpr double kMatters = 0.05;   // bias over residual; with enough rows a test finds biases that do not matter
 constexpr double kSmoothed = 0.2;   // of the bandwidth
-constexpr double kEnough_Hz = 100;  // of rows: motion and its noise lie below 60 Hz, and rows cost
+constexpr double kEnough_Hz = 100;  // of rows: motion and its noise lie below 60 Hz, and rows take time
 
 std::vector<int> Present(const codegen::Model& model, int joint) {
   std::vector<int> present;
@@ -167,7 +168,7 @@ void JudgeByHolm(std::vector<JointExogeneity>& joint) {
 
 double Rate_Hz(const Dataset& d) { return (d.samples() - 1) / (d.s.t[d.samples() - 1] - d.s.t[0]); }
 
-// Every m-th sample; used where all m are.
+// Every m-th sample. It is used if all m samples are.
 Dataset Thinned(const Dataset& d, int m) {
   Dataset out = d;
   const auto rows = Eigen::seqN(0, d.samples() / m, m);
@@ -179,7 +180,7 @@ Dataset Thinned(const Dataset& d, int m) {
   return out;
 }
 
-// Joint's used rows of one log, below those that are there.
+// Adds a joint's used rows of one log below those that are there.
 void AddRows(const Dataset& data, const MatrixXd& measured, const MatrixXd& instrument, const std::vector<int>& columns,
              int joint, JointRows& rows) {
   std::vector<int> used;
@@ -218,7 +219,7 @@ Exogeneity TestExogeneity(const codegen::Model& model, const std::vector<const D
   const std::span<const double> eta{z.data() + model.columns(), static_cast<std::size_t>(model.nonlinear())};
   std::vector<JointRows> rows(static_cast<std::size_t>(model.joints()));
   for (std::size_t l = 0; l < data.size(); ++l) {
-    // What remembers the samples before has to see them all.
+    // An effect with memory has to see every sample.
     const int every = model.states() > 0 ? 1 : std::max(1, static_cast<int>(Rate_Hz(*data[l]) / kEnough_Hz));
     const Dataset log = Thinned(*data[l], every);
     std::vector<MatrixXd> measured, instrument;
@@ -270,7 +271,7 @@ std::vector<Dataset> Simulated(const codegen::Model& model, const std::vector<Da
     problem.closed_loop = MakeClosedLoop(model, reference);
     return SimulatedInstruments(problem, z);
   } catch (const io::InputError&) {
-    return {};  // the reference itself serves, too
+    return {};  // then the reference itself serves
   }
 }
 

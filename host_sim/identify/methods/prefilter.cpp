@@ -132,7 +132,7 @@ Linearised FilteredRows(const Problem& problem, const VectorXd& z, const Decimat
     for (int j = 0; j < log->joints(); ++j) {
       for (Eigen::Index c = 0; c < all[j].cols(); ++c)
         if (!all[j].col(c).isZero(0)) all[j].col(c) = logs::ZeroPhaseLowPass(all[j].col(c), cutoff, rate);
-      // White noise behind the filter: its share of the band below half the sample rate.
+      // The filter leaves of white noise its share of the band below half the sample rate.
       const double sigma = problem.sigma_Nm[j] * std::sqrt(std::min(1.0, 2 * cutoff / rate));
       for (int k = 0; k < samples; k += every) {
         const int a = std::max(0, k - reach), b = std::min(samples - 1, k + reach);

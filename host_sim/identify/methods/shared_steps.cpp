@@ -93,7 +93,8 @@ void Finish(const Problem& problem, double began, Solution& solution) {
                           ? ReadOutBodies(model, solution.z.segment(model.front(), model.rigid()))
                           : SmallestBodies(model, solution.z);
   solution.physical = solution.bodies.size() > 0 && solution.bodies.allFinite() && IsPhysical(solution.bodies);
-  // Information is 1 / variance: the prior's share of a coordinate's is posterior variance over prior variance.
+  // Information is 1 / variance. So the prior's share of a coordinate's information is posterior variance over prior
+  // variance.
   double share = 0;
   int count = 0;
   if (problem.covariance.size() > 0 && solution.covariance.size() > 0)

@@ -14,7 +14,7 @@ namespace armcal::search {
 namespace {
 
 constexpr std::size_t kMemory = 12;   // pairs kept
-constexpr int kWindow = 20;           // steps over which too small a gain means: done
+constexpr int kWindow = 20;           // steps; too small a gain over them ends the search
 constexpr double kSufficient = 1e-4;  // Armijo's constant
 
 struct Pair {
@@ -61,7 +61,7 @@ double Minimise(const Differentiable& function, const MinimiseSettings& settings
     }
     if (!found) {
       if (pairs.empty()) break;
-      pairs.clear();  // a kink: start again along the steepest descent
+      pairs.clear();  // a kink: starts again along the steepest descent
       continue;
     }
     Pair pair{next - x, next_gradient - gradient, 0};

@@ -16,8 +16,8 @@ struct MinimiseSettings {
   std::function<bool()> stop;  // asked before every step
 };
 
-// Improves x in place, never to a worse value; returns the value. Nocedal & Wright, Numerical Optimization,
-// algorithm 7.5, with backtracking: a pair whose curvature is not positive is left out.
+// Limited-memory BFGS. Improves x in place and never makes it worse; returns the value. Nocedal & Wright, Numerical
+// Optimization, algorithm 7.5, with backtracking. A pair whose curvature is not positive is left out.
 double Minimise(const Differentiable& function, const MinimiseSettings& settings, Eigen::VectorXd& x);
 
 struct GeneticSettings {
@@ -35,7 +35,8 @@ struct GeneticResult {
   double last_tenth_gain = 0;  // share by which the last tenth of the generations lowered the value
 };
 
-// value: called by one thread; may return infinity.
+// pagmo's simple genetic algorithm: tournament, simulated binary crossover, polynomial mutation; the best of parents
+// and children live on. value: called by one thread; may return infinity.
 GeneticResult MinimiseGenetic(const std::function<double(const Eigen::VectorXd& x)>& value, int size,
                               const GeneticSettings& settings);
 

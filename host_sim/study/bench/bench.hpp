@@ -61,16 +61,16 @@ std::vector<Input<T>> RandomInputs(int count, unsigned seed) {
   return inputs;
 }
 
-constexpr double kBlock_ns = 5e5;  // shorter blocks feel the clock's own cost
+constexpr double kBlock_ns = 5e5;  // in shorter blocks the clock's own cost counts
 
-// Wall time would count what else the machine does.
+// CPU time, because wall time also counts what else the machine does.
 inline double CpuTime_ns() {
   timespec t;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
   return 1e9 * static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_nsec);
 }
 
-// What the compiler must take as read and written here.
+// Makes the compiler assume that the memory is read and written here.
 inline void Touch(const void* p) { asm volatile("" : : "g"(p) : "memory"); }
 
 struct Work {
@@ -88,7 +88,7 @@ struct Work {
   double median_ns() const { return quantile(0.5); }
 };
 
-// Times `blocks` blocks of each work in turn, so that what the machine does meanwhile falls on all of them alike.
+// Times `blocks` blocks of each work in turn, so that other load of the machine affects all of them alike.
 inline void Measure(std::vector<Work*> works, int blocks) {
   const auto time_ns = [](const Work& w) {
     const double start = CpuTime_ns();
@@ -113,7 +113,7 @@ int Columns();  // filter coordinates
 
 // Each returns the estimate, weight 1 for every row.
 Eigen::VectorXd FusedGram(const Log& log);
-// stored: [samples x joints rows x columns] and its torque, made anew by MakeStored.
+// stored: [samples x joints rows x columns]; right: its torque. MakeStored makes both again at each call.
 void MakeStored(const Log& log, Eigen::MatrixXd& stored, Eigen::VectorXd& right);
 Eigen::VectorXd StoredNormal(const Eigen::MatrixXd& stored, const Eigen::VectorXd& right);
 Eigen::VectorXd StoredHouseholder(Eigen::MatrixXd& stored, const Eigen::VectorXd& right);  // overwrites stored

@@ -1,7 +1,7 @@
-// bench - compares the generated model with yardsticks inside this one program; knows the model compiled in, no files.
+// bench - compares the generated model with yardsticks in one program. The model is compiled in; no file is read.
 //
 //   armcal-bench-ROBOT [--quick] GX GY GZ {ALPHA A D THETA PRISMATIC}...      prints JSON
-// All of it is compiled with the same flags (-O3 -march=native); armcal bench starts it.
+// All of it is compiled with the same flags (-O3 -march=native). armcal bench starts it.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -17,6 +17,8 @@
 namespace armcal::bench {
 namespace {
 
+// The yardstick is one inverse-dynamics call of Orocos KDL for the same arm.
+
 // One joint as the robot file has it: modified DH (Craig).
 struct JointShape {
   double alpha_rad, a_m, d_m, theta_rad;
@@ -31,8 +33,9 @@ class KdlArm {
     const auto before = [&](unsigned j) {
       return KDL::Frame::DH_Craig1989(joints[j].a_m, joints[j].alpha_rad, joints[j].d_m, joints[j].theta_rad);
     };
-    // KDL's segment is a joint and the tip behind it; DH has the fixed part in front of the joint. So the fixed part of
-    // the next joint is this segment's tip, in which KDL wants the body: no segment more than the arm has joints.
+    // A KDL segment is a joint and the tip behind it. DH has the fixed part in front of the joint. So the fixed part of
+    // the next joint becomes this segment's tip, and the body is given in the tip's frame, as KDL wants it. Then there
+    // are not more segments than joints.
     if (const KDL::Frame first = before(0); !KDL::Equal(first, KDL::Frame::Identity()))
       chain_.addSegment(KDL::Segment(KDL::Joint(KDL::Joint::None), first));
     for (unsigned j = 0; j < n_; ++j) {
@@ -56,7 +59,7 @@ class KdlArm {
     state_.push_back(s);
   }
   std::size_t states() const { return state_.size(); }
-  // What is timed: one call, nothing else.
+  // Only this call is timed.
   [[gnu::noinline]] const KDL::JntArray& Call(std::size_t k) {
     solver_->CartToJnt(state_[k].q, state_[k].qd, state_[k].qdd, none_, torque_);
     return torque_;
@@ -77,7 +80,7 @@ class KdlArm {
 };
 
 using nlohmann::ordered_json;
-constexpr int kInputs = 256;  // more than a branch predictor learns by heart, few enough for the first-level cache
+constexpr int kInputs = 256;  // too many for a branch predictor to learn, few enough for the first-level cache
 
 template <class T>
 Work RegressorWork(const std::string& name) {
@@ -162,7 +165,7 @@ int Main(int argc, char** argv) {
   const auto states = RandomInputs<double>(kInputs, 1);
   for (const auto& x : states) arm->Add(x.q, x.qd, x.qdd);
   const double disagreement = Disagreement(*arm, states);
-  if (!(disagreement < 1e-5)) return std::puts("{}"), 1;  // a comparison of two arms says nothing
+  if (!(disagreement < 1e-5)) return std::puts("{}"), 1;  // two different arms cannot be compared
 
   Work kdl = KdlWork(arm), sines = SinCosWork();
   Work plain = RegressorWork<double>("regressor, double"),

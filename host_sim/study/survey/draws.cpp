@@ -93,7 +93,7 @@ Stribeck BelievedStribeck(int joints) {
 
 namespace {
 
-constexpr double kSurveyStart = 1;  // qs in rad/s where the survey's own filters start, which it does not print
+constexpr double kSurveyStart = 1;  // qs in rad/s at which the survey's own filters start; the survey does not print it
 // Standard deviations of DrawStribeck's draws, relative to what is believed before.
 constexpr double kLogSpeed = 0.4, kBreakaway = 0.46;
 constexpr std::uint64_t kStride = 1000003;  // between the seeds of one run and the next
@@ -102,7 +102,7 @@ std::uint64_t SeedOf(std::uint64_t seed, int draw, int purpose) {
   return seed * kStride + static_cast<std::uint64_t>(draw) * 16 + static_cast<std::uint64_t>(purpose);
 }
 
-// The survey's recursions know no CAD; what they start from is their own.
+// The survey's recursions use no CAD values; they have a start of their own.
 bool KnowsNothing(const std::string& method) { return method == "extended_kalman" || method == "forgetting"; }
 
 calibration::Problem ProblemFor(const std::string& method, const codegen::Model& prior, const calibration::Dataset& log,
@@ -207,7 +207,7 @@ std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, 
   const std::unique_ptr<Truth> set = MakeTruth(settings, motions, draws.law, SetStribeck(joints));
   std::vector<std::vector<Solved>> solved(static_cast<std::size_t>(draws.draws));
   ForEachDraw(settings, LawName(draws.law) + ", " + PriorName(draws.prior), draws.draws, [&](int d) {
-    // What CAD says about friction's Stribeck part is centred on the set values, or, for drawn truths, on their range.
+    // CAD's values of the Stribeck part are centred on the set values or, for drawn truths, on their range.
     Stribeck believed = SetStribeck(joints);
     std::unique_ptr<Truth> drawn;
     if (draws.random_truth) {

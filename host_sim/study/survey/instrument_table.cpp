@@ -92,7 +92,7 @@ const Contender kContenders[] = {
     {"pseudo_inverse", false}, {"instrumental_variable", false}, {"map_barrier", true},          {"robust", true},
     {"didim", true},           {"parallel_decimation", true},    {"instrumental_variable", true}};
 
-// What a method is given: q through the 20 Hz filter, as read, or as a Fourier series of its period.
+// The signals that a method gets: q through the 20 Hz filter, as read, or as a Fourier series of its period.
 enum Signal { kFiltered, kPlain, kFourier, kSignals };
 
 struct Result {
@@ -101,7 +101,7 @@ struct Result {
   std::string why;
 };
 
-// One draw's logs, and what a method may know of the arm.
+// One draw: its logs, and the model that a method may use.
 struct Draw {
   codegen::Model prior;
   calibration::Dataset log[kSignals];
@@ -155,7 +155,7 @@ class Bench {
   codegen::Signals wanted_;
   double period_s_;
   PriorError error_;
-  VectorXd feedforward_;  // what the loop's controller believes
+  VectorXd feedforward_;  // the parameters of the loop's controller
   calibration::LoopRun run_;
   std::unique_ptr<Truth> truth_;
 };

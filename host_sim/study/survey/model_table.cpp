@@ -24,7 +24,7 @@ VectorXd Unexplained(const MatrixXd& A, const MatrixXd& B) {
   return rest.colwise().norm().cwiseQuotient(B.colwise().norm());
 }
 
-// [samples x joints], one column a joint, stacked: f1 of each joint has rows of its own.
+// Stacks the columns of [samples x joints], so that f1 of each joint has rows of its own.
 MatrixXd PerJoint(const MatrixXd& load) {
   const Eigen::Index samples = load.rows();
   MatrixXd out = MatrixXd::Zero(samples * load.cols(), load.cols());
@@ -107,7 +107,7 @@ void Simulated(const Settings& settings, const Motions& motions, Findings& out) 
                "(5) contains (7) (f2 = f4 = 0), so it cannot fit worse: the printed 51.8 N m against 44.7 N m is a "
                "failure of the solver. (6) contains (7) only in the limit f4 to infinity; 1 % is allowed there.",
                "(9) uses the load of a 10 kg payload declared at the flange; table (9) says why."}};
-  // The printed 44.7 N m of (7) against 19.1 of (4) belong to an arm whose static friction is strong.
+  // The survey prints 44.7 N m for (7) and 19.1 for (4). Such figures need an arm with strong static friction.
   const int joints = settings.robot.joints();
   const Stribeck set{VectorXd::Constant(joints, 2), VectorXd::Constant(joints, 0.2)};
   const std::unique_ptr<Truth> truth = MakeTruth(settings, motions, Law::kStribeck, set);
@@ -148,7 +148,7 @@ void Simulated(const Settings& settings, const Motions& motions, Findings& out) 
   }
   out.goals.push_back(
       {"Table 12: models that fit no worse than (7), which they contain", all_nested ? 1.0 : 0.0, 1, false});
-  // The survey's order of its Table 12, without (5), whose row is a failed solver's.
+  // The order in the survey's Table 12, without (5), because its solver failed there.
   const bool order = means.size() == std::size(kLaws) && means[Law::kStribeck] < means[Law::kSechTanh] &&
                      means[Law::kSechTanh] < means[Law::kCubeRoot] && means[Law::kCubeRoot] < means[Law::kLoad] &&
                      means[Law::kLoad] < means[Law::kCoulombViscous];
@@ -197,7 +197,7 @@ void FitMeasured(const Settings& settings, const std::string& robot, const std::
   const codegen::Robot file = codegen::ReadRobot(settings.home + "/codegen/robots/" + robot + ".toml");
   const logs::ChannelMap map = logs::ReadChannelMap(settings.home + "/host_sim/data/channels/" + robot + ".toml");
   for (const Law law : kLaws) {
-    if (law == Law::kLoad) continue;  // needs a payload that somebody declared
+    if (law == Law::kLoad) continue;  // needs a declared payload
     const codegen::Model model(WithLaw(file, law, SetStribeck(file.joints())), settings.records);
     for (const Split& split : splits) {
       if (settings.Stopped()) return;

@@ -1,4 +1,4 @@
-// survey - how accurate the firmware's estimator is after ten seconds, and whether it knows when to doubt itself.
+// survey - how accurate the firmware's estimator is after ten seconds, and whether it reports wrong deviations.
 #include <Eigen/Cholesky>
 #include <chrono>
 #include <cmath>
@@ -41,8 +41,8 @@ struct OnlineResult {
 // Whether a joint's row of a sample counts for the estimator.
 bool Moves(double speed_radps, const codegen::Joint& joint) { return std::abs(speed_radps) > joint.v_min_radps; }
 
-// Standard deviations over the mean of what CAD hardly knows: those of Fs / Fc uniform in 1.1 .. 1.5 about 1.25, and of
-// the logarithm of a speed that is log-uniform in 0.05 .. 0.2 rad/s.
+// Wide standard deviations, relative to the mean, for what CAD gives badly. They belong to Fs / Fc uniform in 1.1
+// .. 1.5 about 1.25, and to the logarithm of a speed that is log-uniform in 0.05 .. 0.2 rad/s.
 constexpr double kToldBreakaway = 0.46, kToldSpeed = 0.4;
 
 template <class Arm>
@@ -114,7 +114,7 @@ OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, c
   calibration::Solution& s = out.solution;
   s.converged = core::IsOk(begun) && found.converged;
   s.bodies = Eigen::Map<const VectorXd>(found.body, Arm::kBodyParameters);
-  // Nonlinear parameters are the filter's own; the read-out is of what is linear.
+  // Nonlinear parameters come from the filter, since the read-out has linear ones only.
   VectorXd sd(Arm::kColumns + Arm::kNonlinear);
   s.z.resize(sd.size());
   s.z.head(Arm::kColumns) = Eigen::Map<const VectorXd>(found.column, Arm::kColumns);
@@ -154,13 +154,13 @@ OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset
   return Run<StribeckArm, filter::ExtendedKalmanFilter<StribeckArm>>(prior, log, sigma_Nm);
 }
 
-// What is drawn, and what the filter is told about it.
+// What is drawn, and what the filter is told.
 struct Protocol {
   std::string name;
   PriorError error;
-  double told = 1;                              // stated width of the prior over the drawn one
+  double told = 1;                              // stated width of the prior over the width drawn
   double ripple = 0;                            // undeclared torque, share of tau_max
-  OnlineFilter filter = OnlineFilter::kKalman;  // kExtended: truths of (4) are drawn, too
+  OnlineFilter filter = OnlineFilter::kKalman;  // kExtended: the truth of (4) is drawn, too
 };
 
 struct Drawn {
@@ -188,14 +188,14 @@ std::unique_ptr<Truth> DrawTruth(const Settings& settings, const Motions& motion
                                  Sampled(motions.nonlinear.series), Sampled(motions.other));
 }
 
-// Torque that no model here knows: a wave over each joint's position, twenty to a turn of one radian.
+// Torque that no model here has: a wave over each joint's position, sin(20 q).
 MatrixXd Ripple(const Truth& truth, const Levels& levels, double share) {
   MatrixXd torque = (20 * truth.train.q.array()).sin();
   for (Eigen::Index j = 0; j < torque.cols(); ++j) torque.col(j) *= share * levels.tau_max_Nm[j];
   return torque;
 }
 
-// The least base error (Score::e_base) that any unbiased estimator of what the rows see can have: Cramer and Rao's.
+// The bound of Cramer and Rao: the least base error (Score::e_base) of any unbiased estimator that sees these rows.
 double CramerRao(const Truth& truth) {
   const codegen::Model& model = truth.model;
   std::vector<int> active;
@@ -298,7 +298,7 @@ void ShowOnline(const Settings& settings, const Motions& motions, Findings& out)
     const double count = static_cast<double>(drawn.size());
     const Statistic e_d = Over(scores, &Score::e_d), base = Over(scores, &Score::e_base);
     const bool extended = protocol.filter == OnlineFilter::kExtended;
-    const double over_bound = extended ? std::nan("") : base.mean / bound;  // whose bound depends on the draw
+    const double over_bound = extended ? std::nan("") : base.mean / bound;  // there the bound depends on the draw
     sheet.rows.push_back({protocol.name, Name(protocol.filter), count, Cell(e_d.mean, e_d.low, e_d.high), e_d.p95,
                           Mean(scores, &Score::e_d_over_prior), Mean(scores, &Score::e_f), near / count,
                           Mean(scores, &Score::J_e), Cell(base.mean, base.low, base.high), over_bound,

@@ -85,7 +85,7 @@ excitation::Criterion AboutFriction(const excitation::Observation& observation) 
   return criterion;
 }
 
-// Limits belong to the arm as it is, whatever K is looked at: torque by the set parameters of (7).
+// The limits are those of the arm itself and do not depend on K. So the torque is that of (7) with the set parameters.
 double LimitShare(const codegen::Robot& file, const codegen::Catalogue& records, const excitation::Series& series) {
   const codegen::Model model = ModelOf(file, records, Law::kCoulombViscous);
   const excitation::Observation observation(model);
@@ -120,7 +120,7 @@ void Excite(const codegen::Robot& file, const codegen::Catalogue& records, const
   const excitation::Observation observation(model);
   excitation::OptimiseSettings s;
   s.shape.family = e.family;
-  // The columns of (4) live where a joint is slow: 80 samples a period would miss most of them.
+  // The columns of (4) differ from zero only where a joint is slow. 80 samples a period would miss most of that.
   s.shape.samples = e.law == Law::kGradient ? 250 : 80;
   s.criterion.kind = e.criterion;
   if (e.criterion == excitation::Criterion::Kind::kAccuracy) s.criterion = AboutFriction(observation);

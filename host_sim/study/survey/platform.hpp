@@ -21,17 +21,17 @@ codegen::Signals Sampled(const excitation::Series& series, int samples = kSample
 // White Gaussian noise, [samples x sigma.size()].
 Eigen::MatrixXd Noise(int samples, const Eigen::VectorXd& sigma, std::uint64_t seed);
 
-// A log all of whose rows may be used.
+// A log of which all rows may be used.
 calibration::Dataset Measured(const codegen::Signals& s, const Eigen::MatrixXd& tau);
 
 // Tier 2: q with noise of `noise_rad`, qd and qdd by central differences of it (one-sided at the ends).
 codegen::Signals Differentiated(const codegen::Signals& s, double noise_rad, std::uint64_t seed);
-// Central differences of a position that is there already.
+// Central differences of a given position.
 codegen::Signals Differentiated(const Eigen::VectorXd& t, const Eigen::MatrixXd& q);
 // q through the survey's 20 Hz Butterworth of order four, forward and backward, then central differences.
 codegen::Signals Filtered(const Eigen::VectorXd& t, const Eigen::MatrixXd& q, double cutoff_Hz = 20);
 
-// What to search, and what came out.
+// What to search, and the result.
 struct ExcitedBy {
   Law law = Law::kCoulombViscous;  // kCoulombViscous (48 columns) or kGradient (60 columns)
   excitation::Family family = excitation::Family::kFourier;
@@ -51,19 +51,19 @@ struct ExcitedBy {
 };
 
 struct SearchSettings {
-  double seconds = 55;  // at most; the number of starts is fixed, so that with time enough the seed decides alone
+  double seconds = 55;  // at most; the number of starts is fixed, so given enough time the seed decides the result
   std::uint64_t seed = 1;
   const std::atomic<bool>* stop = nullptr;
 };
 
-// Ten coefficients a joint (Fourier: L = 5), period 10 s, offset allowed; fills in what came out.
+// Searches ten coefficients a joint (Fourier: L = 5), period 10 s, with an offset. Fills in the result.
 void Excite(const codegen::Robot& file, const codegen::Catalogue& records, const SearchSettings& settings,
             ExcitedBy& excited);
 
 // Fills in the figures of excited.series.
 void Examine(const codegen::Robot& file, const codegen::Catalogue& records, ExcitedBy& excited);
 
-// A trajectory that nothing was fitted to: a random series within the limits.
+// A trajectory for validation, to which nothing is fitted: a random series within the limits.
 excitation::Series Validation(const codegen::Robot& file, const codegen::Catalogue& records, std::uint64_t seed);
 
 }  // namespace armcal::survey

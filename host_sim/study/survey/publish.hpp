@@ -1,4 +1,4 @@
-// survey - findings as JSON for machines, as a page and as text for people; computes nothing.
+// survey - findings as JSON for programs, and as a page and text for people.
 #pragma once
 
 #include <string>

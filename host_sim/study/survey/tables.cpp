@@ -1,4 +1,4 @@
-// survey - the order of the tables; what each needs is computed once.
+// survey - runs the survey: computes once what several tables need, then fills the tables in their order.
 #include "host_sim/study/survey/tables.hpp"
 
 #include "host_sim/study/survey/platform.hpp"
@@ -44,7 +44,7 @@ std::vector<Outcome> Draws(const Settings& settings, const Motions& motions, Law
   return RunDraws(settings, motions, d, methods);
 }
 
-// What the tables move along; and, for the table of trajectories, every other curve, search and criterion.
+// Searches the motions that the tables use and, for the table of trajectories, every other curve, search and criterion.
 Motions SearchMotions(const Settings& settings) {
   using excitation::Criterion, excitation::Family, excitation::Search;
   Motions motions;

@@ -19,7 +19,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double Std(const VectorXd& v) { return std::sqrt((v.array() - v.mean()).square().mean()); }
 
-// Relative error of one entry; what is no number counts as 1, as if nothing had been found.
+// Relative error of one entry. NaN counts as 1, as if nothing had been found.
 double Relative(double set, double estimate) {
   const double e = std::abs(estimate - set) / std::abs(set);
   return std::isfinite(e) ? e : 1;

@@ -1,4 +1,5 @@
-// tests - arms, loops and judges for the methods that beat the survey's; torque by KDL, friction by hand.
+// tests - arms, loops and judges for the methods beyond the survey's. Torque comes from KDL, friction is written by
+// hand.
 #pragma once
 
 #include <Eigen/Eigenvalues>

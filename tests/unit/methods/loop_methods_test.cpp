@@ -1,4 +1,4 @@
-// calibration tests - IDIM-IV and DIDIM: no bias where least squares has one; torque by KDL, motion by the true arm.
+// methods tests - IDIM-IV and DIDIM have no bias where least squares has one; torque by KDL, motion by the true arm.
 #include <gtest/gtest.h>
 
 #include "host_sim/identify/methods/prefilter.hpp"

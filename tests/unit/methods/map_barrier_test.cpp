@@ -1,4 +1,4 @@
-// calibration tests - MAP with barrier: bodies exist in every draw, whatever the coordinates, with nonlinear laws too.
+// methods tests - MAP with barrier: bodies exist in every draw, for any coordinates, and with nonlinear laws, too.
 #include <gtest/gtest.h>
 
 #include "codegen/src/io/input_error.hpp"

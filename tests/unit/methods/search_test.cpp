@@ -1,5 +1,5 @@
-// methods tests - gradient descent, genetic algorithm and particle filter: better than the start, within
-// ranges, possible bodies, the same again by seed, interruptible.
+// methods tests - gradient descent, genetic algorithm and particle filter improve on the start, stay within the ranges
+// and among possible bodies, repeat by seed, and can be stopped.
 #include <gtest/gtest.h>
 
 #include <random>

@@ -1,4 +1,4 @@
-// survey tests - the indices of section 5 by hand on cases small enough for a pencil.
+// survey tests - the indices of section 5, worked out by hand on small cases.
 #include "host_sim/study/survey/trial.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// survey tests - a model that contains another never fits the training data worse: the survey's own Table 12 breaks it.
+// survey tests - a model that contains another never fits the training data worse. The survey's own Table 12 breaks
+// this.
 #include <gtest/gtest.h>
 
 #include "host_sim/study/survey/platform.hpp"

@@ -8,6 +8,7 @@
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/progress.hpp"
 #include "host_sim/study/survey/publish.hpp"
+#include "host_sim/study/survey/tables.hpp"
 #include "host_sim/tool/interrupt.hpp"
 #include "host_sim/tool/verb.hpp"
 

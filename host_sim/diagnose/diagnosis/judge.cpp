@@ -5,7 +5,7 @@
 #include "host_sim/diagnose/diagnosis/run_state.hpp"
 #include "host_sim/diagnose/diagnosis/selector.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
-#include "host_sim/identify/calibration/delay.hpp"
+#include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::diagnosis {
 

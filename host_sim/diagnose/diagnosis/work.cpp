@@ -6,7 +6,7 @@
 
 #include "codegen/src/generator/state_path.hpp"
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/calibration/delay.hpp"
+#include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::diagnosis {
 

@@ -1,16 +1,17 @@
-// calibration - parameters that fit, stay near a prior given in table coordinates and are real bodies; knows no log.
+// calibration - fits parameters to data so that they stay near a prior and every body can exist.
 //
-// min over t of  C(x(t)) + 1/2 |(t - t0) / sd|^2 - eps/2 sum_links logdet J_link(t) - eps/2 sum log rotor,
-// eps = 1, 0.1, 0.01; t = (m, c, I about the centre, rotor) per link and the remaining coordinates as they are; J the
-// 4x4 pseudo-inertia (Wensing, Kim, Slotine 2018); C half the weighted sum of squares of the data. Levenberg-Marquardt;
-// a step that leaves the cone is rejected. The prior must lie inside the cone. It works for any choice of filter
-// coordinates: x's rigid part is base_map times the bodies.
+// FitWithBarrier does this for a whole arm. It minimises over t
+//   C(x(t)) + 1/2 |(t - t0) / sd|^2 - eps/2 sum_links logdet J_link(t) - eps/2 sum log rotor,   eps = 1, 0.1, 0.01.
+// t holds (m, c, I about the centre, rotor) of each link and the other coordinates as they are. J is the 4x4
+// pseudo-inertia (Wensing, Kim, Slotine 2018). C is half the weighted sum of squares of the data. The steps are those
+// of Levenberg and Marquardt; a step that leaves the cone of possible bodies is rejected. The prior must lie inside the
+// cone. Any choice of filter coordinates will do: x's rigid part is base_map times the bodies.
+// NearestBody does the same for one body.
 #pragma once
 
+#include <Eigen/Core>
 #include <atomic>
 #include <functional>
-
-#include <Eigen/Core>
 
 #include "codegen/src/generator/model.hpp"
 
@@ -27,11 +28,11 @@ struct BarrierProblem {
   const codegen::Model* model = nullptr;
   Eigen::VectorXd bodies;        // [11 n] prior mean about link origins, physical
   Eigen::VectorXd bodies_sd;     // [11 n] of (m, c, I about the centre, rotor); 0: held
-  Eigen::VectorXd x, x_sd;       // [x] prior of the coordinates that are no rigid ones; sd 0: held, infinite: no prior
+  Eigen::VectorXd x, x_sd;       // [x] prior of the coordinates that are not rigid; sd 0: held, infinite: no prior
   Eigen::VectorXd lower, upper;  // [x] or empty: a step ends there
   // derivatives = false: cost alone is read.
   std::function<DataTerm(const Eigen::VectorXd& x, bool derivatives)> data;
-  bool quadratic = true;  // the data term is: asked once
+  bool quadratic = true;  // the data term is quadratic; it is then asked once
   const std::atomic<bool>* stop = nullptr;
 };
 
@@ -46,7 +47,18 @@ struct BarrierFit {
 
 BarrierFit FitWithBarrier(const BarrierProblem& problem);
 
-// Throws io::InputError naming the first link of the robot file that cannot exist; or if it has prior = "none".
+// Throws io::InputError if a link of the robot file cannot exist (names the first), or if it has prior = "none".
 void RequirePhysicalPrior(const codegen::Model& model);
+
+// The body that can exist nearest to an estimate that perhaps cannot. With p = (m, m c, I about the origin) it
+// minimises
+//   (p - estimate)' information (p - estimate) / 2 - eps / 2 logdet J(p)
+// with eps falling to 0.01. Both parts are convex, so Newton's method with step halving finds the minimum from any
+// body. information: positive definite.
+Eigen::VectorXd NearestBody(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& information);
+
+// The linear map [10 x 10] of a body's ten parameters from one frame to another. pose [4x4]: of the first frame in the
+// second.
+Eigen::MatrixXd BodyMap(const Eigen::Matrix4d& pose);
 
 }  // namespace armcal::calibration

@@ -1,17 +1,18 @@
-// calibration - derives speeds and accelerations and decides which rows count.
+// calibration - derives speeds and accelerations, decides which rows count, and delays a log's motion.
 #include "host_sim/identify/calibration/dataset.hpp"
-
+#include <algorithm>
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::calibration {
+
 namespace {
-constexpr double kUnscored_s = 0.5;  // design: the first and last half second of a log are not scored
+constexpr double kUnscored_s = 0.5;  // the first and last half second of a log are not scored
 constexpr int kFlagSaturated = 2, kFlagStale = 4;
-// A joint that has just stopped or is about to turn may stick while its smoothed speed is already above v_min: rows
-// this close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
+// A joint that has just stopped or is about to turn may stick although its smoothed speed is above v_min. So rows this
+// close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
 constexpr int kTurn = 2;
 constexpr int kPoses = 8;  // at a single one an entry of the mass matrix may vanish
 // Signals and masks for given inertias.
@@ -38,7 +39,7 @@ Dataset Derive(const codegen::Model& model, const logs::Log& log, const Eigen::M
       if (d.s.qd(m, j) * d.s.qd(k, j) <= 0 || std::abs(d.s.qd(m, j)) <= model.robot().joint[j].v_min_radps) return true;
     return false;
   };
-  // A sign law that is smooth over more than v_min says that the joint does not stick: its friction is a function of
+  // A sign law that is smooth over more than v_min says that the joint does not stick. Then friction is a function of
   // speed at rest and near a turn, too.
   const auto sticks = [&robot = model.robot()](int j) {
     return robot.sign_law != "tanh" || robot.joint[j].v_min_radps > robot.sign_width_radps;
@@ -59,7 +60,8 @@ Dataset Derive(const codegen::Model& model, const logs::Log& log, const Eigen::M
 
 Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& base) {
   const int n = model.joints(), per_pose = n + 1;
-  codegen::Signals s;  // unit accelerations, one joint a sample, at each pose; the last sample, at rest, is gravity
+  codegen::Signals
+      s;  // at each pose: a unit acceleration of one joint a sample, then a sample at rest, which is gravity
   s.q.resize(kPoses * per_pose, n), s.qd.setZero(kPoses * per_pose, n), s.qdd = s.qd;
   for (int pose = 0; pose < kPoses; ++pose)
     for (int j = 0; j < n; ++j) {
@@ -93,7 +95,8 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
     for (int k = 0; k < bodies.size(); ++k) bodies[k] = model.table()[k].mean;
     inertia = TypicalMass(model, model.base_map() * bodies);
   } else {
-    // A joint's torque limit over its acceleration limit is a heavy guess: a low cut-off, good enough for a first fit.
+    // A joint's torque limit over its acceleration limit is a heavy guess. It gives a low cut-off, which is good enough
+    // for a first fit.
     for (int j = 0; j < n; ++j)
       inertia(j, j) = model.robot().joint[j].torque_limit_Nm / model.robot().joint[j].acceleration_limit_radps2;
     const Dataset rough = Derive(model, log, inertia, {});
@@ -132,6 +135,33 @@ std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& da
 std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data) {
   std::vector<const Dataset*> out;
   for (const auto& d : data) out.push_back(&d);
+  return out;
+}
+
+Dataset Delayed(const Dataset& data, double delay_s) {
+  Dataset out = data;
+  const Eigen::VectorXd& t = data.s.t;
+  const Eigen::Index last = t.size() - 1;
+  Eigen::Index k = 0;  // t[k] <= time < t[k + 1]
+  for (Eigen::Index i = 0; i <= last; ++i) {
+    const double time = std::clamp(t[i] - delay_s, t[0], t[last]);
+    k = std::min(k, last - 1);
+    while (k + 1 < last && t[k + 1] <= time) ++k;
+    while (k > 0 && t[k] > time) --k;
+    out.used.row(i) = data.used.row(i).cwiseMin(data.used.row(k).cwiseMin(data.used.row(k + 1)));
+    const Eigen::Index first = std::clamp<Eigen::Index>(k - 1, 0, last - 3);
+    double weight[4];
+    for (int a = 0; a < 4; ++a) {
+      weight[a] = 1;
+      for (int b = 0; b < 4; ++b)
+        if (b != a) weight[a] *= (time - t[first + b]) / (t[first + a] - t[first + b]);
+    }
+    for (const auto& [from, to] :
+         {std::pair{&data.s.q, &out.s.q}, std::pair{&data.s.qd, &out.s.qd}, std::pair{&data.s.qdd, &out.s.qdd}}) {
+      to->row(i).setZero();
+      for (int a = 0; a < 4; ++a) to->row(i) += weight[a] * from->row(first + a);
+    }
+  }
   return out;
 }
 

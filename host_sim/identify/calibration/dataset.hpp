@@ -1,4 +1,4 @@
-// calibration - a log made ready for estimation: signals of one instant, and which rows may be used; knows no method.
+// calibration - makes a log ready for estimation: the signals of each sample, and which rows may be used.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,7 @@ struct Dataset {
   int joints() const { return static_cast<int>(tau.cols()); }
 };
 
-// A chosen cut-off depends on the arm's inertia: from the prior, or, without one, from a first fit of this very log.
+// The cut-off depends on the arm's inertia. That comes from the prior or, without one, from a first fit of this log.
 Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::Bandwidth& bandwidth = {});
 
 // RMS over some poses of each entry of the mass matrix [n x n], for given base parameters.
@@ -37,5 +37,10 @@ Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool movi
 std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& data);
 
 std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data);
+
+// The same log for a torque that is read late: position, speed and acceleration are those of delay_s before each torque
+// sample, cubic between samples and held at the ends. A row stays in use if the rows are in use between which its
+// motion is read.
+Dataset Delayed(const Dataset& data, double delay_s);
 
 }  // namespace armcal::calibration

@@ -1,8 +1,9 @@
-// calibration - sums of products of columns over packs of samples; knows no model and no solver.
+// calibration - sums the products of columns over packs of samples.
 //
-// One object sums one row of the regressor: its columns lie side by side in a panel of samples, and every pair's
-// products are added lane by lane into accumulators, kRows x kColumns of them in registers at a time. Memory depends on
-// the number of columns alone. Lanes are added at the end, so the bits do not depend on the machine's vector width.
+// One object sums one row of the regressor. The row's columns lie side by side in a panel of samples. The products of
+// each pair of columns are added lane by lane into accumulators; kTileRows x kTileColumns of them are in registers at a
+// time. Memory depends on the number of columns alone. The lanes are added at the end, so the bits do not depend on the
+// machine's vector width. The file stands alone, because armcal bench compiles it with flags of its own.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// calibration - blocks of samples through the model's graph into one Gram matrix a joint.
+// calibration - evaluates the model over blocks of samples and sums one Gram matrix for each joint.
 #include "host_sim/identify/calibration/information.hpp"
 
 #include <algorithm>

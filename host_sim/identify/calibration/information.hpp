@@ -1,4 +1,4 @@
-// calibration - the least-squares information of logs, joint by joint, never the stacked regressor; knows no prior.
+// calibration - what logs say about the parameters: sums for each joint, without storing the regressor.
 #pragma once
 
 #include <span>
@@ -8,7 +8,7 @@
 
 namespace armcal::calibration {
 
-// For each joint j and coordinates x (all filter columns and kappa): sums over used rows, unweighted by sigma.
+// Sums over the used rows of each joint j, in the coordinates x (all filter columns and kappa). Not weighted by sigma.
 struct Information {
   std::vector<Eigen::MatrixXd> gram;   // [n] A_j' A_j
   std::vector<Eigen::VectorXd> right;  // [n] A_j' tau_j
@@ -22,8 +22,8 @@ struct Information {
   double Residual(int j, const Eigen::VectorXd& x) const;
 };
 
-// Evaluates the model over the data in blocks. p: the estimate at which estimate-dependent columns and the gain columns
-// are taken.
+// Evaluates the model over the data in blocks. Columns that depend on the estimate, and the gain columns, are taken at
+// p.
 Information Accumulate(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& p,
                        std::span<const double> eta);
 

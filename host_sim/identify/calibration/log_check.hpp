@@ -1,5 +1,4 @@
-// calibration - whether a log can be what it says it is: one run of this arm, in SI units, column by column; knows no
-// method.
+// calibration - checks that a log is what it says it is: one run of this arm, in SI units, with each column in place.
 #pragma once
 
 #include <string>
@@ -9,14 +8,16 @@
 
 namespace armcal::calibration {
 
-// From the samples alone and the robot's limits. InputError, one line naming file, joint and problem: a log shorter
-// than 3 s, a clock that jumps, more than a tenth of the samples missing, positions or torques far outside of the
-// limits (degrees, mN m), a position that jumps or sticks, a torque that is zero or does not change while the joint
-// moves. Returns what is worth a line but no refusal: gaps.
+// Checks the samples alone against the robot's limits. Returns remarks that are worth a line: gaps. InputError, one
+// line that names file, joint and problem, where
+// - the log is shorter than 3 s, its clock jumps, or more than a tenth of its samples are missing;
+// - positions or torques lie far outside of the limits (degrees, mN m);
+// - a position jumps or sticks;
+// - a torque is zero, or does not change while the joint moves.
 std::vector<std::string> CheckSignals(const codegen::Robot& robot, const logs::Log& log);
 
-// Against the torque that the robot file's bodies need (arms with a prior): InputError where two columns are
-// exchanged, or a torque has another unit or sign.
+// Checks a log against the torque that the robot file's bodies need; an arm without a prior passes. InputError: two
+// columns are exchanged, or a torque has another unit or sign.
 void CheckAgainstModel(const codegen::Model& model, const Dataset& data);
 
 }  // namespace armcal::calibration

@@ -1,4 +1,4 @@
-// calibration - Gauss and Newton's steps on sums over the logs: bodies and friction, gains, load; knows no file.
+// calibration - solves for bodies, friction, gains and load together, from sums over the logs.
 #include "host_sim/identify/calibration/payload.hpp"
 
 #include <fmt/core.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/calibration/body_barrier.hpp"
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 
 namespace armcal::calibration {
@@ -17,9 +17,10 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kLoad = 10;
-constexpr double kWide = 100;       // a prior that says nothing: a column alone may make this many times the torque
-constexpr double kWideGain = 10;    // the same of a gain
-constexpr double kReach_m = 0.5;    // what any load is like: its mass lies about this far from the flange
+constexpr double kWide =
+    100;  // a prior so wide that it says nothing: a column alone may make this many times the torque
+constexpr double kWideGain = 10;    // the same for a gain
+constexpr double kReach_m = 0.5;    // true of any load: its mass lies about this far from the flange
 constexpr double kTolerance = 0.1;  // of a torque constant whose tolerance the robot file does not state
 constexpr double kSeen = 4;         // standard deviations by which a mass must differ from zero
 constexpr int kMostRounds = 40;
@@ -61,7 +62,7 @@ class LoadFit {
   MatrixXd LoadCovariance() const { return covariance_.bottomRightCorner(kLoad, kLoad); }
   bool converged() const { return converged_; }
 
-  // Nothing is known of the arm, and of the gains nothing but their sign.
+  // Makes the prior of the arm so wide that it says nothing. `gains`: the same for the gains; only their sign is known.
   void ForgetArm(bool gains) {
     prior_.informative = true;
     for (const int c : prior_.active)
@@ -85,7 +86,7 @@ class LoadFit {
     x_ = prior_.mean;
     converged_ = false;
     for (int round = 0; round < kMostRounds && !converged_; ++round) {
-      // Without a torque of the arm there is nothing yet to take the gains' columns at.
+      // The gains' columns need an estimate of the arm's torque, so the first round leaves them out.
       std::vector<int> active = prior_.active;
       if (round == 0) std::erase_if(active, [&](int c) { return c >= columns_ && c < load(0); });
       const VectorXd next = Step(active);
@@ -93,12 +94,12 @@ class LoadFit {
       x_ = next;
       for (int j = 0; j < n_; ++j)
         if (rows_[j] > 0) sigma_[j] = std::max(1e-12, std::sqrt(Square(j, Residual(j)) / rows_[j]));
-      // The load's size is known after the first round: (m, m c, I) of one that reaches kReach_m.
+      // The load's mass is known after the first round. The prior of m c and I is that of a load with reach kReach_m.
       for (int i = 1; i < kLoad; ++i)
         prior_.covariance(load(i), load(i)) = std::pow(x_[load(0)] * (i < 4 ? kReach_m : kReach_m * kReach_m), 2);
     }
     Inflate();
-    Step(prior_.active);  // its covariance, honestly weighted
+    Step(prior_.active);  // again, for a covariance that counts residuals which are not white
   }
 
  private:

@@ -1,14 +1,16 @@
-// calibration - the drives' gains and the load at the flange, from runs with and without it; knows no file.
+// calibration - finds the drives' gains and the load at the flange from runs with and without that load.
 //
-// One equation a joint over both kinds of log (the load's columns are those of the last link, turned into the flange):
-//   gain_j tau_j = Y_j x + P_j load     tau: measured torque; load: m, m c, I about the flange's origin; zero without
-// Without the load the gains have a common factor that nothing fixes; a mass that is known fixes it (M. Gautier,
-// S. Briot, Global identification of drive gains parameters of robots using a known payload mass, 2011). The errors are
-// in tau alone, because Y is derived from smoothed positions: a mixed total least squares problem, the minimum of
-//   sum_j |gain_j tau_j - Y_j x - P_j load|^2 / (gain_j sigma_j)^2,
-// reached by Gauss and Newton's steps in 1 / gain, in which its rows are measured torque minus predicted torque.
-// Friction is taken to be the same in both runs; a run that warms the gears up first makes it so. Columns that depend
-// on the estimate are taken at the robot file's values.
+// Each joint has one equation over both kinds of log:
+//   gain_j tau_j = Y_j x + P_j load
+// tau is the measured torque. load holds m, m c and I about the flange's origin, and is zero in runs without it. P_j
+// are the last link's columns, turned into the flange's frame. Without the load nothing fixes a factor that all gains
+// share. A load of known mass does (M. Gautier, S. Briot, Global identification of drive gains parameters of robots
+// using a known payload mass, 2011). The errors are in tau alone, because Y is derived from smoothed positions. So this
+// is a mixed total least squares problem, the minimum of
+//   sum_j |gain_j tau_j - Y_j x - P_j load|^2 / (gain_j sigma_j)^2.
+// Gauss and Newton's steps in 1 / gain reach it; there a row is measured minus predicted torque.
+// Friction must be the same in both runs: warm the gears up first. Columns that depend on the estimate are taken at the
+// robot file's values.
 #pragma once
 
 #include <vector>
@@ -27,19 +29,19 @@ struct DriveGain {
   bool determined = false;   // false: the logs say less than the torque constant's tolerance does
 };
 
-// The gains of all joints from a load of known mass; its centre and inertia are found with them where they are not
-// known. Nothing is taken from the robot file's bodies. InputError: no load is seen, or a gain is not above zero.
+// The gains of all joints from a load of known mass. Its centre and inertia are found, too, where they are not known.
+// The robot file's bodies are not used. InputError: no load is seen, or a gain is not above zero.
 std::vector<DriveGain> FindDriveGains(const codegen::Model& model, const LoadLogs& logs, const codegen::Payload& known);
 
 struct Load {
   Eigen::VectorXd body;          // [10] m, c, I about the centre (xx xy xz yy yz zz), flange axes
   Eigen::VectorXd sd;            // [10]
-  std::vector<bool> determined;  // [10] false: rests on what any load is like (see payload.cpp)
-  bool was_physical = true;      // least squares alone already gave a body that can exist
+  std::vector<bool> determined;  // [10] false: rests on the prior of any load (payload.cpp)
+  bool was_physical = true;      // least squares alone gave a body that can exist
 };
 
-// A load that nobody knows, with the torque constants' tolerance as a prior on the gains, and the robot file's bodies
-// as one where there are some. The body returned can exist. InputError: no load is seen.
+// An unknown load. The torque constants' tolerance is the prior of the gains; the robot file's bodies, if it has any,
+// are the prior of the arm. The body returned can exist. InputError: no load is seen.
 Load FindLoad(const codegen::Model& model, const LoadLogs& logs);
 
 }  // namespace armcal::calibration

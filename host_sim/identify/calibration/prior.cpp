@@ -1,4 +1,5 @@
-// calibration - the prior mapped into filter coordinates; a diagonal one in (m, m c, I_o) would be worse than none.
+// calibration - maps the prior from the table into filter coordinates. Its full covariance matters: a diagonal one in
+// (m, m c, I_o) would be worse than none.
 #include "host_sim/identify/calibration/prior.hpp"
 
 #include <Eigen/Cholesky>

@@ -1,4 +1,4 @@
-// calibration - what is known before any log: bodies, friction, effects, torque gains as Gaussians; knows no data.
+// calibration - what is known before any log: bodies, friction, effects and torque gains, each as a Gaussian.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,8 +8,8 @@
 namespace armcal::calibration {
 
 // Coordinates of a fit: x = [filter columns, torque gain deviations kappa (one a joint)].
-// measured torque_j = (1 + kappa_j) * (Y_j p): a torque constant that is off by its tolerance is ordinary parameter
-// error.
+// measured torque_j = (1 + kappa_j) * (Y_j p). A torque constant that is off by its tolerance is an ordinary error of a
+// parameter.
 struct Prior {
   Eigen::VectorXd mean;        // [columns + n]
   Eigen::MatrixXd covariance;  // the bodies' part is B J diag(sd^2) J' B', full

@@ -1,4 +1,4 @@
-// calibration - the parameter table as a file people can read, and as the words that the drive takes; knows no drive.
+// calibration - the parameter table: as a file that people can read, and as the words that the drive takes.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/identify/calibration/map_readout.hpp"
+#include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::calibration {
 
@@ -15,8 +15,8 @@ struct TableRow {
   double mean = 0, sd = 0, process_noise = 0;  // sd: prior, of (m, c, I about the centre, rotor) for bodies
   int group = 0;
   double posterior_sd = 0;  // of this identification; 0: not identified
-  bool from_prior = false;  // posterior / prior sd above 0.7: the data hardly say anything
-  double free_mean = 0;     // what the data alone would have moved it to; mean where not from_prior
+  bool from_prior = false;  // posterior / prior sd above 0.7: the data say little
+  double free_mean = 0;     // where the data alone would move it; equals mean where not from_prior
 };
 
 struct TableJoint {
@@ -38,8 +38,8 @@ inline constexpr double kFromPrior = 0.7;  // posterior / prior standard deviati
 // The model's own numbers: CAD bodies, nominal friction.
 TableFile DefaultTable(const codegen::Model& model);
 
-// An identification as a table. `held`: the fit in which columns that the data hardly determine were kept at the prior;
-// `all`: the one in which nothing was held. Bodies come from the physical read-out of `held`.
+// An identification as a table. `held`: the fit that keeps at the prior those columns which the data hardly determine.
+// `all`: the fit that holds nothing. Bodies come from the physical read-out of `held`.
 TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const Fit& held, const PhysicalReadOut& bodies,
                           double log_step_s);
 
@@ -54,8 +54,8 @@ void WriteTable(const std::filesystem::path& path, const TableFile& table);
 std::vector<std::uint16_t> EncodeTable(const TableFile& table);
 TableFile DecodeTable(const std::vector<std::uint16_t>& words, const TableFile& like);
 
-// Values of `from` into the layout `to`, by parameter name; rows that `from` does not know keep `to`'s. Returns their
-// names.
+// Copies the values of `from` into the layout `to`, by parameter name. Rows that `from` does not have keep their value;
+// their names are returned.
 std::vector<std::string> CarryOver(const TableFile& from, TableFile& to);
 
 }  // namespace armcal::calibration

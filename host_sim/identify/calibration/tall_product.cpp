@@ -1,4 +1,4 @@
-// calibration - dot products of columns, several at a time, over stretches of rows that stay in the nearest caches.
+// calibration - computes several dot products at a time, over so few rows that they stay in the nearest caches.
 #include "host_sim/identify/calibration/tall_product.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// calibration - products of matrices with many rows and few columns; knows no log.
+// calibration - products of matrices with many rows and few columns.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,10 +1,11 @@
-// calibration - normal equations in prior-scaled coordinates; weights are re-estimated until they settle.
+// calibration - solves the normal equations in units of the prior, and estimates the weights again until they settle.
 #include "host_sim/identify/calibration/weighted_fit.hpp"
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 
 namespace armcal::calibration {
 
@@ -47,7 +48,8 @@ VectorXd SolveWithPrior(const Information& info, const VectorXd& weight, const P
   VectorXd step(a);
   MatrixXd P(a, a);
   if (prior.informative) {
-    // x = S z with P0 = S C S: (S H S + C^-1) z = S g, written as C^(1/2) so that a singular prior does no harm.
+    // x = S z with P0 = S C S: (S H S + C^-1) z = S g. It is solved with C^(1/2), so that a singular prior does no
+    // harm.
     const MatrixXd P0 = Pick(prior.covariance, active);
     scale = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
     const MatrixXd C = scale.cwiseInverse().asDiagonal() * P0 * scale.cwiseInverse().asDiagonal();
@@ -106,7 +108,7 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
   fit.sigma.resize(n);
   for (int j = 0; j < n; ++j) fit.sigma[j] = model.robot().joint[j].torque_noise_Nm;
   fit.inflation = VectorXd::Ones(n);
-  // The first pass has no estimate to take gain columns at; the weights settle within three.
+  // The first pass has no estimate at which to take the gain columns. The weights settle within three passes.
   for (fit.iterations = 1; fit.iterations <= 4; ++fit.iterations) {
     fit.information = Information(n, columns + n);
     for (const Dataset* d : data) fit.information += Accumulate(model, *d, fit.x.head(columns), fit.eta);
@@ -125,11 +127,38 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
   }
   const VectorXd weight = (fit.sigma.cwiseAbs2().cwiseProduct(fit.inflation)).cwiseInverse();
   SolveWithPrior(fit.information, weight, prior, fit.active,
-                 &fit.covariance);  // what the data determine, honestly weighted
+                 &fit.covariance);  // the covariance under weights that count residuals which are not white
   fit.sd = fit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   fit.prior_sd = prior.covariance.diagonal().cwiseSqrt();
   if (!prior.informative) fit.prior_sd.setConstant(std::numeric_limits<double>::infinity());
   return fit;
+}
+
+PhysicalReadOut ReadOutPhysical(const codegen::Model& model, const Fit& fit) {
+  RequirePhysicalPrior(model);
+  const Prior prior = MakePrior(model);
+  const Eigen::Index size = prior.mean.size();
+  BarrierProblem problem;
+  problem.model = &model;
+  problem.bodies = BodyMean(model);
+  problem.bodies_sd = VectorXd::Zero(problem.bodies.size());
+  for (int k = 0; k < problem.bodies.size(); ++k)
+    if (model.table()[k].state == "estimated") problem.bodies_sd[k] = model.table()[k].sd;
+  problem.x = prior.mean;
+  problem.x_sd = VectorXd::Zero(size);
+  for (const int c : fit.active) problem.x_sd[c] = std::sqrt(prior.covariance(c, c));
+  problem.data = [&](const VectorXd& x, bool) {
+    DataTerm term{0, VectorXd::Zero(size), MatrixXd::Zero(size, size)};
+    for (std::size_t j = 0; j < fit.information.gram.size(); ++j) {
+      const double weight = 1 / (fit.sigma[j] * fit.sigma[j] * fit.inflation[j]);
+      term.hessian += weight * fit.information.gram[j];
+      term.gradient -= weight * fit.information.right[j];
+    }
+    term.gradient += term.hessian * x;
+    return term;
+  };
+  BarrierFit found = FitWithBarrier(problem);
+  return {std::move(found.bodies), std::move(found.bodies_sd), std::move(found.x), found.iterations, found.converged};
 }
 
 }  // namespace armcal::calibration

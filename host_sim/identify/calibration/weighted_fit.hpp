@@ -1,4 +1,5 @@
-// calibration - weighted least squares with prior in double; the reference that every other estimate is compared with.
+// calibration - weighted least squares with a prior, in double, and the standard parameters that follow from it.
+// Every other estimate is compared with this one.
 #pragma once
 
 #include <vector>
@@ -23,8 +24,9 @@ struct Fit {
   double ratio(int c) const { return prior_sd[c] > 0 ? sd[c] / prior_sd[c] : 1; }
 };
 
-// Iterates: weights from the residuals, gain and estimate-dependent columns from the estimate. `held`: coordinates kept
-// at the prior mean. Directions that no data and no prior determine stay at the prior mean.
+// Iterates: the weights come from the residuals, the gain columns and those that depend on the estimate from the
+// estimate. `held`: coordinates kept at the prior mean. Directions that neither data nor prior determine stay there,
+// too.
 Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& data,
                 const std::vector<int>& held = {});
 
@@ -32,8 +34,19 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
 Eigen::VectorXd SolveWithPrior(const Information& info, const Eigen::VectorXd& weight, const Prior& prior,
                                const std::vector<int>& active, Eigen::MatrixXd* covariance);
 
-// 1 + 2 sum of autocorrelations up to the first negative one: what a sum over these residuals varies more than over
-// white ones.
+// How much more a sum over these residuals varies than one over white residuals: 1 + 2 times the sum of the
+// autocorrelations up to the first negative one.
 double VarianceInflation(const Eigen::VectorXd& residual, const Eigen::VectorXi& used);
+
+struct PhysicalReadOut {
+  Eigen::VectorXd bodies;     // [11n] about link origins
+  Eigen::VectorXd bodies_sd;  // [11n] posterior standard deviation of (m, c, I about the centre, rotor)
+  Eigen::VectorXd x;          // [columns + n] the consistent filter coordinates
+  int iterations = 0;
+  bool converged = false;
+};
+
+// Throws io::InputError if a link of the prior is not physical (names it), or if the robot has prior = "none".
+PhysicalReadOut ReadOutPhysical(const codegen::Model& model, const Fit& fit);
 
 }  // namespace armcal::calibration

@@ -1,6 +1,5 @@
-// excitation - puts the parts on one grid; knows no search.
+// excitation - blends, slow moves, and the grid that the parts are put on.
 #include "host_sim/identify/excitation/compose.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -8,10 +7,171 @@
 #include <optional>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/excitation/blend.hpp"
-#include "host_sim/identify/excitation/slow_moves.hpp"
+#include "host_sim/identify/excitation/peaks.hpp"
 
 namespace armcal::excitation {
+
+namespace {
+
+constexpr double kShortest_s = 0.5, kLongest_s = 20, kGrowth = 1.15;
+constexpr int kCheckPoints =
+    200;  // the peaks of a polynomial of degree 5 between these points differ by less than 1e-3
+
+bool Keeps(const Observation& observation, const Blend& blend, double share) {
+  const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(kCheckPoints, 0, blend.duration_s());
+  return Keeps(FindPeaks(observation, blend.At(t)), share);
+}
+
+// Where a joint rests before (direction -1) or after (+1) a blend of this duration from or to the state. It moves at
+// the average of zero and its speed for the duration. The place is kept inside the position limits.
+State RestNear(const codegen::Robot& robot, const State& moving, double direction, double duration_s, double share) {
+  Eigen::VectorXd q = moving.q + direction * duration_s / 2 * moving.qd;
+  for (int j = 0; j < robot.joints(); ++j) {
+    const auto [low, high] = robot.joint[j].position_limit_rad;
+    const double middle = (low + high) / 2, half = share * (high - low) / 2;
+    q[j] = std::clamp(q[j], middle - half, middle + half);
+  }
+  return AtRest(q);
+}
+
+template <class Make>
+std::optional<Blend> Shortest(const Observation& observation, double share, Make make) {
+  for (double duration = kShortest_s; duration < kLongest_s; duration *= kGrowth)
+    if (Blend blend = make(duration); Keeps(observation, blend, share)) return blend;
+  return std::nullopt;
+}
+
+}  // namespace
+
+State AtRest(const Eigen::VectorXd& q) { return {q, Eigen::VectorXd::Zero(q.size()), Eigen::VectorXd::Zero(q.size())}; }
+
+Blend::Blend(const State& from, const State& to, double duration_s)
+    : duration_s_(duration_s), power_(from.q.size(), 6) {
+  const double T = duration_s;
+  const Eigen::VectorXd v0 = T * from.qd, a0 = T * T * from.qdd, a1 = T * T * to.qdd;
+  // The difference between the end and the start's parabola there, in position, speed and acceleration.
+  const Eigen::VectorXd q = to.q - from.q - v0 - a0 / 2, v = T * to.qd - v0 - a0, a = a1 - a0;
+  power_ << from.q, v0, a0 / 2, 10 * q - 4 * v + a / 2, -15 * q + 7 * v - a, 6 * q - 3 * v + a / 2;
+}
+
+Eigen::VectorXd Blend::Position(double t_s) const {
+  const double x = t_s / duration_s_;
+  Eigen::VectorXd q = power_.col(5);
+  for (int k = 4; k >= 0; --k) q = q * x + power_.col(k);
+  return q;
+}
+
+codegen::Signals Blend::At(const Eigen::VectorXd& t) const {
+  codegen::Signals s;
+  s.t = t;
+  Eigen::MatrixXd x[3];  // derivatives of 1, x, .., x^5 by t
+  for (auto& m : x) m = Eigen::MatrixXd::Zero(t.size(), 6);
+  for (Eigen::Index k = 0; k < t.size(); ++k) {
+    const double u = t[k] / duration_s_;
+    x[0].row(k) << 1, u, u * u, u * u * u, u * u * u * u, u * u * u * u * u;
+    for (int order = 1; order < 3; ++order)
+      for (int power = 1; power < 6; ++power) x[order](k, power) = power * x[order - 1](k, power - 1) / duration_s_;
+  }
+  s.q = x[0] * power_.transpose(), s.qd = x[1] * power_.transpose(), s.qdd = x[2] * power_.transpose();
+  return s;
+}
+
+std::optional<Blend> ShortestBlend(const Observation& observation, const State& from, const State& to, double share) {
+  return Shortest(observation, share, [&](double duration) { return Blend(from, to, duration); });
+}
+
+std::optional<Blend> ShortestStart(const Observation& observation, const State& to, double share) {
+  const codegen::Robot& robot = observation.model().robot();
+  return Shortest(observation, share,
+                  [&](double duration) { return Blend(RestNear(robot, to, -1, duration, share), to, duration); });
+}
+
+std::optional<Blend> ShortestStop(const Observation& observation, const State& from, double share) {
+  const codegen::Robot& robot = observation.model().robot();
+  return Shortest(observation, share,
+                  [&](double duration) { return Blend(from, RestNear(robot, from, +1, duration, share), duration); });
+}
+
+namespace {
+
+constexpr double kCell_s = 3.5;
+constexpr double kSlowest = 3, kReversal = 5;  // times v_min
+constexpr double kFastest = 0.3;               // of the speed limit
+constexpr int kReversals = 8;                  // strokes of the cell of small reversals
+constexpr double kShortestBlend_s = 0.15;      // keeps the jerk of slow strokes small
+constexpr double kAccelerationShare = 0.5;     // of the limit: friction shows best while inertia needs little torque
+
+// A smooth step 10 x^3 - 15 x^4 + 6 x^5 rises with a slope of at most 15/8.
+constexpr double kSteepest = 1.875;
+
+// Integral of the smooth step from 0 to x, for any x.
+double StepIntegral(double x) {
+  if (x <= 0) return 0;
+  if (x >= 1) return x - 0.5;
+  return x * x * x * x * (2.5 + x * (x - 3));
+}
+
+// `direction` if the room there is enough for the reach, else the other one.
+double Toward(double direction, double reach, double room_up, double room_down) {
+  return reach <= (direction > 0 ? room_up : room_down) ? direction : -direction;
+}
+
+}  // namespace
+
+Strokes::Strokes(double duration_s, int strokes, double speed_radps, double blend_s)
+    : duration_s_(duration_s), speed_radps_(speed_radps), blend_s_(blend_s), strokes_(strokes) {}
+
+double Strokes::Offset(double t_s) const {
+  const double stroke_s = (duration_s_ - blend_s_) / strokes_;
+  double sum = 0;
+  for (int k = 0; k <= strokes_; ++k) {
+    const double change = (k == 0 || k == strokes_ ? 1 : 2) * (k % 2 == 0 ? 1 : -1);
+    sum += change * StepIntegral((t_s - k * stroke_s) / blend_s_);
+  }
+  return speed_radps_ * blend_s_ * sum;
+}
+
+double Strokes::reach_rad() const { return std::abs(Offset((duration_s_ - blend_s_) / strokes_ + blend_s_ / 2)); }
+
+SlowMoves::SlowMoves(const codegen::Robot& robot, const Eigen::VectorXd& home, int speeds, double share, double reach)
+    : home_(home), cell_(robot.joints()) {
+  for (int j = 0; j < robot.joints(); ++j) {
+    const codegen::Joint& joint = robot.joint[j];
+    const auto [low, high] = joint.position_limit_rad;
+    const double middle = (low + high) / 2, half = share * (high - low) / 2;
+    const double room_up = middle + half - home[j], room_down = home[j] - middle + half;
+    const double acceleration = kAccelerationShare * share * joint.acceleration_limit_radps2;
+    // The change from +v to -v must fit into a quarter of the cell, and the way out must fit into the room.
+    const double fastest =
+        std::min({reach * kFastest * joint.speed_limit_radps, acceleration * kCell_s / 4 / (2 * kSteepest),
+                  std::max(room_up, room_down) / (kCell_s / 2)});
+    const double slowest = std::min(kSlowest * joint.v_min_radps, fastest);
+    const auto cell = [&](int strokes, double speed, double direction) {
+      const double blend = std::max(kShortestBlend_s, 2 * kSteepest * speed / acceleration);
+      const double size = Strokes(kCell_s, strokes, speed, blend).reach_rad();
+      return Strokes(kCell_s, strokes, Toward(direction, size, room_up, room_down) * speed, blend);
+    };
+    for (int k = 0; k < speeds; ++k) {
+      const double speed =
+          slowest * std::pow(fastest / slowest, speeds > 1 ? static_cast<double>(k) / (speeds - 1) : 1);
+      cell_[j].push_back(cell(2, speed, (j + k) % 2 ? -1 : 1));
+    }
+    cell_[j].push_back(cell(kReversals, std::min(kReversal * joint.v_min_radps, fastest), j % 2 ? -1 : 1));
+    std::rotate(cell_[j].begin(), cell_[j].begin() + j % static_cast<int>(cell_[j].size()), cell_[j].end());
+  }
+}
+
+double SlowMoves::duration_s() const { return kCell_s * static_cast<double>(cell_[0].size()); }
+
+Eigen::VectorXd SlowMoves::Position(double t_s) const {
+  const auto last = static_cast<double>(cell_[0].size() - 1);
+  const double cell = std::clamp(std::floor(t_s / kCell_s), 0.0, last);
+  Eigen::VectorXd q = home_;
+  for (Eigen::Index j = 0; j < q.size(); ++j)
+    q[j] += cell_[j][static_cast<std::size_t>(cell)].Offset(t_s - cell * kCell_s);
+  return q;
+}
+
 namespace {
 
 struct Part {
@@ -29,7 +189,7 @@ State StateAt(const Series& series, double t_s) {
   return {s.q.row(0), s.qd.row(0), s.qdd.row(0)};
 }
 
-// Instants of the period, those at which the arm is slow and hardly accelerated first.
+// Instants of the period, sorted: first those at which speed and acceleration are small.
 std::vector<double> QuietInstants(const codegen::Robot& robot, const Series& series) {
   constexpr int kInstants = 100;
   const double period = series.period_s;
@@ -51,7 +211,7 @@ std::vector<double> QuietInstants(const codegen::Robot& robot, const Series& ser
   throw io::InputError(observation.model().robot().path + ": " + what);
 }
 
-// In, the periods, out; ends at rest.
+// The blend in, the periods, and the blend out, which ends at rest.
 std::vector<Part> SeriesParts(const Observation& observation, const Series& series, int periods, double share) {
   for (const double begin : QuietInstants(observation.model().robot(), series)) {
     const State state = StateAt(series, begin);
@@ -85,7 +245,7 @@ Part Transfer(const Observation& observation, const std::string& name, const Eig
   return AsPart(name, *blend);
 }
 
-// One point each step_s of the parts in a row; the end pose is added once more where it falls between two points.
+// One point each step_s of the parts in a row. Where the end falls between two points, its pose is added once more.
 Composed OnGrid(const std::vector<Part>& parts, double step_s) {
   Composed composed;
   double end = 0;

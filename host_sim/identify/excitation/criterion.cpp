@@ -1,4 +1,4 @@
-// excitation - figures of a Gram matrix and their derivatives.
+// excitation - computes the criteria from a Gram matrix, with their derivatives.
 #include "host_sim/identify/excitation/criterion.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -46,7 +46,7 @@ double SmoothCondition(const Axes& a, const MatrixXd& gram, MatrixXd& derivative
   const VectorXd d_value = (up / up.sum() - down / down.sum()) / (2 * a.value.array());
   const MatrixXd d_scaled = a.vector * d_value.asDiagonal() * a.vector.transpose();
   derivative = a.scale.asDiagonal() * d_scaled * a.scale.asDiagonal();
-  // The scaling, too, follows the diagonal.
+  // The scaling depends on the diagonal, too.
   derivative.diagonal() -= d_scaled.cwiseProduct(a.scaled).rowwise().sum().cwiseQuotient(gram.diagonal());
   return (std::log(up.sum()) + std::log(down.sum())) / kNorm;
 }

@@ -1,4 +1,4 @@
-// excitation - what makes a motion a good one, as a figure of the Gram matrix of K; knows no trajectory.
+// excitation - the criteria that rate a motion. Each is a figure of the Gram matrix of K.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@ struct Criterion {
   enum class Kind {
     kCondition,  // (26): cond(K), columns scaled to unit norm
     kDOptimal,   // det(G)^(-1 / 2 n): the geometric mean of the standard deviations along G's axes
-    kAccuracy    // the geometric mean of the standard deviations of the parameters `about`, all others unknown, too
+    kAccuracy    // the geometric mean of the standard deviations of the parameters `about`, with all others unknown
   };
   Kind kind = Kind::kCondition;
   std::vector<int> about{};  // kAccuracy: places in the Gram matrix
@@ -19,8 +19,8 @@ struct Criterion {
 // gram: sum of K' R^-1 K over the samples. Infinite if K is singular to working precision.
 double Figure(const Criterion& criterion, const Eigen::MatrixXd& gram);
 
-// Logarithm of the figure for a search, smooth (kCondition: a norm with p = 10 above it, within 2 log(n) / p), and its
-// derivative by the Gram matrix. Infinite if K is singular, then without a derivative.
+// A smooth logarithm of the figure, for searches, and its derivative by the Gram matrix. For kCondition it is a norm
+// with p = 10, above the figure by at most 2 log(n) / p. Infinite, without a derivative, if K is singular.
 double SmoothFigure(const Criterion& criterion, const Eigen::MatrixXd& gram, Eigen::MatrixXd& derivative);
 
 // Standard deviation of each parameter when all are estimated together, [n]; infinite if K is singular.

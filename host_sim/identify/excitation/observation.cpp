@@ -1,4 +1,4 @@
-// excitation - weighted regressor, its Gram matrix and condition number; knows no trajectory family.
+// excitation - the weighted regressor, its Gram matrix and its condition number.
 #include "host_sim/identify/excitation/observation.hpp"
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 namespace armcal::excitation {
 namespace {
 
-constexpr Eigen::Index kPiece = 1024;  // samples evaluated at once: rows of a minute would fill the memory
+constexpr Eigen::Index kPiece = 1024;  // samples evaluated at once, since the rows of a minute would fill the memory
 
 bool MotionShows(const codegen::Model& model, const std::string& effect) {
   for (const codegen::EffectInstance& e : model.effects())

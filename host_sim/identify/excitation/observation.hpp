@@ -1,4 +1,4 @@
-// excitation - how well a motion shows a model's parameters, equation (26), and its torque; knows no trajectory family.
+// excitation - how well a motion shows a model's parameters, equation (26), and the torque that it needs.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,12 +9,12 @@
 
 namespace armcal::excitation {
 
-// Motion alone shows the effect: it looks at no temperature, time or flag, is no state of the run, and has no memory
-// (a row would then depend on all samples before).
+// True if motion alone shows the effect. Then it reads no temperature, time or flag, is no state of the run, and has no
+// memory; with memory a row would depend on all samples before.
 bool MotionShows(const codegen::EffectRecord& record);
 
-// One convention for the condition number of K: columns are the filter coordinates that are estimated (rigid base,
-// Coulomb, viscous, effects), rows are divided by their joint's torque noise, columns are scaled to unit norm.
+// Defines the condition number of K for all of armcal. Columns are the filter coordinates that are estimated: rigid
+// base, Coulomb, viscous, effects. Rows are divided by their joint's torque noise. Columns are scaled to unit norm.
 class Observation {
  public:
   enum class Rotors { kAsked, kLeftOut };
@@ -32,7 +32,7 @@ class Observation {
   // row[i]: [samples x model columns], at the robot file's values where a column depends on them. Reuses row's memory.
   void Rows(const codegen::Signals& s, std::vector<Eigen::MatrixXd>& row) const;
 
-  // The file's torque, [samples x joints]. Only joints whose bodies are known: see Model::robot().has_prior.
+  // The torque by the robot file's values, [samples x joints]. The file must know bodies: Model::robot().has_prior.
   Eigen::MatrixXd Torque(const codegen::Signals& s) const;
 
   // sum_i K_i' K_i / noise_i^2 over the columns asked for, of the first `samples` rows.
@@ -44,9 +44,8 @@ class Observation {
   // cond(K); infinite if a column is zero or K is singular to working precision.
   double ConditionNumber(const codegen::Signals& s) const;
 
-  // Places among columns() of the friction and effects of these names, "coulomb_viscous" for Coulomb and viscous
-  // friction, "stribeck" or "stribeck:3" for an effect on every joint or on joint 3. InputError: a name without a
-  // column.
+  // The places of these friction terms and effects among columns(). "coulomb_viscous" is Coulomb and viscous friction;
+  // "stribeck" is an effect on every joint, "stribeck:3" on joint 3. InputError: a name without a column.
   std::vector<int> Places(const std::vector<std::string>& effects) const;
 
  private:

@@ -1,4 +1,4 @@
-// excitation - peaks of a motion, and a series scaled back until it keeps the limits; knows nothing of collisions.
+// excitation - finds the peaks of a motion, and reduces a series until it keeps the limits.
 #include "host_sim/identify/excitation/peaks.hpp"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ double LargestShare(const std::vector<JointPeaks>& peaks) {
   return share;
 }
 
-// Poses at the edge of what `share` allows are chosen on purpose.
+// The tolerance is needed because some poses lie exactly at the edge of what `share` allows.
 bool Keeps(const std::vector<JointPeaks>& peaks, double share) { return LargestShare(peaks) <= share * (1 + 1e-9); }
 
 codegen::Signals Sampled(const trajectory::TrajectorySpline& spline, double step_s) {
@@ -58,7 +58,7 @@ bool ScaleToLimits(const Observation& observation, double share, Series& series)
   const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(points, 0, kCheckStep_s * static_cast<double>(points - 1));
   const auto keeps = [&](double factor) { return Keeps(FindPeaks(observation, series.Scaled(factor).At(t)), share); };
 
-  // Position, speed and acceleration are linear in the amplitude: their factor follows from one look.
+  // Position, speed and acceleration are linear in the amplitude, so their factor follows from one evaluation.
   double factor = 1;
   const std::vector<JointPeaks> peaks = FindPeaks(observation, series.At(t));
   for (int j = 0; j < robot.joints(); ++j) {
@@ -71,7 +71,7 @@ bool ScaleToLimits(const Observation& observation, double share, Series& series)
                        room_down / std::max(q0 - p.lowest_rad, room_down), share / std::max(p.speed_share, share),
                        share / std::max(p.acceleration_share, share)});
   }
-  // Torque is not linear (gravity): halve the bracket. 12 steps leave 1/4000 of the amplitude.
+  // Torque is not linear, because of gravity. So the bracket is halved: 12 steps leave 1/4000 of the amplitude.
   if (!keeps(factor)) {
     if (!keeps(0)) return false;
     double good = 0, bad = factor;

@@ -1,5 +1,5 @@
-// excitation - the largest position, speed, acceleration and torque of a motion and their share of the limits.
-// Knows nothing of collisions.
+// excitation - the largest position, speed, acceleration and torque of a motion, and their shares of the limits.
+// Collisions are not checked.
 #pragma once
 
 #include <vector>
@@ -18,20 +18,20 @@ struct JointPeaks {
   double position_share = 0, speed_share = 0, acceleration_share = 0, torque_share = 0;
 };
 
-// Torque by the robot file's values; with prior = "none" nobody knows it: torque and its share are 0.
+// Torque by the robot file's values. With prior = "none" it is unknown: torque and its share are 0.
 std::vector<JointPeaks> FindPeaks(const Observation& observation, const codegen::Signals& s);
 
 // The largest share of any limit of any joint.
 double LargestShare(const std::vector<JointPeaks>& peaks);
 
-// Is it at most `share`, but for round-off?
+// True if it is at most `share`, up to round-off.
 bool Keeps(const std::vector<JointPeaks>& peaks, double share);
 
 // The motion along the spline, on the check grid or any other: q, qd, qdd.
 codegen::Signals Sampled(const trajectory::TrajectorySpline& spline, double step_s = kCheckStep_s);
 
-// The series with its amplitude reduced (never enlarged) until every share is at most `share` on the check grid over
-// one period. False: not even the pose q0 keeps it.
+// Reduces the series' amplitude until every share is at most `share` on the check grid over one period. Never enlarges
+// it. False: even the pose q0 breaks a limit.
 bool ScaleToLimits(const Observation& observation, double share, Series& series);
 
 }  // namespace armcal::excitation

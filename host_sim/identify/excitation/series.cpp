@@ -1,4 +1,4 @@
-// excitation - the terms of each family and their derivatives; knows no limits and no model.
+// excitation - the terms of each family of curves, and their derivatives.
 #include "host_sim/identify/excitation/series.hpp"
 
 #include <cmath>
@@ -55,7 +55,7 @@ ArrayXd BSpline(const ArrayXd& u, int order) {
   return (u < 6).select(factor * out, 0);
 }
 
-// Spline i of n on a period: what reaches beyond the end comes in again at the begin.
+// Spline i of n on a period. The part beyond the end of the period is added at its begin.
 ArrayXd Periodic(const ArrayXd& s, int i, int n, double period_s, int order) {
   const double per_s = n / period_s;
   ArrayXd out = ArrayXd::Zero(s.size());

@@ -1,5 +1,4 @@
-// excitation - the periodic curves of the survey's section 4, linear in their coefficients; knows no limits and no
-// model.
+// excitation - the periodic curves of the survey's section 4. All are linear in their coefficients.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,8 +19,8 @@ inline constexpr Family kFamilies[] = {Family::kFourier, Family::kSine, Family::
 const char* Name(Family family);
 Family FamilyNamed(const std::string& name);  // InputError: none of them
 
-// Derivative `order` (0, 1, 2) of each term and of the offset at the times t: [t.size() x terms + 1]; times the
-// coefficients it is the motion.
+// Derivative `order` (0, 1, 2) of each term and of the offset at the times t: [t.size() x terms + 1]. Multiplied by the
+// coefficients it gives the motion.
 Eigen::MatrixXd Basis(Family family, const Eigen::VectorXd& t, double period_s, int terms, int order);
 
 struct Series {

@@ -1,4 +1,4 @@
-// excitation - effects named by a user become estimated effects of a robot in memory.
+// excitation - turns effects that the user names into estimated effects of a robot in memory.
 #include "host_sim/identify/excitation/target.hpp"
 
 #include <algorithm>
@@ -32,15 +32,15 @@ Wanted Parse(const std::string& name) {
   return wanted;
 }
 
-// Instances that the robot has already keep their values, unless others were found.
+// An instance that the robot already has keeps its values, unless others were found.
 void Estimate(const codegen::EffectRecord& record, const std::vector<int>& joints,
               const std::vector<codegen::EffectUse>& found, codegen::Robot& robot) {
   codegen::EffectUse use;
   use.effect = record.name;
   for (const codegen::EffectUse& known : robot.effect)
     if (known.effect == record.name &&
-        (known.joints == joints ||
-         (record.scope == codegen::EffectScope::kJoint && std::count(known.joints.begin(), known.joints.end(), joints[0]) > 0)))
+        (known.joints == joints || (record.scope == codegen::EffectScope::kJoint &&
+                                    std::count(known.joints.begin(), known.joints.end(), joints[0]) > 0)))
       use = known;
   for (const codegen::EffectUse& f : found)
     if (f.effect == record.name && f.joints == joints) use.nonlinear = f.nonlinear;
@@ -65,7 +65,7 @@ void Add(const std::string& name, const codegen::Catalogue& records, const std::
     throw io::InputError(name + ": expected joints of " + robot.name + " that " + wanted.record + " can have");
 }
 
-// States as no path has them, slow ones among them: what these do not tell apart, no motion does.
+// Random states, slow ones among them. No path has them all, so effects that they do not tell apart, no motion does.
 codegen::Signals AnyStates(const codegen::Robot& robot) {
   constexpr int kSamples = 1500;
   std::mt19937_64 random(1);
@@ -94,7 +94,7 @@ Target::Target(const codegen::Robot& robot, const codegen::Catalogue& records, C
 
 Target::Target(codegen::Robot robot, const codegen::Catalogue& records, const std::vector<std::string>& effects,
                const std::vector<codegen::EffectUse>& found) {
-  std::vector<std::string> asked;  // as Places has them: several joints share a column that belongs to none of them
+  std::vector<std::string> asked;  // as Places names them: a column that several joints share belongs to none of them
   for (const std::string& name : effects) {
     Add(name, records, found, robot);
     const Wanted wanted = Parse(name);

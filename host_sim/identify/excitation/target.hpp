@@ -1,5 +1,4 @@
-// excitation - the model that a search looks at: the robot's own, and effects that are to show although the robot does
-// not have them. Knows no trajectory.
+// excitation - the model that a search looks at: the robot, and effects to look for that the robot does not declare.
 #pragma once
 
 #include <memory>
@@ -15,12 +14,12 @@ class Target {
  public:
   // The robot's own parameters, all of them.
   Target(const codegen::Robot& robot, const codegen::Catalogue& records, Criterion::Kind kind);
-  // effects: to be told apart and from all else: "record" (every joint), "record:2", "record:1-2". found: uses whose
-  // nonlinear parameters are known; those of the others are the robot's or the record's. InputError: no such record or
-  // joints, or one whose column motion alone does not show.
+  // The motion is to tell these effects from each other and from all else. An effect is named "record" (every joint),
+  // "record:2" or "record:1-2". found: effects whose nonlinear parameters are known; the others take those of the robot
+  // or of the record. InputError: there is no such record or joint, or motion alone does not show the effect.
   Target(codegen::Robot robot, const codegen::Catalogue& records, const std::vector<std::string>& effects,
          const std::vector<codegen::EffectUse>& found = {});
-  // Every parameter of friction, and a Stribeck term on every joint: it shows where low speeds do.
+  // Every parameter of friction, and a Stribeck term on every joint, so that the motion has low speeds, too.
   static Target Friction(const codegen::Robot& robot, const codegen::Catalogue& records);
 
   const Observation& observation() const { return *observation_; }
@@ -32,7 +31,8 @@ class Target {
   Criterion criterion_;
 };
 
-// Some motion within the limits of speed and acceleration tells these effects from each other and from all else.
+// True if some motion within the limits of speed and acceleration tells these effects from each other and from all
+// else.
 bool CanSeparate(const codegen::Robot& robot, const codegen::Catalogue& records,
                  const std::vector<std::string>& effects, const std::vector<codegen::EffectUse>& found = {});
 

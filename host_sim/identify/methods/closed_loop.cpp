@@ -1,7 +1,7 @@
-// methods - time stepping of the arm under its control law; knows no true arm.
+// methods - simulates the arm under its control law, step by step, and makes logs along that motion.
 #include "host_sim/identify/methods/closed_loop.hpp"
-
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -10,6 +10,7 @@
 #include "codegen/src/generator/dynamics.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/quintic_spline.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -211,6 +212,52 @@ ClosedLoop MakeClosedLoop(const codegen::Model& model, std::map<std::string, Mat
       throw io::InputError(log.source + ": expected a reference (qref) for every sample");
     return simulator->Run(log.s.t, it->second, z).s;
   };
+}
+
+namespace {
+
+constexpr double kFollows = 0.1;
+constexpr double kSmallestShare = 0.125;
+
+bool Follows(const codegen::Signals& s, const codegen::Signals& path) {
+  for (Eigen::Index j = 0; j < path.q.cols(); ++j) {
+    const auto motion = path.q.col(j).array() - path.q.col(j).mean();
+    if ((s.q.col(j) - path.q.col(j)).squaredNorm() > kFollows * kFollows * motion.square().sum()) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+LoopLogs::LoopLogs(const Problem& problem, const char* method) : problem_(problem) {
+  if (!problem.closed_loop)
+    throw io::InputError(std::string("method ") + method +
+                         ": expected a control law in the robot file and a log with qref");
+  if (!Run(problem.start))
+    throw io::InputError(std::string("method ") + method +
+                         ": the arm with the robot file's values runs away in simulation; expected gains and values "
+                         "with which it follows its reference");
+  start_ = logs_;
+}
+
+bool LoopLogs::Run(const VectorXd& z) {
+  logs_.clear();
+  for (const Dataset* log : problem_.train) {
+    Dataset copy = *log;
+    copy.s = problem_.closed_loop(*log, z);
+    copy.s.temp = log->s.temp;
+    if (!copy.s.q.allFinite() || !copy.s.qd.allFinite() || !copy.s.qdd.allFinite()) return false;
+    if (!start_.empty() && !Follows(copy.s, start_[logs_.size()].s)) return false;
+    logs_.push_back(std::move(copy));
+  }
+  return true;
+}
+
+double LoopLogs::Simulate(const VectorXd& z) {
+  for (; share_ >= kSmallestShare; share_ /= 2)
+    if (Run(problem_.start + share_ * (z - problem_.start))) return share_;
+  logs_ = start_;
+  return share_ = 0;
 }
 
 }  // namespace armcal::calibration

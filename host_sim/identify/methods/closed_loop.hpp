@@ -1,16 +1,17 @@
-// methods - the arm under its robot file's control law, with parameters that one chooses; knows no true arm.
+// methods - simulates the arm under its control law with parameters of your choice, and logs along that motion.
 //
 // pd_feedforward: tau = tau_ff(reference) + kp (qref - q) + kd (qdref - qd), cut to the torque limits. The arm is
 // M(q) qdd + V(q, qd) + G(q) + friction and effects = tau, from the model's own expressions.
 //
-// An arm without rotor inertia is very stiff: 0.003 kg m^2 against 8 N m of friction. Steps of half a control period
-// are therefore implicit in the control law and in friction's sign: a joint's speed after a step is the one at which
-// all torques balance, or zero where friction can hold it (Moreau's time stepping). It takes no smoothing of the sign
-// and is stable for every gain; the sampled law's delay of half a period is not in it.
+// An arm without rotor inertia is very stiff: 0.003 kg m^2 against 8 N m of friction. So a step, half a control period
+// long, is implicit in the control law and in friction's sign (Moreau's time stepping). A joint's speed after a step is
+// the one at which all torques balance, or zero where friction can hold it. The sign needs no smoothing, and every gain
+// is stable. The sampled law's delay of half a period is left out.
 #pragma once
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "host_sim/identify/methods/effect_point.hpp"
 #include "host_sim/identify/methods/method.hpp"
@@ -18,11 +19,11 @@
 namespace armcal::calibration {
 
 struct LoopSettings {
-  Eigen::VectorXd feedforward;  // [z] what the controller believes; empty: the model's table (the CAD values)
+  Eigen::VectorXd feedforward;  // [z] the controller's own parameters; empty: the model's table (the CAD values)
   bool encoder = false;         // the controller reads position and its difference in encoder steps
 };
 
-// At the sample times asked for; q_read: what the encoder says there (q itself without encoder).
+// The motion at the sample times asked for. q_read: what the encoder reads (q itself without encoder).
 struct LoopRun {
   codegen::Signals s;
   Eigen::MatrixXd q_read, tau;  // [N x n] rad, N m
@@ -58,5 +59,27 @@ class LoopSimulator {
 // For Problem::closed_loop: one simulation a call, reference by the log's `source`. InputError for a log without one.
 ClosedLoop MakeClosedLoop(const codegen::Model& model, std::map<std::string, Eigen::MatrixXd> reference,
                           const LoopSettings& settings = {});
+
+// The training logs with their signals replaced by those of a simulated arm.
+class LoopLogs {
+ public:
+  // Simulates the arm of problem.start. InputError naming the method where the problem has no closed loop, or where
+  // not even that arm can be simulated.
+  LoopLogs(const Problem& problem, const char* method);
+
+  // Simulates the arm of problem.start + share (z - start) and returns the share. It is 1 if the arm of z follows the
+  // path of the start's arm within a tenth of each joint's motion; under one control law two arms take nearly the same
+  // path. An estimate from noisy data may have a negative inertia and not follow. Then the share is the largest one
+  // tried that does. It never grows from call to call, since an iteration would otherwise jump between two shares.
+  double Simulate(const Eigen::VectorXd& z);
+  const std::vector<Dataset>& logs() const { return logs_; }  // of the last call
+
+ private:
+  bool Run(const Eigen::VectorXd& z);
+
+  const Problem& problem_;
+  std::vector<Dataset> start_, logs_;
+  double share_ = 1;
+};
 
 }  // namespace armcal::calibration

@@ -1,4 +1,4 @@
-// methods - friction and effects at one instant from the model's graph; knows no method.
+// methods - evaluates friction and effects at one instant, from the model's graph.
 #include "host_sim/identify/methods/effect_point.hpp"
 
 #include <map>

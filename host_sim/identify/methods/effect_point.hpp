@@ -1,4 +1,4 @@
-// methods - friction and effects at one instant, where a whole log is not known yet; knows no method.
+// methods - friction and effects at one instant, for methods that go sample by sample.
 #pragma once
 
 #include <span>
@@ -7,18 +7,18 @@
 
 namespace armcal::calibration {
 
-// The columns of a model that are no rigid ones and their derivative by eta, at one sample. Holds scratch: one thread.
+// The columns of a model that are not rigid, and their derivative by eta, at one sample. Holds scratch: one object a
+// thread.
 class EffectPoint {
  public:
   // InputError for a model with memory: its columns need the samples before.
   explicit EffectPoint(const codegen::Model& model);
 
-  // q, qd, qdd [n]; temp [n] or empty, then 0; z = [p, eta], p also stands for the committed model where a column
-  // depends on one.
+  // q, qd, qdd [n]; temp [n], or empty for 0; z = [p, eta]. Where a column depends on the committed model, p stands for
+  // it.
   void Set(double t, const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd,
            const Eigen::VectorXd& temp, const Eigen::VectorXd& z);
-  // Writes the values at the last Set. row: [n x columns], slope: [n x nonlinear], entries not named here are
-  // untouched.
+  // Writes the values at the last Set. row: [n x columns], slope: [n x nonlinear]. Other entries stay as they are.
   void Columns(Eigen::MatrixXd& row);
   void Slope(Eigen::MatrixXd& slope);
   // Torque of all effects at the last Set, [n].

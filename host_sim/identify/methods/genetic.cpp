@@ -1,10 +1,9 @@
-// methods - (25) by a genetic algorithm within ranges and among bodies that can exist.
-#include "host_sim/identify/search/genetic.hpp"
+// methods - minimises (25) by a genetic algorithm, within the ranges and among bodies that can exist.
+#include "host_sim/identify/search/minimise.hpp"
 
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/objective.hpp"
-#include "host_sim/identify/methods/search_space.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/search_problem.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -12,8 +11,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kLinear = 3000;    // generations; a value of a linear model takes some microseconds,
-constexpr int kNonlinear = 500;  // one of a nonlinear model a good part of a millisecond
+constexpr int kLinear = 3000;    // generations; one value takes some microseconds
+constexpr int kNonlinear = 500;  // generations; one value takes a good part of a millisecond
 
 }  // namespace
 
@@ -21,7 +20,7 @@ Solution Genetic(const Problem& problem) {
   const double began = CpuSeconds();
   const SearchSpace space(problem, "genetic algorithm");
   Objective objective(problem, Criterion::kMeanSpread);
-  // A genome stands for the nearest possible bodies on the way to the start.
+  // A genome whose bodies cannot exist is moved towards the start until they can.
   const auto point = [&](const VectorXd& u) { return space.Possible(space.Point(u)); };
   search::GeneticSettings settings;
   settings.generations = problem.model->nonlinear() ? kNonlinear : kLinear;

@@ -1,16 +1,15 @@
-// methods - (25) along its own gradient from Problem::start, within ranges and among bodies that can exist.
+// methods - minimises (25) along its gradient from Problem::start, within the ranges and among bodies that can exist.
 //
-// Spectral projected gradient (Birgin, Martinez, Raydan 2000): every step goes along the reverse gradient, as the
-// survey has it, with the step length of Barzilai and Borwein and a search that looks at the last ten values. A log-det
+// Spectral projected gradient (Birgin, Martinez, Raydan 2000). Every step goes against the gradient, as in the survey.
+// Its length is that of Barzilai and Borwein, shortened until the value beats the worst of the last ten. A log-det
 // barrier keeps bodies possible.
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/objective.hpp"
-#include "host_sim/identify/methods/search_space.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/search_problem.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -19,9 +18,9 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kLinearSteps = 50000, kNonlinearSteps = 8000;  // some seconds
-constexpr int kMemory = 10;                                  // values that a step may be worse than
-constexpr double kBarrier = 1e-3;    // of the objective at the start, per unit of log det: far below what data change
-constexpr double kSmallStep = 1e-7;  // of the ranges: the projected gradient leads nowhere
+constexpr int kMemory = 10;                                  // values; a step must beat the worst of them
+constexpr double kBarrier = 1e-3;  // of the objective at the start, per unit of log det: far less than what data change
+constexpr double kSmallStep = 1e-7;  // of the ranges: a smaller step ends the search
 
 VectorXd Clamped(const VectorXd& u) { return u.cwiseMax(0).cwiseMin(1); }
 
@@ -56,7 +55,7 @@ Solution GradientDescent(const Problem& problem) {
   Descent descent(objective, space, kBarrier * objective(problem.start));
   VectorXd u = Clamped(space.Place(problem.start)), gradient, next_gradient;
   double value = descent(u, gradient), best = value;
-  if (!std::isfinite(value)) {  // the start lies outside its ranges, and within them no such body can exist
+  if (!std::isfinite(value)) {  // cut to its ranges, the start has bodies that cannot exist
     u = space.Place(space.Possible(space.Point(u)));
     best = value = descent(u, gradient);
   }

@@ -1,18 +1,17 @@
-// methods - iterated extended Kalman filter, (21), with what must stay positive as logarithms; knows no
-// truth.
+// methods - the iterated extended Kalman filter, (21), with positive parameters as logarithms.
 //
-// As (21), but it starts from the prior (its covariance mapped from the CAD table), R is the torque's variance, and the
-// amplitudes of nonlinear effects (Fs - Fc) and their positive eta (q_s) are filtered as logarithms, cut to their
-// range: q_s can neither change its sign nor grow until exp(-(v / q_s)^2) is constant, which is how the survey's filter
-// dies.
+// As (21), with three changes. It starts from the prior, whose covariance comes from the CAD table. R is the variance
+// of the torque. The amplitudes of nonlinear effects (Fs - Fc) and their positive eta (q_s) are filtered as logarithms,
+// cut to their range. So q_s can neither change its sign nor grow until exp(-(v / q_s)^2) is constant, which is how the
+// survey's filter fails.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/better_methods.hpp"
 #include "host_sim/identify/methods/effect_point.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -22,7 +21,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kRelinearised = 2;       // passes over one sample
-constexpr double kUnknownShare = 0.1;  // of its deviation: where an amplitude starts whose mean is zero
+constexpr double kUnknownShare = 0.1;  // of its deviation: the start of an amplitude whose mean is zero
 constexpr double kWidestLog = 1.5;     // prior deviation of a logarithm: a factor of 4.5
 constexpr double kReach = 4;           // prior deviations that a logarithm may move from its start
 

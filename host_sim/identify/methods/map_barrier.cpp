@@ -1,15 +1,15 @@
-// methods - maximum a posteriori with the prior in table coordinates and a log-det barrier; knows no truth.
+// methods - the most probable parameters under a prior in table coordinates. A log-det barrier keeps bodies possible.
 //
-// Beats (15): the directions that K does not see stay at the CAD values, and every body can exist. Linear models cost
-// one Gram matrix and some 20 small steps; nonlinear ones are linearised anew in each step.
+// Better than (15), because directions that K does not see stay at the CAD values and every body can exist. A linear
+// model costs one Gram matrix and some 20 small steps. A nonlinear one is linearised again in each step.
 #include <cmath>
 #include <limits>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/information.hpp"
-#include "host_sim/identify/methods/better_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-// C(x) of the used rows; a linear model's sums are taken joint by joint, without the stacked K.
+// C(x) of the used rows of a linear model. Sums are taken joint by joint, without stacking K.
 DataTerm LinearTerm(const Problem& problem, const VectorXd& x) {
   const codegen::Model& model = *problem.model;
   const int columns = model.columns();
@@ -69,7 +69,7 @@ Solution MapBarrier(const Problem& problem) {
   barrier.bodies_sd = VectorXd::Zero(barrier.bodies.size());
   for (int k = 0; k < barrier.bodies.size(); ++k)
     if (model.table()[k].state == "estimated") barrier.bodies_sd[k] = model.table()[k].sd;
-  // Parameters left out of the filter coordinates (zero columns of the map) are told by the prior alone.
+  // Only the prior tells of parameters that are in no filter coordinate (zero columns of the map).
   barrier.x = problem.start;
   barrier.x_sd = VectorXd::Zero(problem.start.size());
   for (const int c : FreeCoordinates(problem)) {

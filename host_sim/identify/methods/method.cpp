@@ -6,8 +6,7 @@
 #include <limits>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/better_methods.hpp"
-#include "host_sim/identify/methods/classic_methods.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
 
 namespace armcal::calibration {
 
@@ -21,7 +20,8 @@ std::span<const double> Tail(const VectorXd& z, int count) {
   return {z.data() + z.size() - count, static_cast<std::size_t>(count)};
 }
 
-// What nobody has measured lies anywhere in its range: a quarter of it, of its logarithm where that is the scale.
+// A parameter that was never measured lies anywhere in its range. Its deviation is a quarter of the range, or of the
+// range's logarithm where that is the scale.
 double UnknownDeviation(const codegen::EffectUnknown& u, double value) {
   return u.logarithmic ? value * 0.25 * std::log(u.upper / u.lower) : 0.25 * (u.upper - u.lower);
 }

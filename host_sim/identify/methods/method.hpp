@@ -1,5 +1,4 @@
-// methods - one interface for every identification method: those of the survey's section 3 and those that beat
-// them; knows no table of the survey and no file.
+// methods - one interface for every identification method: those of the survey's section 3, and better ones.
 //
 // Unknowns z = [p, eta]: p the model's filter coordinates (phi of (12); body parameters, friction, effects), eta its
 // nonlinear parameters (those of f in (13)). With `[parameters] set = "standard"` in the robot file p holds every body
@@ -17,8 +16,8 @@
 
 namespace armcal::calibration {
 
-// What a simulation of the closed loop with given parameters moves through: signals at the samples of a log, from the
-// log's own reference. Methods that build instruments call it with THEIR estimate, never with a truth.
+// Simulates the closed loop with given parameters along the log's own reference; returns the signals at the log's
+// samples. Methods that build instruments call it with their own estimate, never with a truth.
 using ClosedLoop = std::function<codegen::Signals(const Dataset& log, const Eigen::VectorXd& z)>;
 
 struct Problem {
@@ -26,7 +25,7 @@ struct Problem {
   std::vector<const Dataset*> train;  // rows with used = 1 count; samples in order of time
   Eigen::VectorXd sigma_Nm;           // [n] standard deviation of a torque sample
   Eigen::VectorXd start;              // [z] prior mean
-  Eigen::MatrixXd covariance;         // [z x z] prior; 0 x 0: nobody knows anything
+  Eigen::MatrixXd covariance;         // [z x z] prior; 0 x 0: none
   Eigen::VectorXd lower, upper;       // [z] ranges that a search may use
   ClosedLoop closed_loop;             // empty: the control law is not known
   double forgetting = 0.998;          // mu of (22)-(24)
@@ -38,15 +37,15 @@ struct Problem {
 struct Solution {
   Eigen::VectorXd z;
   Eigen::MatrixXd covariance;  // [z x z]; 0 x 0 where the method gives none
-  Eigen::VectorXd bodies;  // [11 n] standard parameters about link origins, read out of z with what the method knows
-  bool physical = false;   // every body of `bodies` can exist
+  Eigen::VectorXd bodies;      // [11 n] standard parameters about link origins, read out of z
+  bool physical = false;       // every body of `bodies` can exist
   bool converged = true;
   int iterations = 0;
   double seconds = 0;            // of this call, one thread's CPU time
   std::size_t memory_bytes = 0;  // of what grows with samples or particles, and the method's own matrices
   double from_prior = 0;  // share of the posterior information that the prior gave, mean over coordinates; 0: none used
   Eigen::MatrixXd path;   // [samples x z] estimate after each sample; online methods only
-  std::string remark;     // what a reader must know: "diverged at sample 311", ...
+  std::string remark;     // for the reader: "diverged at sample 311", ...
 };
 
 struct Method {
@@ -63,9 +62,9 @@ struct Method {
 
 // All of them, those of the survey first.
 const std::vector<Method>& Methods();
-// InputError naming the known ones.
+// InputError that names the known ones.
 const Method& FindMethod(const std::string& name);
-// Runs a method. InputError, one line, where the model is not one it takes or the problem lacks what it needs.
+// Runs a method. InputError, one line, where it does not take such a model or the problem lacks what it needs.
 Solution Solve(const Method& method, const Problem& problem);
 
 // Prior mean, covariance and ranges from the model's table; ranges: +-3 prior standard deviations, cut to the bounds.
@@ -74,8 +73,7 @@ Problem MakeProblem(const codegen::Model& model, std::vector<const Dataset*> tra
 // The same problem along other logs, which must outlive it.
 Problem Along(const Problem& problem, const std::vector<Dataset>& logs);
 
-// Rows of all used samples at eta: K [rows x columns], tau [rows], joint and sample of each row. For methods that look
-// at everything at once; online methods take sample by sample.
+// Rows of all used samples at eta: K [rows x columns], tau [rows], joint, log and sample of each row.
 struct Rows {
   Eigen::MatrixXd K;
   Eigen::VectorXd tau;

@@ -1,16 +1,16 @@
-// methods - three Kalman filters for friction that changes while one identifies; knows no truth.
+// methods - a bank of three Kalman filters, for friction that changes during the run.
 //
-// The bank (IMM, Blom and Bar-Shalom 1988) shares the model and differs in how fast viscous friction may change: its
-// states carry beta and beta's slope. Process noise on friction alone, none on bodies, so directions that no sample
-// sees do not inflate, as they do under the forgetting of (23), (24). A joint at rest is neither updated nor allowed to
-// drift.
+// The three filters (IMM, Blom and Bar-Shalom 1988) share the model. They differ in how fast viscous friction beta may
+// change; their states hold beta and its slope. Only friction has process noise, bodies have none. So the variance of
+// directions that no sample sees does not grow, as it does under the forgetting of (23), (24). The friction of a joint
+// at rest is neither updated nor allowed to drift.
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/better_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -31,8 +31,8 @@ constexpr double kStay = 0.995, kLeast = 1e-4;
 constexpr int kMixEvery = 10;
 
 struct Tracked {
-  int joint, column, slope;  // slope: state, -1 for one that only walks
-  double size;               // what relative means
+  int joint, column, slope;  // slope: its state; -1: the column has a random walk alone
+  double size;               // what the relative deviations refer to
 };
 
 struct Filter {

@@ -1,16 +1,24 @@
-// methods - covariance form, one sample at a time; knows no prior.
-#include "host_sim/identify/methods/online_filter.hpp"
-
+// methods - the survey's recursive methods: (19) Kalman, (21) extended Kalman, (23) and (24) exponential forgetting.
+//
+// All share one recursion. With forgetting mu it does this for each sample:
+//   G = P K' (K P K' + mu I)^-1,  z += G (tau_j - prediction),  P = (I - G K) P / mu.
+// mu = 1 gives (19) and (21) with R = I; mu < 1 gives (23) and (24). A linear model predicts K p. A nonlinear one
+// predicts K_d p_d + f(p_f), and K = [K_d, d f / d p_f] is taken at the estimate of that sample. In (21) and (24) the
+// survey prints tau_f for tau_j and P_k for P_n. P is neither made symmetric nor bounded, because the survey's is not.
+//
+// Start: p = 0, P = 100 I. Nonlinear parameters start at Problem::start: a Stribeck speed of zero divides by zero.
+// Where their range is positive, the law sees their magnitude, as in (4), and the magnitude is the result. path holds
+// every sample of every log, and NaN after a divergence. A sample without used rows only ages P.
 #include <fmt/core.h>
-
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/methods/effect_point.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/minimum_norm.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -144,6 +152,23 @@ Solution RunOnline(const Problem& problem, double forgetting, double start_varia
   Finish(problem, began, out);
   out.from_prior = 0;
   return out;
+}
+
+// (19) as the survey prints it: zero start, P0 = 100 I, R = I.
+Solution Kalman(const Problem& problem) {
+  ExpectLinear(problem, "Kalman filter");
+  return RunOnline(problem, 1);
+}
+
+// (21) as the survey prints it, with tau_j for its tau_f and P_n for its P_k. On a linear model it is (19).
+Solution ExtendedKalman(const Problem& problem) { return RunOnline(problem, 1); }
+
+// (23) for linear and (24) for nonlinear models, as the survey prints them.
+Solution Forgetting(const Problem& problem) {
+  if (!(problem.forgetting > 0 && problem.forgetting <= 1))
+    throw io::InputError("exponential forgetting: expected mu of (23) in (0, 1], not " +
+                         std::to_string(problem.forgetting));
+  return RunOnline(problem, problem.forgetting);
 }
 
 }  // namespace armcal::calibration

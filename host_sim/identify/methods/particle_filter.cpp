@@ -1,17 +1,16 @@
-// methods - (25) by particles: weighted by exp(-J / T), resampled, moved, while the temperature T falls.
+// methods - minimises (25) by particles: weighted by exp(-J / T), resampled and moved, while the temperature T falls.
 //
-// Particles are drawn from the whole ranges; no initial value is used (Problem::start only says which side of the cone
-// of possible bodies is inside). T falls so slowly that most particles keep a say. A particle moves along the
-// difference of two others, so that the cloud's own shape is the proposal (ter Braak 2006), and the move counts with
-// the chance that the weights ask for.
+// Particles are drawn from the whole ranges. No initial value is used: Problem::start only lies inside the cone of
+// possible bodies. T falls so slowly that most particles keep some weight. A particle moves along the difference of two
+// others, so the cloud's own shape is the proposal (ter Braak 2006). The move is accepted with the chance that the
+// weights give.
 #include <algorithm>
 #include <cmath>
 #include <random>
 
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/objective.hpp"
-#include "host_sim/identify/methods/search_space.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/search_problem.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -20,14 +19,14 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kPerUnknown = 6;       // particles per unknown: the cloud must span all directions, and some to spare
+constexpr int kPerUnknown = 6;       // particles per unknown: the cloud must span all directions with some to spare
 constexpr double kJitter = 1e-4;     // of the ranges, so that a cloud that has lost a direction finds it again
 constexpr double kCollapsed = 1e-6;  // of the objective
-constexpr double kTaken = 0.25;      // share of moves that count, kept by the length of the moves
-constexpr double kWholeStep = 0.1;   // share of moves with the whole difference: from one hollow to another
+constexpr double kTaken = 0.25;      // share of moves to accept; the length of the moves is adapted to it
+constexpr double kWholeStep = 0.1;   // share of moves with the whole difference, which lead from one minimum to another
 
-// Rounds of weighting, resampling, moving, and the effective share of particles that each fall of the temperature
-// leaves: a value of a linear model takes some microseconds, one of a nonlinear model a good part of a millisecond.
+// rounds: of weighting, resampling and moving. say: the effective share of particles that each fall of the temperature
+// leaves. A linear model's value takes some microseconds, a nonlinear one's a good part of a millisecond.
 struct Schedule {
   int rounds;
   double say;
@@ -78,7 +77,7 @@ class Cloud {
   }
 
   double best() const { return best_; }
-  // All particles are as good as the best: nothing left to choose among.
+  // All particles are as good as the best one.
   bool collapsed() const { return value_.maxCoeff() - best_ < kCollapsed * best_; }
   const VectorXd& best_point() const { return best_point_; }
   std::size_t memory_bytes() const {
@@ -92,7 +91,7 @@ class Cloud {
     if (x > 1) x = 2 - x;
     return std::clamp(x, 0.0, 1.0);
   }
-  // u becomes the place of a possible point.
+  // Moves u to bodies that can exist.
   double Value(VectorXd& u) {
     const VectorXd z = space_.Possible(space_.Point(u));
     u = space_.Place(z);
@@ -112,7 +111,7 @@ class Cloud {
     added_ = low;
     per_temperature_ += low;
   }
-  // Systematic: one random number, every particle as often as its weight says, within one.
+  // Systematic resampling: one random number; each particle is taken as often as its weight says, within one.
   void Resample() {
     const Eigen::ArrayXd w = (-added_ * (value_.array() - value_.minCoeff())).exp();
     const Eigen::Index count = value_.size();

@@ -1,12 +1,11 @@
-// methods - (15), plain and with rows over sigma_j; knows no prior and no range.
+// methods - the pseudo-inverse (15), plain and with rows over sigma_j.
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <limits>
 
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/minimum_norm.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -15,8 +14,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-// Singular values below rows x rounding x the largest count as zero, as in MATLAB's pinv: the columns that the torque
-// cannot tell apart leave rounding noise there, every other direction lies ten orders above.
+// Singular values below rows x rounding x the largest count as zero, as in MATLAB's pinv. Columns that the torque
+// cannot tell apart leave rounding noise there; every other direction lies ten orders above.
 double Threshold(Eigen::Index rows, Eigen::Index columns) {
   return static_cast<double>(std::max(rows, columns)) * std::numeric_limits<double>::epsilon();
 }
@@ -51,8 +50,8 @@ Solution Solve(const Problem& problem, const char* name, bool weighted) {
   const VectorXd x =
       svd.matrixV() * (inverse.asDiagonal() * (svd.matrixU().transpose() * triangle.col(count).head(count)));
 
-  // Of an estimate K^+ tau with noise Sigma: K^+ Sigma K^+'. Directions that no row sees get no variance: the method
-  // takes them as zero.
+  // The covariance of K^+ tau under noise Sigma is K^+ Sigma K^+'. Directions that no row sees get no variance, because
+  // the method takes them as zero.
   MatrixXd P = svd.matrixV() * inverse.cwiseAbs2().asDiagonal() * svd.matrixV().transpose();  // (K' K)^+
   if (!weighted) {
     const MatrixXd noisy = sigma.asDiagonal() * A.topLeftCorner(sigma.size(), count);

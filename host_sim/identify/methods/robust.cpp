@@ -1,15 +1,15 @@
-// methods - iteratively reweighted least squares against outliers: Huber, then bisquare; knows no truth.
+// methods - least squares with weights that reject outliers: Huber, then bisquare.
 //
-// A row's weight falls with its residual in robust standard deviations of its joint (median absolute deviation /
-// 0.6745, never below the stated torque noise): Huber 1.345, which is convex and finds the way, then Tukey's
-// bisquare 4.685, which gives outliers no weight at all; both 95 % efficient on Gaussian noise.
+// A row's weight falls with its residual, counted in robust standard deviations of its joint: median absolute deviation
+// / 0.6745, but never below the stated torque noise. Huber's weights (1.345) are convex and find the minimum. Tukey's
+// bisquare (4.685) then gives outliers no weight at all. Both are 95 % efficient on Gaussian noise.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "host_sim/identify/methods/better_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 

@@ -1,25 +1,25 @@
-// methods - Stribeck friction (4) by a fixed linear basis, (Fs - Fc, q_s) read out of it afterwards; knows
-// no truth.
+// methods - Stribeck friction (4) by a fixed linear basis; (Fs - Fc, q_s) are read out of it afterwards.
 //
-// exp(-(v / q_s)^delta), delta <= 2, is a mixture of Gaussians of v, so w_k sgn(v) exp(-(v / q_k)^2) with a few fixed
-// q_k spans it: what runs along the samples is linear and cannot diverge, the sums H, g. Read-out: the linear
-// parameters are eliminated (Schur), leaving a quadratic in w; then w = (Fs - Fc) c(q_s, delta) joint by joint, c by
-// least squares, and Levenberg-Marquardt over log(Fs - Fc), log q_s, delta, with the prior where there is one.
+// For delta <= 2, exp(-(v / q_s)^delta) is a mixture of Gaussians of v. So the terms w_k sgn(v) exp(-(v / q_k)^2) with
+// a few fixed q_k span it. The work along the samples is then linear and cannot diverge: the sums H and g. Read-out:
+// the linear parameters are eliminated (Schur complement), which leaves a quadratic in w. For each joint w = (Fs - Fc)
+// c(q_s, delta), with c by least squares. Levenberg-Marquardt then searches log(Fs - Fc), log q_s and delta, with the
+// prior where there is one.
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/better_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 namespace {
-constexpr double kRatio = 1.8;  // of neighbouring q_k: the mixture errs by at most 0.022
+constexpr double kRatio = 1.8;  // of neighbouring q_k: the mixture is wrong by at most 0.022
 constexpr int kMostBasis = 10, kGrid = 240, kSpeedsTried = 10, kBasisSteps = 60;
 constexpr double kUnknownLog = 1.5;  // prior deviation of log(Fs - Fc) where its mean is zero: a factor of 4.5
 
@@ -74,7 +74,7 @@ std::vector<Law> FindLaws(const Problem& problem) {
   return laws;
 }
 
-// What all samples say about the weights w once the linear parameters are eliminated: w'S w / 2 - g'w.
+// What all samples say about the weights w after the linear parameters are eliminated: w'S w / 2 - g'w.
 struct Reduced {
   MatrixXd S, back;  // back, offset: p = offset - back w
   VectorXd g, offset;
@@ -98,7 +98,7 @@ Reduced Reduce(const Problem& problem, const std::vector<Law>& laws) {
     rows.K.row(r) *= weight;
     rows.tau[r] *= weight;
   }
-  // p = start + L v, v of unit covariance; without a prior columns of unit norm and a trace of one.
+  // p = start + L v, v of unit covariance. Without a prior: columns of unit norm, and a tiny prior.
   MatrixXd L;
   double floor = 1;
   if (problem.covariance.size() > 0) {
@@ -216,7 +216,7 @@ Solution StribeckBasis(const Problem& problem) {
   const ReadOut fit(problem, laws, reduced);
   VectorXd theta = fit.start();
   double cost = fit.Cost(theta), damping = 1e-3;
-  for (std::size_t i = 0; i < laws.size(); ++i)  // where q_s is far off, its slope says nothing
+  for (std::size_t i = 0; i < laws.size(); ++i)  // a q_s that is far off has no slope, so several are tried
     for (int k = 0; k < kSpeedsTried; ++k)
       for (const double amplitude : {0.3, 1.0, 3.0}) {
         const auto a = static_cast<Eigen::Index>(3 * i);

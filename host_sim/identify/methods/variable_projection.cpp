@@ -1,14 +1,15 @@
-// methods - nonlinear laws (13) with the linear part solved inside: only eta is searched; knows no truth.
+// methods - nonlinear laws (13): only eta is searched, and the linear part is solved inside.
 //
-// Golub and Pereyra 1973, Kaufman's simplification: F(eta) = min_p |tau - K(eta) p|^2 + prior; its Gauss-Newton Hessian
-// is the Schur complement of p in that of all. eta moves by its logarithm where its range is positive. A coarse profile
-// of each eta first, because exp(-(v / q_s)^2) has no slope where q_s is far off; that is where (21) fails.
+// Golub and Pereyra 1973 with Kaufman's simplification: F(eta) = min_p |tau - K(eta) p|^2 + prior. Its Gauss-Newton
+// Hessian is the Schur complement of p in the Hessian of all. Where the range of eta is positive, its logarithm is
+// searched. Some values of each eta are tried first, because exp(-(v / q_s)^2) has no slope where q_s is far off. That
+// is where (21) fails.
 #include <Eigen/Cholesky>
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/better_methods.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -34,7 +35,7 @@ class Projection {
         if (L.col(k).head(columns_).squaredNorm() > 0) inner.col(kept++).head(columns_) = L.col(k).head(columns_);
       L_ = inner.leftCols(kept);
     } else {
-      // Columns of one size, so that the trace of a prior in Evaluate weighs on all alike.
+      // Columns of equal size, so that the tiny prior in Evaluate acts on all alike.
       const Rows rows = StackRows(problem, problem.start);
       L_ = MatrixXd::Zero(problem.start.size(), static_cast<Eigen::Index>(linear_.size()));
       for (std::size_t i = 0; i < linear_.size(); ++i) {
@@ -58,7 +59,7 @@ class Projection {
     const MatrixXd A = weight.asDiagonal() * (rows.K * L_.topRows(columns_));
     const VectorXd target = weight.cwiseProduct(rows.tau - rows.K * z.head(columns_));
     MatrixXd H = A.transpose() * A;
-    // Without a prior a trace of one keeps directions that nothing sees where they are.
+    // Without a prior, a tiny one keeps directions that no row sees where they are.
     H.diagonal().array() += problem_.covariance.size() > 0 ? 1.0 : 1e-12 * H.diagonal().maxCoeff();
     const Eigen::LLT<MatrixXd> factor(H);
     const VectorXd w = factor.solve(A.transpose() * target);

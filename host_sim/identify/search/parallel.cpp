@@ -1,4 +1,4 @@
-// search - a counter that threads draw their next piece from.
+// search - threads draw their next piece of work from a counter.
 #include "host_sim/identify/search/parallel.hpp"
 
 #include <algorithm>

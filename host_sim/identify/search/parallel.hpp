@@ -1,12 +1,12 @@
-// search - independent pieces of work on all cores; knows nothing of the work.
+// search - runs independent pieces of work on all cores.
 #pragma once
 
 #include <functional>
 
 namespace armcal::search {
 
-// work(0) .. work(count - 1), each once, on `threads` threads (0: one a core), in that order of begin. An exception
-// ends what has not begun and comes out here when the rest is done.
+// Calls work(0) .. work(count - 1), each once, on `threads` threads (0: one a core). They begin in this order. After an
+// exception no further piece begins; it is thrown here when the running ones are done.
 void InParallel(int count, int threads, const std::function<void(int)>& work);
 
 }  // namespace armcal::search

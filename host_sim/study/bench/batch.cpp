@@ -1,14 +1,13 @@
-// bench - the three ways, all with the generated model compiled in here.
-#include "host_sim/study/bench/batch.hpp"
+// bench - solves least squares over a log in three ways, with the generated model compiled in.
+#include "host_sim/study/bench/bench.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <cmath>
 #include <random>
 #include <vector>
 
 #include "host_sim/identify/calibration/gram_kernel.hpp"
-#include "host_sim/identify/calibration/gram_solve.hpp"
-#include "host_sim/study/bench/inputs.hpp"
 
 namespace armcal::bench {
 
@@ -57,6 +56,21 @@ P Load(const MatrixXd& m, int j, int begin) {
   const double* column = m.col(j).data();
   for (int lane = 0; lane < 8; ++lane) p.Set(lane, column[std::min(begin + lane, last)]);
   return p;
+}
+
+// gram x = right with columns scaled to unit diagonal: LDL' and one step of refinement. A column of zeros gets x = 0.
+VectorXd SolveNormal(const MatrixXd& gram, const VectorXd& right) {
+  const auto size = gram.rows();
+  VectorXd scale(size);
+  for (Eigen::Index i = 0; i < size; ++i) scale[i] = gram(i, i) > 0 ? 1 / std::sqrt(gram(i, i)) : 0;
+  MatrixXd scaled = scale.asDiagonal() * gram * scale.asDiagonal();
+  for (Eigen::Index i = 0; i < size; ++i)
+    if (scale[i] == 0) scaled(i, i) = 1;
+  const VectorXd target = scale.cwiseProduct(right);
+  const Eigen::LDLT<MatrixXd> factor(scaled);
+  VectorXd z = factor.solve(target);
+  z += factor.solve(target - scaled * z);
+  return scale.cwiseProduct(z);
 }
 
 }  // namespace
@@ -110,7 +124,7 @@ VectorXd FusedGram(const Log& log) {
       right[pattern[i][a].place] += total(a, tau);
     }
   }
-  return calibration::SolveNormal(gram, right).x;
+  return SolveNormal(gram, right);
 }
 
 void MakeStored(const Log& log, MatrixXd& stored, VectorXd& right) {

@@ -1,23 +1,86 @@
-// bench - compares the generated model with yardsticks inside this one program; knows the model compiled in, no files.
+// bench - compares the generated model with yardsticks in one program. The model is compiled in; no file is read.
 //
 //   armcal-bench-ROBOT [--quick] GX GY GZ {ALPHA A D THETA PRISMATIC}...      prints JSON
-// All of it is compiled with the same flags (-O3 -march=native); armcal bench starts it.
+// All of it is compiled with the same flags (-O3 -march=native). armcal bench starts it.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <kdl/chain.hpp>
+#include <kdl/chainidsolver_recursive_newton_euler.hpp>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <vector>
 
-#include "host_sim/study/bench/batch.hpp"
-#include "host_sim/study/bench/inputs.hpp"
-#include "host_sim/study/bench/kdl_arm.hpp"
-#include "host_sim/study/bench/timing.hpp"
+#include "host_sim/study/bench/bench.hpp"
 
 namespace armcal::bench {
 namespace {
 
+// The yardstick is one inverse-dynamics call of Orocos KDL for the same arm.
+
+// One joint as the robot file has it: modified DH (Craig).
+struct JointShape {
+  double alpha_rad, a_m, d_m, theta_rad;
+  bool prismatic;
+};
+
+// bodies: 11 a link as in the parameter table: m, m c, I about the link origin (xx xy xz yy yz zz), rotor.
+class KdlArm {
+ public:
+  KdlArm(const std::vector<JointShape>& joints, const double* gravity_mps2, const double* bodies)
+      : n_(static_cast<unsigned>(joints.size())), torque_(n_) {
+    const auto before = [&](unsigned j) {
+      return KDL::Frame::DH_Craig1989(joints[j].a_m, joints[j].alpha_rad, joints[j].d_m, joints[j].theta_rad);
+    };
+    // A KDL segment is a joint and the tip behind it. DH has the fixed part in front of the joint. So the fixed part of
+    // the next joint becomes this segment's tip, and the body is given in the tip's frame, as KDL wants it. Then there
+    // are not more segments than joints.
+    if (const KDL::Frame first = before(0); !KDL::Equal(first, KDL::Frame::Identity()))
+      chain_.addSegment(KDL::Segment(KDL::Joint(KDL::Joint::None), first));
+    for (unsigned j = 0; j < n_; ++j) {
+      const double* b = bodies + 11 * j;
+      const KDL::Vector c(b[1] / b[0], b[2] / b[0], b[3] / b[0]);
+      const KDL::RotationalInertia origin(b[4], b[7], b[9], b[5], b[6], b[8]);
+      const KDL::RotationalInertia centre = KDL::RigidBodyInertia(-b[0], c).getRotationalInertia() + origin;
+      const KDL::Frame tip = j + 1 < n_ ? before(j + 1) : KDL::Frame::Identity();
+      chain_.addSegment(KDL::Segment(KDL::Joint(joints[j].prismatic ? KDL::Joint::TransZ : KDL::Joint::RotZ), tip,
+                                     tip.Inverse() * KDL::RigidBodyInertia(b[0], c, centre)));
+      rotor_.push_back(b[10]);
+    }
+    none_.assign(chain_.getNrOfSegments(), KDL::Wrench::Zero());
+    solver_ = std::make_unique<KDL::ChainIdSolver_RNE>(chain_,
+                                                       KDL::Vector(gravity_mps2[0], gravity_mps2[1], gravity_mps2[2]));
+  }
+
+  void Add(const double* q, const double* qd, const double* qdd) {
+    State s{KDL::JntArray(n_), KDL::JntArray(n_), KDL::JntArray(n_)};
+    for (unsigned j = 0; j < n_; ++j) s.q(j) = q[j], s.qd(j) = qd[j], s.qdd(j) = qdd[j];
+    state_.push_back(s);
+  }
+  std::size_t states() const { return state_.size(); }
+  // Only this call is timed.
+  [[gnu::noinline]] const KDL::JntArray& Call(std::size_t k) {
+    solver_->CartToJnt(state_[k].q, state_[k].qd, state_[k].qdd, none_, torque_);
+    return torque_;
+  }
+  double torque(std::size_t k, unsigned j) { return Call(k)(j) + rotor_[j] * state_[k].qdd(j); }
+
+ private:
+  struct State {
+    KDL::JntArray q, qd, qdd;
+  };
+  unsigned n_;
+  KDL::Chain chain_;
+  KDL::Wrenches none_;
+  KDL::JntArray torque_;
+  std::vector<double> rotor_;
+  std::vector<State> state_;
+  std::unique_ptr<KDL::ChainIdSolver_RNE> solver_;
+};
+
 using nlohmann::ordered_json;
-constexpr int kInputs = 256;  // more than a branch predictor learns by heart, few enough for the first-level cache
+constexpr int kInputs = 256;  // too many for a branch predictor to learn, few enough for the first-level cache
 
 template <class T>
 Work RegressorWork(const std::string& name) {
@@ -102,7 +165,7 @@ int Main(int argc, char** argv) {
   const auto states = RandomInputs<double>(kInputs, 1);
   for (const auto& x : states) arm->Add(x.q, x.qd, x.qdd);
   const double disagreement = Disagreement(*arm, states);
-  if (!(disagreement < 1e-5)) return std::puts("{}"), 1;  // a comparison of two arms says nothing
+  if (!(disagreement < 1e-5)) return std::puts("{}"), 1;  // two different arms cannot be compared
 
   Work kdl = KdlWork(arm), sines = SinCosWork();
   Work plain = RegressorWork<double>("regressor, double"),

@@ -1,4 +1,4 @@
-// survey - robot variants in memory; effect records do the rest.
+// survey - makes the robot variants in memory, mostly by effect records.
 #include "host_sim/study/survey/arm.hpp"
 
 namespace armcal::survey {
@@ -92,7 +92,7 @@ codegen::Robot StribeckArm(const codegen::Robot& file, const Stribeck& stribeck)
   codegen::Robot robot = Variant(file, Law::kStribeck, Bodies::kBase, stribeck);
   robot.name = "stribeck_arm";
   for (codegen::Joint& joint : robot.joint)
-    joint.v_min_radps = 0.01;  // the law shows near standstill; no stiction here
+    joint.v_min_radps = 0.01;  // the law shows near standstill, and this arm does not stick
   return robot;
 }
 

@@ -1,5 +1,4 @@
-// survey - the arm of section 6.1 in memory: a robot file with the friction law of one model, and its set parameters;
-// knows no data and no method.
+// survey - the arm of section 6.1 in memory: a robot file with the friction law of one model, and its set parameters.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,26 +34,26 @@ Stribeck SetStribeck(int joints);  // Fs = 1.2 Fc, qs = 0.1 rad/s
 
 enum class Bodies { kStandard, kBase };
 
-// The robot file with `law` on every joint, without rotor inertias, torque gains and undeclared effects. kStandard:
-// every body parameter that the torque depends on, as in the survey; kBase: an independent choice.
+// The robot file with `law` on every joint, without rotor inertias, torque gains and undeclared effects. kStandard
+// takes every body parameter that the torque depends on, as the survey does; kBase takes independent ones.
 codegen::Robot Variant(const codegen::Robot& file, Law law, Bodies bodies, const Stribeck& stribeck);
 
 // (4) with base parameters: the arm for which the firmware's extended filter is compiled here.
 codegen::Robot StribeckArm(const codegen::Robot& file, const Stribeck& stribeck);
 
-// The records that Variant uses: those given, with (4)'s delta_s fixed at 2, (9)'s payload declared, and one for
-// kGradient.
+// The records that Variant uses: the given ones, but with delta_s of (4) fixed at 2 and the payload of (9) declared,
+// and one more for kGradient.
 codegen::Catalogue Records(codegen::Catalogue records, const Payload& payload = {});
 
-// The table's own means as z = [p, eta]; of a model whose robot file holds the truth this is the truth.
+// The table's means as z = [p, eta]. If the model's robot file holds the truth, this is the truth.
 Eigen::VectorXd SetParameters(const codegen::Model& model);
 
 // tau = K(s; eta) p of (14), [samples x joints].
 Eigen::MatrixXd Torque(const codegen::Model& model, const codegen::Signals& s, const Eigen::VectorXd& z);
 
-// What the survey calls phi_f: one row a joint, columns Fc, [Fs, qs,] beta. For (4): Fs = Fc + dFs.
+// The survey's phi_f: one row a joint, columns Fc, [Fs, qs,] beta. For (4): Fs = Fc + dFs.
 Eigen::MatrixXd Friction(const codegen::Model& model, const Eigen::VectorXd& z);
-// Place in z of a parameter by its table name ("Fc3", "stribeck.vs3"); -1: it has none.
+// The place in z of a parameter with this table name ("Fc3", "stribeck.vs3"). -1: there is none.
 int PlaceOf(const codegen::Model& model, const std::string& name);
 
 }  // namespace armcal::survey

@@ -1,4 +1,4 @@
-// survey - reads the two data files; knows no experiment.
+// survey - reads the level limits and the printed figures.
 #include "host_sim/study/survey/data_files.hpp"
 
 #include <limits>

@@ -1,4 +1,4 @@
-// survey - the level limits of Tables 1 to 4 and the survey's printed figures, read from their files; computes nothing.
+// survey - the level limits of Tables 1 to 4 and the survey's printed figures, as read from their files.
 #pragma once
 
 #include <filesystem>
@@ -16,10 +16,10 @@ struct Limits {
 struct Levels {
   std::map<std::string, Limits> limit;  // e_T, e_d, e_f, J_e, solution_time_s, delta_J_e
   double follow_rms = 0, settle_s = 0;
-  std::vector<double> tau_max_Nm;  // the survey prints none: a normaliser that reproduces its e_T_Std
+  std::vector<double> tau_max_Nm;  // the survey prints none; these reproduce its e_T_Std
   double mass_floor_kg = 0, center_floor_m = 0, inertia_floor_of_trace = 0;
 
-  // 'A' below the first limit, 'B' below the second, else 'C'; so is what is no number.
+  // 'A' below the first limit, 'B' below the second, else 'C'. NaN gives 'C'.
   char Of(const std::string& index, double value) const;
 };
 // io::InputError: file, key, what was expected.

@@ -1,4 +1,4 @@
-// survey - prints the firmware's model of the arm of (4) while building; knows no data.
+// survey - a program for the build: it prints the firmware's model of the arm with friction law (4).
 #include "codegen/src/generator/emit.hpp"
 #include "host_sim/study/survey/arm.hpp"
 

@@ -1,12 +1,20 @@
-// survey - how accurate the firmware's estimator is after ten seconds: fresh draws of CAD values and noise, float32,
-// judged on the physical read-out; and whether it knows when its deviations cannot be believed.
+// survey - how accurate the firmware's estimator is after ten seconds, and whether it reports wrong deviations.
 #include <Eigen/Cholesky>
+#include <chrono>
 #include <cmath>
 #include <memory>
+#include <stribeck_arm/model.hpp>
 
+#include "armcal/estimator/physical_read_out.hpp"
+#include "armcal/filter/kalman_filter.hpp"
+#include "codegen/generated/er20_like/model.hpp"
+#include "codegen/src/generator/emit.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/calibration/dataset.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
+#include "host_sim/identify/methods/method.hpp"
 #include "host_sim/machine/plant/random.hpp"
-#include "host_sim/study/survey/online_arm.hpp"
 #include "host_sim/study/survey/platform.hpp"
 #include "host_sim/study/survey/tables.hpp"
 
@@ -17,13 +25,143 @@ using Eigen::VectorXd;
 
 namespace {
 
-// What is drawn, and what the filter is told about it.
+enum class OnlineFilter { kForgetting, kKalman, kExtended };  // kExtended: of the arm with (4)
+
+std::string Name(OnlineFilter filter) {
+  constexpr const char* kName[] = {"forgetting", "Kalman", "extended Kalman"};
+  return kName[static_cast<int>(filter)];
+}
+
+struct OnlineResult {
+  calibration::Solution solution;     // of the physical read-out; covariance: its diagonal alone
+  Eigen::VectorXd filter, filter_sd;  // [columns] of the filter's own read-out
+  bool inconsistent = false;          // monitor::InnovationTest, or estimator::PriorIsTooNarrow
+};
+
+// Whether a joint's row of a sample counts for the estimator.
+bool Moves(double speed_radps, const codegen::Joint& joint) { return std::abs(speed_radps) > joint.v_min_radps; }
+
+// Wide standard deviations, relative to the mean, for what CAD gives badly. They belong to Fs / Fc uniform in 1.1
+// .. 1.5 about 1.25, and to the logarithm of a speed that is log-uniform in 0.05 .. 0.2 rad/s.
+constexpr double kToldBreakaway = 0.46, kToldSpeed = 0.4;
+
+template <class Arm>
+estimator::Table<Arm> TableOf(const codegen::Model& prior, const VectorXd& sigma_Nm) {
+  calibration::TableFile file = calibration::DefaultTable(prior);
+  for (int j = 0; j < Arm::kJoints; ++j) file.joint[j].sigma_Nm = sigma_Nm[j];
+  for (calibration::TableRow& row : file.row) {
+    if (row.name.starts_with("stribeck.dFs")) row.sd = kToldBreakaway * row.mean;
+    if (row.name.starts_with("stribeck.vs")) row.sd = kToldSpeed * row.mean, row.state = "estimated";
+  }
+  estimator::Table<Arm> table;
+  if (file.schema != Arm::kSchema ||
+      !core::IsOk(model::Decode(calibration::EncodeTable(file).data(), Arm::kSchema, table)))
+    throw io::InputError(prior.robot().path + ": not the arm for which the estimator is compiled");
+  return table;
+}
+
+template <class Arm>
+model::Sample<Arm::kJoints> SampleOf(const calibration::Dataset& log, const codegen::Robot& robot, int k) {
+  model::Sample<Arm::kJoints> s;
+  s.tick = static_cast<std::uint32_t>(k * Arm::kSampleTicks);
+  for (int j = 0; j < Arm::kJoints; ++j) {
+    s.q[j] = static_cast<float>(log.s.q(k, j));
+    s.qd[j] = static_cast<float>(log.s.qd(k, j));
+    s.qdd[j] = static_cast<float>(log.s.qdd(k, j));
+    s.tau[j] = static_cast<float>(log.tau(k, j));
+    s.flags[j] = Moves(log.s.qd(k, j), robot.joint[j]) ? model::kValid | model::kMoving : model::kValid;
+  }
+  return s;
+}
+
+template <class Arm, class Filter>
+OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm) {
+  struct Drive {
+    estimator::RigidPrior<Arm, float> rigid;
+    estimator::AdoptedTable<Arm> adopted;
+    estimator::Estimator<Arm, Filter> estimator;
+    estimator::Estimates<Arm> estimates;
+    physical::MapReadOut<Arm, double> read_out;
+  };
+  const auto began = std::chrono::steady_clock::now();
+  const auto drive = std::make_unique<Drive>();
+  const core::Status built =
+      estimator::BuildAdoptedTable(TableOf<Arm>(prior, sigma_Nm), 1, drive->rigid, drive->adopted);
+  if (!core::IsOk(built)) throw io::InputError(prior.robot().path + ": expected bodies that can exist");
+  auto& arm = drive->estimator;
+  arm.SetPublishEvery(1u << 30);
+  arm.Adopt(drive->adopted, 0);
+  const auto work = [&] {
+    while (arm.Step()) {
+    }
+  };
+  for (int k = 0; k < log.samples(); ++k) {
+    (void)arm.PushSample(SampleOf<Arm>(log, prior.robot(), k));
+    work();
+  }
+  arm.RequestReadOut();
+  work();
+  arm.Take(drive->estimates);
+
+  OnlineResult out;
+  out.inconsistent = drive->estimates.inconsistent;
+  out.filter = Eigen::Map<const Eigen::VectorXf>(drive->estimates.value, Arm::kColumns).cast<double>();
+  out.filter_sd = Eigen::Map<const Eigen::VectorXf>(drive->estimates.sd, Arm::kColumns).cast<double>();
+  const core::Status begun = estimator::BeginPhysical(drive->adopted, drive->rigid, arm, false, drive->read_out);
+  while (core::IsOk(begun) && !drive->read_out.Step()) {
+  }
+  out.inconsistent |= estimator::PriorIsTooNarrow(drive->read_out);
+  const auto& found = drive->read_out.result();
+  calibration::Solution& s = out.solution;
+  s.converged = core::IsOk(begun) && found.converged;
+  s.bodies = Eigen::Map<const VectorXd>(found.body, Arm::kBodyParameters);
+  // Nonlinear parameters come from the filter, since the read-out has linear ones only.
+  VectorXd sd(Arm::kColumns + Arm::kNonlinear);
+  s.z.resize(sd.size());
+  s.z.head(Arm::kColumns) = Eigen::Map<const VectorXd>(found.column, Arm::kColumns);
+  sd.head(Arm::kColumns) = Eigen::Map<const VectorXd>(found.column_sd, Arm::kColumns);
+  for (int e = 0; e < Arm::kNonlinear; ++e) {
+    s.z[Arm::kColumns + e] = static_cast<double>(drive->estimates.eta[e]);
+    sd[Arm::kColumns + e] = static_cast<double>(drive->estimates.eta_sd[e]);
+  }
+  s.covariance = sd.cwiseAbs2().asDiagonal();
+  s.iterations = found.steps;
+  s.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  s.memory_bytes = sizeof(Drive);
+  return out;
+}
+
+// True if the filter is compiled for this model.
+bool CompiledFor(const codegen::Model& model, OnlineFilter filter) {
+  const bool stribeck = filter == OnlineFilter::kExtended;
+  return codegen::Schema(model) == (stribeck ? generated::StribeckArm::kSchema : generated::Er20Like::kSchema);
+}
+
+// The firmware's own estimator, float32, on a log. It starts from the table of `prior`, with sigma_Nm of a sample's
+// row. Rows below a joint's v_min are left out, as on a drive. Breakaway and Stribeck speed get the wide deviations
+// above. io::InputError: another arm, or a prior whose bodies cannot exist.
+OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm,
+                         OnlineFilter filter) {
+  using generated::Er20Like;
+  using generated::StribeckArm;
+  switch (filter) {
+    case OnlineFilter::kForgetting:
+      return Run<Er20Like, filter::ForgettingFilter<Er20Like>>(prior, log, sigma_Nm);
+    case OnlineFilter::kKalman:
+      return Run<Er20Like, filter::KalmanFilter<Er20Like>>(prior, log, sigma_Nm);
+    case OnlineFilter::kExtended:
+      break;
+  }
+  return Run<StribeckArm, filter::ExtendedKalmanFilter<StribeckArm>>(prior, log, sigma_Nm);
+}
+
+// What is drawn, and what the filter is told.
 struct Protocol {
   std::string name;
   PriorError error;
-  double told = 1;                              // stated width of the prior over the drawn one
+  double told = 1;                              // stated width of the prior over the width drawn
   double ripple = 0;                            // undeclared torque, share of tau_max
-  OnlineFilter filter = OnlineFilter::kKalman;  // kExtended: truths of (4) are drawn, too
+  OnlineFilter filter = OnlineFilter::kKalman;  // kExtended: the truth of (4) is drawn, too
 };
 
 struct Drawn {
@@ -51,14 +189,14 @@ std::unique_ptr<Truth> DrawTruth(const Settings& settings, const Motions& motion
                                  Sampled(motions.nonlinear.series), Sampled(motions.other));
 }
 
-// Torque that no model here knows: a wave over each joint's position, twenty to a turn of one radian.
+// Torque that no model here has: a wave over each joint's position, sin(20 q).
 MatrixXd Ripple(const Truth& truth, const Levels& levels, double share) {
   MatrixXd torque = (20 * truth.train.q.array()).sin();
   for (Eigen::Index j = 0; j < torque.cols(); ++j) torque.col(j) *= share * levels.tau_max_Nm[j];
   return torque;
 }
 
-// The least base error (Score::e_base) that any unbiased estimator of what the rows see can have: Cramer and Rao's.
+// The bound of Cramer and Rao: the least base error (Score::e_base) of any unbiased estimator that sees these rows.
 double CramerRao(const Truth& truth) {
   const codegen::Model& model = truth.model;
   std::vector<int> active;
@@ -161,7 +299,7 @@ void ShowOnline(const Settings& settings, const Motions& motions, Findings& out)
     const double count = static_cast<double>(drawn.size());
     const Statistic e_d = Over(scores, &Score::e_d), base = Over(scores, &Score::e_base);
     const bool extended = protocol.filter == OnlineFilter::kExtended;
-    const double over_bound = extended ? std::nan("") : base.mean / bound;  // whose bound depends on the draw
+    const double over_bound = extended ? std::nan("") : base.mean / bound;  // there the bound depends on the draw
     sheet.rows.push_back({protocol.name, Name(protocol.filter), count, Cell(e_d.mean, e_d.low, e_d.high), e_d.p95,
                           Mean(scores, &Score::e_d_over_prior), Mean(scores, &Score::e_f), near / count,
                           Mean(scores, &Score::J_e), Cell(base.mean, base.low, base.high), over_bound,

@@ -1,4 +1,4 @@
-// survey - Figures 1, 2 and 3: the arm's joint frames, the trajectories, the platform as a diagram.
+// survey - Figures 1, 2 and 3: the joint frames of the arm, the trajectories, and a diagram of the platform.
 #include <Eigen/Geometry>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// survey - the better methods under every prior, over fresh draws, and the goals that they are to reach.
+// survey - how well the better methods do under every prior, over fresh draws, and the goals that they must reach.
 #include "host_sim/study/survey/tables.hpp"
 
 namespace armcal::survey {
@@ -94,7 +94,7 @@ void ShowPriors(const Settings& settings, const Motions& motions, Findings& out)
             {"Stribeck, drawn truths, noise, " + std::to_string(o->noisy.size()) + " draws, " + o->name + ": mean e_f",
              Over(o->noisy, &Score::e_f).mean, 0.06, true});
   }
-  // The same laws where the trajectory asked for them: low speeds instead of a small cond(K).
+  // The same laws along a trajectory searched for friction: it has low speeds instead of a small cond(K).
   for (const ExcitedBy& e : motions.others) {
     if (e.law != Law::kGradient || e.criterion != excitation::Criterion::Kind::kAccuracy) continue;
     Motions along = motions;

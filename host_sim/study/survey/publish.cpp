@@ -1,4 +1,4 @@
-// survey - cells into text, JSON and HTML.
+// survey - writes cells as text, JSON and HTML.
 #include "host_sim/study/survey/publish.hpp"
 
 #include <fmt/format.h>
@@ -106,7 +106,7 @@ std::string Html(const Findings& findings, const Settings& settings) {
     page.Subsection("Figure " + p.number + ": " + p.title);
     page.AddGrid(p.plots, p.caption);
   }
-  // A page takes plots; what is drawn by hand goes to its end.
+  // The page takes plots only, so the drawings are inserted at its end.
   std::string html = page.Html();
   return html.insert(html.rfind("</main>"), drawings);
 }

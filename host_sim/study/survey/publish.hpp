@@ -1,10 +1,11 @@
-// survey - findings as JSON for machines, as a page and as text for people; computes nothing.
+// survey - findings as JSON for programs, and as a page and text for people.
 #pragma once
 
 #include <string>
 
 #include "host_sim/data/report/table.hpp"
-#include "host_sim/study/survey/survey.hpp"
+#include "host_sim/study/survey/draws.hpp"
+#include "host_sim/study/survey/sheet.hpp"
 
 namespace armcal::survey {
 

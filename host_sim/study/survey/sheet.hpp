@@ -1,4 +1,4 @@
-// survey - what a table or figure of the survey becomes: cells, goals, pictures; knows no experiment and no file.
+// survey - the form of the findings: cells of tables, goals, pictures.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// survey - Tables 5 to 12 and Figures 1 to 4; each function fills in what it found.
+// survey - fills all of the survey's tables and figures from one robot file: Tables 5 to 12, Figures 1 to 4.
 #pragma once
 
 #include "host_sim/study/survey/draws.hpp"
@@ -12,7 +12,7 @@ const std::vector<std::string>& OwnNonlinear();
 const std::vector<std::string>& BetterLinear();
 const std::vector<std::string>& BetterNonlinear();
 
-// What Table 11 is made of.
+// The results from which Table 11 is made.
 struct Evidence {
   std::vector<Outcome> linear, nonlinear;
   std::map<std::string, double> follow_slope, follow_step;  // method -> relative RMS after settling
@@ -24,9 +24,9 @@ void ShowTrajectories(const Settings& settings, const Motions& motions, Findings
 void ShowParameters(const Settings& settings, const Motions& motions, const Evidence& evidence, Findings& out);
 // Tables 7, 8 and 9.
 void ShowErrors(const Settings& settings, const Evidence& evidence, Findings& out);
-// The better methods under every prior, and the goals that they are to reach.
+// The better methods under every prior, and the goals that they must reach.
 void ShowPriors(const Settings& settings, const Motions& motions, Findings& out);
-// The firmware's own estimator on fresh draws, and whether it knows when not to be believed.
+// The firmware's own estimator on fresh draws, and whether it reports that its deviations cannot be trusted.
 void ShowOnline(const Settings& settings, const Motions& motions, Findings& out);
 // Table 10: in the closed loop, and without one.
 void ShowDifferentiation(const Settings& settings, const Motions& motions, Findings& out);
@@ -35,13 +35,18 @@ void ShowInstruments(const Settings& settings, const Motions& motions, Findings&
 void ShowTracking(const Settings& settings, const Motions& motions, Evidence& evidence, Findings& out);
 // Table 11.
 void ShowLevels(const Settings& settings, const Evidence& evidence, Findings& out);
-// What (9) adds to the rigid columns.
+// What the load column of (9) adds to the rigid columns.
 void ShowLoad(const Settings& settings, const Motions& motions, Findings& out);
 // Table 12, simulated and on measured logs.
 void ShowModels(const Settings& settings, const Motions& motions, Findings& out);
 // Figures 1 and 3.
 void ShowArm(const Settings& settings, Findings& out);
-// Where the survey slips, and what was done about it.
+// The survey's mistakes, and what armcal does instead.
 Sheet Slips();
+
+// Runs the survey: searches the trajectories and fills every table asked for, with the printed figures beside ours.
+// When settings.stop is set, it stops early with what it has. io::InputError: the robot has no motion within its
+// limits, or measured logs cannot be read.
+Findings RunSurvey(const Settings& settings);
 
 }  // namespace armcal::survey

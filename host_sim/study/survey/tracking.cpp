@@ -1,4 +1,4 @@
-// survey - Figure 4: friction that changes while the filter runs; who follows it.
+// survey - Figure 4: friction changes while the filters run, and some of them follow it.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -85,7 +85,7 @@ report::Plot PlotOf(const std::string& title, const std::vector<std::pair<std::s
       List(VectorXd::LinSpaced(beta.rows(), 0, static_cast<double>(beta.rows() - 1) / kRate_Hz));
   plot.series.push_back({"set", t, List(beta.col(kShownJoint))});
   for (const auto& [name, run] : runs) plot.series.push_back({name, t, List(run->found.col(kShownJoint))});
-  // Filters that start from nothing begin far away; the picture is about what follows.
+  // Filters without a prior start far away. The picture leaves that out, to show how they follow.
   for (std::size_t k = 1; k < plot.series.size(); ++k)
     for (double& v : plot.series[k].y)
       if (v < 0.5 * plot.series[0].y[0] || v > 2.2 * plot.series[0].y[0]) v = std::nan("");

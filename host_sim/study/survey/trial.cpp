@@ -1,15 +1,132 @@
-// survey - runs methods and judges them.
+// survey - computes the indices of section 5, runs methods, and judges them.
 #include "host_sim/study/survey/trial.hpp"
-
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/calibration/prior.hpp"
 
 namespace armcal::survey {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+double Std(const VectorXd& v) { return std::sqrt((v.array() - v.mean()).square().mean()); }
+
+// Relative error of one entry. NaN counts as 1, as if nothing had been found.
+double Relative(double set, double estimate) {
+  const double e = std::abs(estimate - set) / std::abs(set);
+  return std::isfinite(e) ? e : 1;
+}
+
+}  // namespace
+
+BodyError CompareBodies(const VectorXd& set, const VectorXd& estimate, const Levels& levels) {
+  const auto links = set.size() / 11;
+  BodyError out;
+  out.per_link.resize(links);
+  for (Eigen::Index j = 0; j < links; ++j) {
+    const VectorXd truth = calibration::ToCentre(set.segment(11 * j, 10));
+    VectorXd body = estimate.segment(11 * j, 10);
+    const bool massless = !(std::abs(body[0]) > levels.mass_floor_kg);
+    VectorXd found = massless ? body : calibration::ToCentre(body);
+    if (massless) found.segment(1, 3).setConstant(kNaN);
+    out.massless += massless;
+    VectorXd whole = VectorXd::Zero(11);
+    whole.head(10) = body;
+    out.impossible += !calibration::IsPhysical(whole);
+    const double trace = truth[4] + truth[7] + truth[9];
+    double sum = 0;
+    int count = 0;
+    for (int k = 0; k < 10; ++k) {
+      const double floor = k == 0  ? levels.mass_floor_kg
+                           : k < 4 ? levels.center_floor_m
+                                   : levels.inertia_floor_of_trace * std::abs(trace);
+      if (std::abs(truth[k]) < floor) {
+        ++out.skipped;
+        continue;
+      }
+      sum += Relative(truth[k], found[k]);
+      ++count;
+    }
+    out.per_link[j] = count ? sum / count : 0;
+  }
+  out.e_d = out.per_link.mean();
+  return out;
+}
+
+double FrictionError(const MatrixXd& set, const MatrixXd& estimate) {
+  double sum = 0;
+  for (Eigen::Index j = 0; j < set.rows(); ++j)
+    for (Eigen::Index k = 0; k < set.cols(); ++k) sum += Relative(set(j, k), estimate(j, k));
+  return sum / static_cast<double>(set.size());
+}
+
+TorqueError CompareTorques(const MatrixXd& error, const std::vector<double>& tau_max) {
+  TorqueError out;
+  const auto n = static_cast<double>(error.cols());
+  for (Eigen::Index j = 0; j < error.cols(); ++j) {
+    const VectorXd e = error.col(j) / tau_max[static_cast<std::size_t>(j)];
+    out.mean_abs += e.cwiseAbs().mean() / n;
+    out.abs_mean += std::abs(e.mean()) / n;
+    out.std_signed += Std(e) / n;
+    out.std_abs += Std(e.cwiseAbs()) / n;
+  }
+  return out;
+}
+
+double BaseError(const MatrixXd& difference, const VectorXd& sigma) {
+  return std::sqrt((difference * sigma.cwiseInverse().asDiagonal()).squaredNorm() /
+                   static_cast<double>(difference.size()));
+}
+
+double Coverage(const VectorXd& truth, const VectorXd& estimate, const MatrixXd& covariance) {
+  if (covariance.rows() != truth.size()) return kNaN;
+  int inside = 0, count = 0;
+  for (Eigen::Index k = 0; k < truth.size(); ++k) {
+    const double variance = covariance(k, k);
+    if (!(variance > 0)) continue;
+    ++count;
+    inside += std::abs(estimate[k] - truth[k]) <= 1.96 * std::sqrt(variance);
+  }
+  return count ? static_cast<double>(inside) / count : kNaN;
+}
+
+double FollowError(const MatrixXd& truth, const MatrixXd& estimate, double step_s, double settle_s) {
+  const auto from = static_cast<Eigen::Index>(std::llround(settle_s / step_s));
+  const Eigen::Index rows = truth.rows() - from;
+  if (rows <= 0) return kNaN;
+  const MatrixXd relative = (estimate.bottomRows(rows) - truth.bottomRows(rows)).cwiseQuotient(truth.bottomRows(rows));
+  return relative.array().square().colwise().mean().sqrt().mean();
+}
+
+Statistic Summarise(std::vector<double> values) {
+  std::erase_if(values, [](double v) { return std::isnan(v); });
+  const auto n = values.size();
+  Statistic s{kNaN, kNaN, kNaN, kNaN, kNaN, static_cast<int>(n)};
+  if (n == 0) return s;
+  std::sort(values.begin(), values.end());
+  double sum = 0, square = 0;
+  for (const double v : values) sum += v;
+  s.mean = sum / static_cast<double>(n);
+  for (const double v : values) square += (v - s.mean) * (v - s.mean);
+  s.p95 = values[std::min(n - 1, static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(n))) - 1)];
+  s.largest = values.back();
+  if (n < 2) return s;
+  // Student's t at 97.5 %: exact for one to four degrees of freedom, then an expansion right to 1 %.
+  constexpr double kExact[] = {12.706, 4.303, 3.182, 2.776};
+  const double freedom = static_cast<double>(n - 1);
+  const double t = n <= 5 ? kExact[n - 2] : 1.96 + 2.372 / freedom + 2.82 / (freedom * freedom);
+  const double half = t * std::sqrt(square / freedom / static_cast<double>(n));
+  s.low = s.mean - half, s.high = s.mean + half;
+  return s;
+}
 
 Truth::Truth(codegen::Model model_of_truth, const codegen::Signals& train_motion, const codegen::Signals& other_motion)
     : model(std::move(model_of_truth)),
@@ -89,6 +206,28 @@ Cell Mean(const std::vector<Score>& scores, double Score::*index) {
 Cell Mean(const std::vector<double>& values) {
   const Statistic s = Summarise(values);
   return {s.mean, s.low, s.high};
+}
+
+ModelFit FitModel(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
+                  const std::atomic<bool>* stop) {
+  ModelFit fit;
+  const calibration::Method& method =
+      calibration::FindMethod(model.nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse");
+  calibration::Problem problem = calibration::MakeProblem(model, std::move(train));
+  problem.covariance.resize(0, 0);
+  problem.stop = stop;
+  Attempt attempt = Try(method, problem);
+  fit.method = method.title;
+  if (attempt.solution && attempt.solution->z.allFinite()) fit.z = attempt.solution->z;
+  else fit.why = attempt.solution ? attempt.solution->remark : attempt.why;
+  return fit;
+}
+
+codegen::Robot WithLaw(const codegen::Robot& file, Law law, const Stribeck& stribeck) {
+  codegen::Robot robot = file;
+  const codegen::Robot variant = Variant(file, law, Bodies::kBase, stribeck);
+  robot.effect.insert(robot.effect.begin(), variant.effect.begin(), variant.effect.end());
+  return robot;
 }
 
 }  // namespace armcal::survey

@@ -1,16 +1,60 @@
-// survey - one method on one data set, judged by every index; knows no table.
+// survey - one trial: a method or a friction model is fitted to one data set, and the indices of section 5 judge it.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "host_sim/identify/methods/method.hpp"
 #include "host_sim/study/survey/arm.hpp"
-#include "host_sim/study/survey/indices.hpp"
+#include "host_sim/study/survey/data_files.hpp"
 #include "host_sim/study/survey/sheet.hpp"
 
 namespace armcal::survey {
 
-// What an estimate is compared with: the model at the truth, the training motion and one that nothing was fitted to.
+// Relative errors of one arm's bodies in m, c, I about the centre. e_di is the mean over link i, e_d the mean over
+// links.
+struct BodyError {
+  double e_d = 0;
+  Eigen::VectorXd per_link;
+  int skipped = 0;     // entries whose set value is below the floor
+  int massless = 0;    // links whose estimated mass is zero or NaN: c is 0/0, and its error counts as 1
+  int impossible = 0;  // links with a negative mass or an inertia that no body has
+};
+// set, estimate: [11 n] about link origins.
+BodyError CompareBodies(const Eigen::VectorXd& set, const Eigen::VectorXd& estimate, const Levels& levels);
+
+// e_f: per joint the mean of |est - set| / |set| over its row, then the mean over joints.
+double FrictionError(const Eigen::MatrixXd& set, const Eigen::MatrixXd& estimate);
+
+// e_T and e_T_Std in both readings, error [samples x joints] in N m.
+struct TorqueError {
+  double mean_abs = 0;    // the printed formula, Mean(|e| / tau_max)
+  double abs_mean = 0;    // the only formula that fits the survey's figures: |Mean(e)| / tau_max, mean over joints
+  double std_signed = 0;  // of e / tau_max: the survey's figures
+  double std_abs = 0;     // the printed formula, Std(|e| / tau_max)
+};
+TorqueError CompareTorques(const Eigen::MatrixXd& error_Nm, const std::vector<double>& tau_max_Nm);
+
+// Root mean square of the torque difference in units of the noise. It is the effect of wrong base parameters alone.
+double BaseError(const Eigen::MatrixXd& difference_Nm, const Eigen::VectorXd& sigma_Nm);
+
+// Share of coordinates whose truth lies within 1.96 standard deviations; NaN without a covariance. Coordinates with
+// variance 0 do not count.
+double Coverage(const Eigen::VectorXd& truth, const Eigen::VectorXd& estimate, const Eigen::MatrixXd& covariance);
+
+// RMS of (estimate - truth) / truth after settle_s, mean over columns; [samples x joints].
+double FollowError(const Eigen::MatrixXd& truth, const Eigen::MatrixXd& estimate, double step_s, double settle_s);
+
+// Mean over draws with its 95 % interval (Student's t; NaN with one draw), and the empirical 95th percentile.
+struct Statistic {
+  double mean, low, high, p95, largest;
+  int draws;
+};
+Statistic Summarise(std::vector<double> values);
+
+// What an estimate is compared with: the true model, the training motion, and a motion to which nothing was fitted.
 struct Truth {
   Truth(codegen::Model model_of_truth, const codegen::Signals& train_motion, const codegen::Signals& other_motion);
 
@@ -23,11 +67,12 @@ struct Truth {
 };
 
 struct Score {
-  double e_d = 0, e_f = 0, e_T = 0, e_T_std = 0, J_e = 0;  // as the survey's figures; torque against the measured one
-  double e_T_printed = 0, e_T_std_printed = 0;             // as the survey's formulas
-  double J_true = 0;          // J_e with e_T, e_T_Std against noise-free torque of the other motion
-  double e_d_over_prior = 0;  // e_d / e_d of what was believed before
-  double e_base = 0;          // torque-equivalent base parameter error on the other motion, in sigma
+  double e_d = 0, e_f = 0, e_T = 0, e_T_std = 0,
+         J_e = 0;                               // as in the survey's figures; torque against the measured one
+  double e_T_printed = 0, e_T_std_printed = 0;  // as the survey's formulas
+  double J_true = 0;                            // J_e with e_T, e_T_Std against noise-free torque of the other motion
+  double e_d_over_prior = 0;                    // e_d over the e_d of the prior
+  double e_base = 0;                            // torque-equivalent base parameter error on the other motion, in sigma
   double coverage = 0;
   double physical = 0;  // 1: every link can exist
   double seconds = 0, memory_bytes = 0, from_prior = 0;
@@ -36,18 +81,18 @@ struct Score {
   std::string remark;
 };
 
-// measured: the torque that was fitted. bodies_before: what was believed before, [11 n].
+// measured: the torque that was fitted. bodies_before: the prior's, [11 n].
 Score Judge(const Truth& truth, const Levels& levels, const Eigen::MatrixXd& measured,
             const calibration::Solution& solution, const Eigen::VectorXd& bodies_before);
 
-// The method's answer, or why there is none.
+// The method's answer, or the reason why there is none.
 struct Attempt {
   std::optional<calibration::Solution> solution;
   std::string why;
 };
 Attempt Try(const calibration::Method& method, const calibration::Problem& problem);
 
-// A prior for a model whose robot file says how far it may be off: relative deviations of eta and of effects, too.
+// The problem with a prior of this relative deviation for friction, effects and eta, too.
 calibration::Problem WithPrior(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
                                double relative_sd);
 
@@ -55,5 +100,20 @@ calibration::Problem WithPrior(const codegen::Model& model, std::vector<const ca
 Cell Mean(const std::vector<Score>& scores, double Score::*index);
 Cell Mean(const std::vector<double>& values);
 Statistic Over(const std::vector<Score>& scores, double Score::*index);
+
+struct ModelFit {
+  Eigen::VectorXd z;   // empty: `why`
+  std::string method;  // the method that fitted it
+  std::string why;
+};
+
+// One friction model fitted to logs without a prior: weighted least squares for a linear model, variable projection for
+// a nonlinear one. Variable projection has least squares inside, so a model never fits worse than one that it contains
+// at fixed eta.
+ModelFit FitModel(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
+                  const std::atomic<bool>* stop = nullptr);
+
+// The robot file with its declared effects, and with another friction law on every joint.
+codegen::Robot WithLaw(const codegen::Robot& file, Law law, const Stribeck& stribeck);
 
 }  // namespace armcal::survey

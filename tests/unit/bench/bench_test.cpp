@@ -1,4 +1,4 @@
-// bench tests - what armcal bench writes, and that it compares like with like; no test judges a time.
+// bench tests - what armcal bench writes, and that it compares like with like. No test judges a time.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// tests - an arm of the plant (KDL, its own reader of robot files) with and without a load, and drives whose torque
-// constants are off; only the motion's time law is borrowed.
+// tests - an arm with and without a load, and drives whose torque constants are off. Motion and torque come from the
+// plant (KDL, its own reader of robot files); only the motion's time law is borrowed.
 #pragma once
 
 #include <fstream>

@@ -1,4 +1,4 @@
-// calibration tests - a good log of a simulated arm passes; each planted fault is refused and named.
+// calibration tests - a good log of a simulated arm passes, and each planted fault is refused and named.
 #include "host_sim/identify/calibration/log_check.hpp"
 
 #include <gtest/gtest.h>

@@ -5,7 +5,7 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
-#include "host_sim/identify/calibration/body_barrier.hpp"
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/payload.hpp"
 #include "tests/unit/calibration/laden_arm.hpp"
 #include "tests/unit/files/temporary_folder.hpp"

@@ -1,4 +1,5 @@
-// tests - a made-up true arm: KDL torque, bodies off the CAD, friction and noise; what a fit should find is known.
+// tests - a made-up true arm: KDL torque, bodies that differ from CAD, friction and noise. So the right answer is
+// known.
 #pragma once
 
 #include <cmath>

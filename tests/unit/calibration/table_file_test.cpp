@@ -1,4 +1,4 @@
-// calibration tests - the table file: text, words and names keep every value; foreign ones are refused.
+// calibration tests - text, words and names of a table file keep every value, and foreign files are refused.
 #include <gtest/gtest.h>
 
 #include "armcal/estimator/adopted_table.hpp"

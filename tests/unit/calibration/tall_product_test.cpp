@@ -1,4 +1,4 @@
-// calibration tests - products of tall matrices against long-double sums, at every remainder of the kernel's tiles.
+// calibration tests - products of tall matrices against long-double sums, for every remainder of the kernel's tiles.
 #include "host_sim/identify/calibration/tall_product.hpp"
 
 #include <gtest/gtest.h>

@@ -4,8 +4,8 @@
 #include <Eigen/Cholesky>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/calibration/map_readout.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
+#include "host_sim/identify/calibration/weighted_fit.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::calibration {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
-#include "host_sim/identify/calibration/delay.hpp"
+#include "host_sim/identify/calibration/dataset.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::diagnosis {

@@ -1,4 +1,4 @@
-// excitation tests - the arms they move and a trajectory published for one of them; knows no expectation.
+// excitation tests - the arms that the tests move, and a published trajectory for one of them.
 #pragma once
 
 #include <string>

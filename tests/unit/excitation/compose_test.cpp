@@ -5,8 +5,6 @@
 
 #include <cmath>
 
-#include "host_sim/identify/excitation/blend.hpp"
-#include "host_sim/identify/excitation/slow_moves.hpp"
 #include "tests/unit/excitation/arms.hpp"
 #include "tests/unit/files/temporary_folder.hpp"
 

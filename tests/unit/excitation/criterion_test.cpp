@@ -8,7 +8,6 @@
 #include <Eigen/SVD>
 #include <cmath>
 
-#include "host_sim/identify/excitation/objective.hpp"
 #include "host_sim/identify/excitation/optimise.hpp"
 #include "host_sim/identify/excitation/peaks.hpp"
 #include "host_sim/identify/excitation/target.hpp"
@@ -148,7 +147,7 @@ TEST(Observation, Places_FindAnEffectsColumns_AndNameOneThatIsNotThere) {
   EXPECT_NE(files::test::ErrorOf([&] { observation.Places({"stribeck:1"}); }).find("stribeck:1"), std::string::npos);
 }
 
-// A search for the robot's own cond(K) does not look at two laws of low speed on one joint.
+// A search for the robot's own cond(K) does not separate two low-speed laws on one joint.
 TEST(Target, SeparationAware_TellsTwoEffectsApartBetterThanConditionDoes) {
   const codegen::Robot robot = test::RobotFile("two_link");
   const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");

@@ -1,4 +1,4 @@
-// excitation tests - the search: its gradient, its limits, and that it beats chance.
+// excitation tests - the search has the right gradient, keeps the limits, and beats chance.
 #include "host_sim/identify/excitation/optimise.hpp"
 
 #include <gtest/gtest.h>

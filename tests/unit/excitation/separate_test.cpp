@@ -1,4 +1,4 @@
-// excitation tests - which effects a motion can be searched for that tells them apart: the catalogue, pair by pair.
+// excitation tests - which pairs of effects a motion can tell apart, over the whole catalogue.
 #include <gtest/gtest.h>
 
 #include "codegen/src/io/input_error.hpp"
@@ -65,7 +65,7 @@ TEST(Separate, LooksAtTheEffectAsItWasFound) {
   EXPECT_EQ(seen, 2);
 }
 
-// What is said to be separable is what a search finds a motion for; what is not, what it finds none for.
+// A search finds a motion for effects that are called separable, and finds none for the others.
 TEST(Separate, IsPromisedWhereASearchSucceeds) {
   const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
   const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");

@@ -1,4 +1,5 @@
-// excitation tests - the curves against the survey's formula, difference quotients and what their family promises.
+// excitation tests - the curves against the survey's formula and difference quotients, and the properties of each
+// family.
 #include "host_sim/identify/excitation/series.hpp"
 
 #include <gtest/gtest.h>
@@ -57,7 +58,7 @@ TEST(Series, RepeatsAfterItsPeriod_AndScalesAboutItsOffset) {
   }
 }
 
-// What a controller feels: no jump of position, speed or acceleration where the period closes.
+// Position, speed and acceleration do not jump where the period closes.
 TEST(Series, ClosesSmoothly) {
   const VectorXd begin = VectorXd::Constant(1, 1e-9), end = VectorXd::Constant(1, 10 - 1e-9);
   for (const Family family : kFamilies) {

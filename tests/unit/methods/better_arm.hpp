@@ -1,13 +1,14 @@
-// tests - arms, loops and judges for the methods that beat the survey's; torque by KDL, friction by hand.
+// tests - arms, loops and judges for the methods beyond the survey's. Torque comes from KDL, friction is written by
+// hand.
 #pragma once
 
 #include <Eigen/Eigenvalues>
 #include <random>
 
-#include "host_sim/identify/methods/better_methods.hpp"
 #include "host_sim/identify/methods/closed_loop.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
 #include "host_sim/identify/methods/method.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::tests {

@@ -1,8 +1,8 @@
-// calibration tests - friction that changes, outliers, ripple: multiple model, robust weights, parallel decimation.
+// methods tests - friction that changes, outliers and ripple: multiple model, robust weights, parallel decimation.
 #include <gtest/gtest.h>
 
-#include "host_sim/identify/methods/linearised.hpp"
-#include "host_sim/identify/methods/parallel_decimation.hpp"
+#include "host_sim/identify/methods/prefilter.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/methods/better_arm.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 
@@ -45,7 +45,7 @@ TEST(MultipleModel, FollowsARampOfViscousFriction) {
   printf("multiple_model: relative RMS of beta after 5 s, ramp: %.4f mean, %.4f worst\n", error.mean(),
          error.maxCoeff());
   EXPECT_LT(error.maxCoeff(), 0.05);  // the "follows": 5 % after 5 s
-  // planted: who never lets go does not follow
+  // planted: a filter without process noise does not follow
   const VectorXd stiff = FollowError(arm, d, LogEkf(tests::ProblemOf(arm, {&d})).path, 0.5);
   EXPECT_GT(stiff.mean(), 2 * error.mean());
 }

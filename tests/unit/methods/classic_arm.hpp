@@ -1,4 +1,4 @@
-// tests - arms as the survey has them, without rotors, torque gains and undeclared effects, and their problems.
+// tests - arms as in the survey, without rotors, torque gains and undeclared effects, and problems for them.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,4 @@
-// calibration tests - the simulated closed loop: its motion obeys KDL's dynamics, it tracks, sticks and says when it
-// fails.
+// methods tests - the simulated closed loop obeys KDL's dynamics, tracks, sticks, and reports when it fails.
 #include <gtest/gtest.h>
 
 #include "codegen/src/io/input_error.hpp"
@@ -56,7 +55,7 @@ TEST(ClosedLoop, AnArmWithoutRotors_NeitherChattersNorRunsAway) {
   const LoopRun run = loop.Run(reference.s.t, reference.s.q, tests::Truth(arm));
   ASSERT_TRUE(run.complete);
   EXPECT_LT((run.s.q - reference.s.q).cwiseAbs().maxCoeff(), 0.01);
-  // Chatter would show as turns that the reference does not make; at a turn a joint may stop and break loose again.
+  // Chatter would show as turns that the reference does not make. At a turn a joint may stop and break loose again.
   const auto turns = [](const VectorXd& speed) {
     int count = 0;
     for (Eigen::Index k = 1; k < speed.size(); ++k)

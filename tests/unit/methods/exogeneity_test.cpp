@@ -1,4 +1,4 @@
-// calibration tests - the exogeneity test raises false alarms as often as it says, and finds noise in the regressors.
+// methods tests - the exogeneity test raises false alarms as often as it states, and finds noise in the regressors.
 #include <gtest/gtest.h>
 
 #include "host_sim/identify/methods/exogeneity.hpp"
@@ -74,7 +74,7 @@ TEST(Exogeneity, NoiseOfTheDerivedAccelerations_FailsWithEveryKindOfInstrument) 
     by_reference += !e.passed();
     by_simulation += !bench.Test(d, SimulatedInstruments(problem, bench.start)).passed();
     by_smoothing += !bench.Test(d, SmoothedInstruments({&d})).passed();
-    // Least squares errs by more than the noise here, and the test says by how much.
+    // The bias of least squares is larger than the noise here, and the test gives its size.
     for (int j = 0; j < 2; ++j) EXPECT_GT(e.joint[j].bias_Nm, 0.5 * bench.arm.noise_Nm(j)) << j;
   }
   EXPECT_EQ(by_reference, kDraws);

@@ -1,8 +1,8 @@
-// calibration tests - IDIM-IV and DIDIM: no bias where least squares has one; torque by KDL, motion by the true arm.
+// methods tests - IDIM-IV and DIDIM have no bias where least squares has one; torque by KDL, motion by the true arm.
 #include <gtest/gtest.h>
 
-#include "host_sim/identify/methods/fourier_fit.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/prefilter.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/methods/better_arm.hpp"
 
 namespace armcal::calibration {

@@ -1,8 +1,8 @@
-// calibration tests - MAP with barrier: bodies exist in every draw, whatever the coordinates, with nonlinear laws too.
+// methods tests - MAP with barrier: bodies exist in every draw, for any coordinates, and with nonlinear laws, too.
 #include <gtest/gtest.h>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/linearised.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/methods/better_arm.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 

@@ -1,5 +1,5 @@
 // methods tests - (16), (22), (25) worked out by hand, row by row, and their gradients by differences.
-#include "host_sim/identify/methods/objective.hpp"
+#include "host_sim/identify/methods/search_problem.hpp"
 
 #include <gtest/gtest.h>
 

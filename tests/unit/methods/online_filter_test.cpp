@@ -6,8 +6,7 @@
 #include <Eigen/LU>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/online_filter.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 
 namespace armcal::tests {
@@ -18,7 +17,7 @@ using calibration::Solution;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Minimum of sum mu^(N - i) |tau_i - K_i p|^2 + mu^N |p|^2 / variance: what the recursions stand for. N counts all
+// Minimum of sum mu^(N - i) |tau_i - K_i p|^2 + mu^N |p|^2 / variance: which the recursions compute. N counts all
 // samples of the log.
 VectorXd Forgotten(const Stacked& rows, int samples, double mu, double variance) {
   VectorXd weight(rows.tau.size());
@@ -100,7 +99,7 @@ TEST_F(LinearArm, Stopped_GivesWhatItHasAndSaysSo) {
   EXPECT_TRUE(s.z.allFinite());
 }
 
-// Columns that the torque cannot tell apart: mu^-n blows their variance up, (23) as the survey has it.
+// The variance of columns that the torque cannot tell apart grows with mu^-n, as in the survey's (23).
 TEST(Forgetting, DependentColumns_BlowUpAndTheRemarkSaysSo) {
   SyntheticArm arm(PlainRobot("er20_like", Columns::kStandard), 23);
   const calibration::Dataset d = arm.Run(4, 24);

@@ -5,8 +5,8 @@
 #include <Eigen/QR>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/minimum_norm.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 
 namespace armcal::tests {

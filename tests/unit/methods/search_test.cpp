@@ -1,13 +1,12 @@
-// methods tests - gradient descent, genetic algorithm and particle filter: better than the start, within
-// ranges, possible bodies, the same again by seed, interruptible.
+// methods tests - gradient descent, genetic algorithm and particle filter improve on the start, stay within the ranges
+// and among possible bodies, repeat by seed, and can be stopped.
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/methods/classic_methods.hpp"
-#include "host_sim/identify/methods/objective.hpp"
-#include "host_sim/identify/methods/search_space.hpp"
+#include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/search_problem.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 
 namespace armcal::tests {

@@ -1,4 +1,4 @@
-// calibration tests - Stribeck truths by the log-EKF, variable projection and the fixed basis; truth written by hand.
+// methods tests - Stribeck truths, written by hand, against the log-EKF, variable projection and the fixed basis.
 #include <gtest/gtest.h>
 
 #include "codegen/src/io/input_error.hpp"
@@ -67,7 +67,7 @@ struct Draw {
 
 using Solve = Solution (*)(const Problem&);
 
-// The study reaches 0.045 mean; two joints at 20 s of slow motion have less to go by than the bound asks.
+// The study reaches a mean of 0.045. Two joints with 20 s of slow motion give less information, so the bound is wider.
 void Judge(Solve solve, const char* name, int first = 1) {
   double sum = 0, worst = 0, prior = 0, seconds = 0;
   constexpr int kDraws = 10;

@@ -1,4 +1,4 @@
-// search tests - every piece once, and an exception that comes out.
+// search tests - every piece runs once, and an exception is passed on.
 #include "host_sim/identify/search/parallel.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// survey tests - the two data files: limits, and spot checks of the printed figures against one another.
+// survey tests - the two data files: the limits, and printed figures that must agree with one another.
 #include "host_sim/study/survey/data_files.hpp"
 
 #include <gtest/gtest.h>

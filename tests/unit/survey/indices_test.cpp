@@ -1,5 +1,5 @@
-// survey tests - the indices of section 5 by hand on cases small enough for a pencil.
-#include "host_sim/study/survey/indices.hpp"
+// survey tests - the indices of section 5, worked out by hand on small cases.
+#include "host_sim/study/survey/trial.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
-// survey tests - a model that contains another never fits the training data worse: the survey's own Table 12 breaks it.
+// survey tests - a model that contains another never fits the training data worse. The survey's own Table 12 breaks
+// this.
 #include <gtest/gtest.h>
 
-#include "host_sim/study/survey/indices.hpp"
-#include "host_sim/study/survey/model_fit.hpp"
 #include "host_sim/study/survey/platform.hpp"
+#include "host_sim/study/survey/trial.hpp"
 #include "tests/unit/survey/survey_arm.hpp"
 
 namespace armcal::survey {

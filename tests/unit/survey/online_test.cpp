@@ -1,4 +1,4 @@
-// survey tests - the firmware's estimator on fresh draws reaches the accuracy that is asked of it; knows no filter.
+// survey tests - the firmware's estimator reaches the required accuracy on fresh draws.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// survey tests - findings as JSON and HTML: the shape that machines rely on.
+// survey tests - findings as JSON and HTML have the form that programs rely on.
 #include "host_sim/study/survey/publish.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,4 @@
-// survey tests - the arm, its records and the study's two trajectories, which are test data and no results; knows no
-// expectation.
+// survey tests - the arm, its records, and two trajectories. The trajectories are test data, not results.
 #pragma once
 
 #include "host_sim/study/survey/draws.hpp"

@@ -1,4 +1,4 @@
-// methods - what a search minimises: (16), (22) or (25) as a function of z; knows no range and no search.
+// methods - what the searches minimise, (16), (22) or (25), and the ranges and bodies that they may try.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,17 +19,18 @@ enum class Criterion {
 
 inline constexpr double kSpreadWeight = 1;  // k_e of (25); the survey gives no number
 
-// Linear models: each joint keeps the mean of its rows [K tau] and the triangular factor of their (centred) Gram
-// matrix; a value then costs some thousand multiplications, whatever the number of samples. Nonlinear models: each
-// joint keeps its rows, and only columns that read a nonlinear parameter are evaluated anew. Holds scratch: one a
-// thread.
+// For a linear model each joint keeps the mean of its rows [K tau] and the triangular factor of their (centred) Gram
+// matrix. A value then costs some thousand multiplications, whatever the number of samples. For a nonlinear model each
+// joint keeps its rows, and only columns that read a nonlinear parameter are evaluated again. Holds scratch: one object
+// a thread.
 class Objective {
  public:
   // InputError: no usable rows; a nonlinear model with memory or whose columns depend on the estimate.
   Objective(const Problem& problem, Criterion criterion);
 
   double operator()(const Eigen::VectorXd& z);
-  // With gradient [z]; (25) smoothed within a hundredth of sigma_j of its kinks, e_i of mean or spread zero.
+  // With gradient [z]. (25) is smoothed within a hundredth of sigma_j of its kinks, where mean or spread of e_i is
+  // zero.
   double operator()(const Eigen::VectorXd& z, Eigen::VectorXd& gradient);
 
   std::size_t memory_bytes() const;
@@ -65,6 +66,40 @@ class Objective {
   Criterion criterion_;
   bool linear_;
   std::vector<Joint> joint_;
+};
+
+// Where a search may look. Coordinates u in [0, 1] stand for the free coordinates of z within their ranges. The bodies
+// that can exist are a convex set that holds Problem::start. So a point outside is moved back along the straight line
+// to the start. If the robot file has no bodies, only base parameters are searched, and bodies are not checked.
+class SearchSpace {
+ public:
+  // InputError: a free coordinate without a finite range, or bodies of the start that cannot exist (names them).
+  SearchSpace(const Problem& problem, const char* method);
+
+  int size() const { return static_cast<int>(free_.size()); }
+  Eigen::VectorXd Point(const Eigen::VectorXd& u) const;  // u -> z
+  Eigen::VectorXd Place(const Eigen::VectorXd& z) const;  // z -> u
+  // z, moved towards the start until its bodies can exist.
+  Eigen::VectorXd Possible(const Eigen::VectorXd& z) const;
+  // Turns d value / d z into d value / d u.
+  Eigen::VectorXd Gradient(const Eigen::VectorXd& dz) const;
+
+  // Standard parameters: z determines a part of them, the prior the rest.
+  Eigen::VectorXd Bodies(const Eigen::VectorXd& z) const;
+  // Minus the sum over links of log det of the pseudo-inertia, relative to that of the start, and its gradient [z].
+  // Infinite where a body cannot exist.
+  double Barrier(const Eigen::VectorXd& z, Eigen::VectorXd& gradient) const;
+
+  // "3 of 72 at an end of their range"; empty if none.
+  std::string AtEnds(const Eigen::VectorXd& z) const;
+
+ private:
+  const codegen::Model& model_;
+  Eigen::VectorXd start_, lower_, upper_, width_;  // [z], [free] ...
+  std::vector<int> free_;
+  Eigen::MatrixXd map_;     // [11 n x rigid]
+  Eigen::VectorXd offset_;  // bodies = offset + map p
+  double start_log_det_ = 0;
 };
 
 }  // namespace armcal::calibration

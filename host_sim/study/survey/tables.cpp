@@ -1,8 +1,7 @@
-// survey - the order of the tables; what each needs is computed once.
-#include "host_sim/study/survey/survey.hpp"
+// survey - runs the survey: computes once what several tables need, then fills the tables in their order.
+#include "host_sim/study/survey/tables.hpp"
 
 #include "host_sim/study/survey/platform.hpp"
-#include "host_sim/study/survey/tables.hpp"
 
 namespace armcal::survey {
 
@@ -45,7 +44,7 @@ std::vector<Outcome> Draws(const Settings& settings, const Motions& motions, Law
   return RunDraws(settings, motions, d, methods);
 }
 
-// What the tables move along; and, for the table of trajectories, every other curve, search and criterion.
+// Searches the motions that the tables use and, for the table of trajectories, every other curve, search and criterion.
 Motions SearchMotions(const Settings& settings) {
   using excitation::Criterion, excitation::Family, excitation::Search;
   Motions motions;

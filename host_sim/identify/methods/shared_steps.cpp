@@ -1,15 +1,14 @@
-// methods - the model about an estimate, its regularised solution and the read-out of bodies; knows no
-// method.
-#include "host_sim/identify/methods/linearised.hpp"
-
+// methods - linearises the model, solves with a prior, and reads out the bodies.
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include <time.h>
-
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "codegen/src/generator/derivative.hpp"
+#include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
-#include "host_sim/identify/methods/minimum_norm.hpp"
 
 namespace armcal::calibration {
 
@@ -94,7 +93,8 @@ void Finish(const Problem& problem, double began, Solution& solution) {
                           ? ReadOutBodies(model, solution.z.segment(model.front(), model.rigid()))
                           : SmallestBodies(model, solution.z);
   solution.physical = solution.bodies.size() > 0 && solution.bodies.allFinite() && IsPhysical(solution.bodies);
-  // Information is 1 / variance: the prior's share of a coordinate's is posterior variance over prior variance.
+  // Information is 1 / variance. So the prior's share of a coordinate's information is posterior variance over prior
+  // variance.
   double share = 0;
   int count = 0;
   if (problem.covariance.size() > 0 && solution.covariance.size() > 0)
@@ -103,6 +103,27 @@ void Finish(const Problem& problem, double began, Solution& solution) {
         share += std::clamp(solution.covariance(c, c) / problem.covariance(c, c), 0.0, 1.0), ++count;
   solution.from_prior = count ? share / count : 0;
   solution.seconds = CpuSeconds() - began;
+}
+
+void ExpectLinear(const Problem& problem, const char* method) {
+  const int columns = problem.model->columns();
+  for (int k = 0; k < problem.model->nonlinear(); ++k)
+    if (problem.lower[columns + k] < problem.upper[columns + k])
+      throw io::InputError(std::string(method) + ": expected a linear model, (12); " +
+                           problem.model->unknowns()[k].name + " of model " + problem.model->robot().name +
+                           " is nonlinear, (13)");
+}
+
+bool Varies(const codegen::Model& model, int joint, int column) {
+  if (model.is_rigid(column)) return false;
+  const codegen::Expr e = model.rows()[joint][column];
+  for (const codegen::EffectUnknown& u : model.unknowns())
+    if (codegen::Reads(e, e.graph()->Symbol(u.name))) return true;
+  return false;
+}
+
+Eigen::VectorXd SmallestBodies(const codegen::Model& model, const Eigen::VectorXd& z) {
+  return model.base_map().completeOrthogonalDecomposition().solve(z.segment(model.front(), model.rigid()));
 }
 
 }  // namespace armcal::calibration

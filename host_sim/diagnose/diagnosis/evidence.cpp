@@ -1,0 +1,178 @@
+// diagnosis - evaluates candidates over the used rows, all of them or every m-th sample, and checks their excitation.
+#include "host_sim/diagnose/diagnosis/evidence.hpp"
+
+#include <algorithm>
+
+namespace armcal::diagnosis {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kSmooth_s = 0.02;  // over which columns are taken to be smooth
+
+// The samples about row k are all used and in one piece.
+bool IsWhole(const RowIndex& rows, int k, int reach) {
+  return k >= reach && k + reach < rows.size() && rows.dataset[k - reach] == rows.dataset[k + reach] &&
+         rows.sample[k + reach] - rows.sample[k - reach] == 2 * reach;
+}
+
+Columns Gather(const Candidate& candidate, const std::vector<Quantities>& logs, const std::vector<RowIndex>& rows,
+               const std::vector<double>& eta) {
+  Columns out;
+  out.joints = candidate.rows();
+  for (const int j : out.joints) out.block.emplace_back(MatrixXd::Zero(rows[j].size(), candidate.columns(eta)));
+  std::vector<std::vector<VectorXd>> value;
+  for (std::size_t log = 0; log < logs.size(); ++log) {
+    candidate.Evaluate(logs[log], eta, value);
+    for (std::size_t r = 0; r < out.joints.size(); ++r) {
+      const RowIndex& index = rows[out.joints[r]];
+      const auto [first, last] = std::equal_range(index.dataset.begin(), index.dataset.end(), static_cast<int>(log));
+      const auto begin = first - index.dataset.begin(), end = last - index.dataset.begin();
+      for (int c = 0; c < candidate.columns(eta); ++c) {
+        const VectorXd& v = value[c][r];
+        if (v.size() == 0) continue;
+        double* const to = out.block[r].col(c).data();
+        for (auto k = begin; k < end; ++k) to[k] = v[index.sample[static_cast<std::size_t>(k)]];
+      }
+    }
+  }
+  return out;
+}
+
+MatrixXd PickRows(const MatrixXd& m, int every) {
+  return m.rows() == 0 ? m : MatrixXd(m(Eigen::seq(0, m.rows() - 1, every), Eigen::all));
+}
+
+// What columns without memory may read, at every m-th sample.
+Quantities PickSamples(const Quantities& q, int every, calibration::Dataset& data) {
+  data.s = {PickRows(q.data->s.t, every), PickRows(q.data->s.q, every), PickRows(q.data->s.qd, every),
+            PickRows(q.data->s.qdd, every), PickRows(q.data->s.temp, every)};
+  data.tau = PickRows(q.data->tau, every);
+  Quantities out;
+  out.data = &data;
+  out.parts.rigid = PickRows(q.parts.rigid, every), out.parts.gravity = PickRows(q.parts.gravity, every);
+  for (const auto& [from, to] : {std::pair{&q.parts.mass, &out.parts.mass}, std::pair{&q.parts.tilt, &out.parts.tilt}})
+    for (const auto& row : *from) {
+      to->emplace_back();
+      for (const VectorXd& v : row) to->back().push_back(PickRows(v, every));
+    }
+  out.tau_model = PickRows(q.tau_model, every);
+  for (const auto& [body, rows] : q.body)
+    for (const MatrixXd& m : rows) out.body[body].push_back(PickRows(m, every));
+  return out;
+}
+
+}  // namespace
+
+Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, const std::vector<double>& eta) {
+  return Gather(candidate, evidence.logs, evidence.index, eta);
+}
+
+Thinned::Thinned(const Evidence& evidence, int rows) : all(evidence) {
+  for (const Quantities& log : evidence.logs) every = std::max(every, log.data->samples() / rows);
+  every |= 1;  // odd: a sample in the middle
+  reach = std::min(every / 2, static_cast<int>(0.5 * kSmooth_s / evidence.logs[0].dt[0]));
+  for (const Quantities& log : evidence.logs) {
+    data.push_back(std::make_unique<calibration::Dataset>());
+    logs.push_back(PickSamples(log, every, *data.back()));
+  }
+  for (const RowIndex& from : evidence.index) {
+    kept.emplace_back(), index.emplace_back();
+    for (int k = 0; k < from.size(); ++k) {
+      if (from.sample[k] % every || !IsWhole(from, k, reach)) continue;
+      kept.back().push_back(k);
+      index.back().dataset.push_back(from.dataset[k]);
+      index.back().segment_begin.push_back(1);
+      index.back().sample.push_back(from.sample[k] / every);
+    }
+  }
+}
+
+Columns Thinned::Gather(const Candidate& candidate, const std::vector<double>& eta) const {
+  if (!candidate.has_memory()) return diagnosis::Gather(candidate, logs, index, eta);
+  Columns out = GatherColumns(candidate, all, eta);
+  for (std::size_t r = 0; r < out.joints.size(); ++r) out.block[r] = AverageRows(out.block[r], out.joints[r]);
+  return out;
+}
+
+MatrixXd Thinned::AverageRows(const MatrixXd& m, int j) const {
+  const auto size = static_cast<Eigen::Index>(kept[j].size());
+  MatrixXd out = MatrixXd::Zero(size, m.cols());
+  for (Eigen::Index c = 0; c < m.cols(); ++c)
+    for (Eigen::Index k = 0; k < size; ++k)
+      out(k, c) = m.col(c).segment(kept[j][static_cast<std::size_t>(k)] - reach, 2 * reach + 1).mean();
+  return out;
+}
+
+BaseRows Thinned::Average(const BaseRows& from) const {
+  BaseRows out;
+  out.columns = from.columns, out.informative = from.informative, out.L = from.L, out.mean = from.mean;
+  out.precision = from.precision;
+  out.index = index;
+  for (int j = 0; j < from.joints(); ++j) {
+    out.design.push_back(AverageRows(from.design[j], j));
+    out.target.push_back(AverageRows(from.target[j], j));
+    out.Multiply(j);
+  }
+  return out;
+}
+
+namespace {
+constexpr int kFewRows = 200;  // of a joint: too few for terms beside the base
+constexpr double kSlow = 0.1;  // of the fastest that was seen is low speed, of the joint's limit is high speed
+constexpr int kFewSlowRows = 30;
+constexpr double kAboveStiction = 5;  // times v_min: a log that only creeps has no low speed to compare
+constexpr double kTempSpan_K = 2;
+constexpr double kLoadSpan = 2;  // times the torque's noise
+}  // namespace
+
+VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::string name) {
+  int j = candidate.joints().empty() ? candidate.rows()[0] : candidate.joints()[0];
+  const RowIndex& index = evidence.index[j];
+  const bool size = name.starts_with("abs(");
+  if (size) name = name.substr(4, name.size() - 5);
+  if (name.ends_with("[k]")) {
+    name.resize(name.size() - 3);
+    j = candidate.joints().at(1);
+  }
+  VectorXd out(index.size());
+  for (int k = 0; k < index.size(); ++k) {
+    const Quantities& log = evidence.logs[index.dataset[k]];
+    const auto& s = log.data->s;
+    const int at = index.sample[k];
+    out[k] = name == "t"      ? s.t[at]
+             : name == "q"    ? s.q(at, j)
+             : name == "qd"   ? s.qd(at, j)
+             : name == "temp" ? (s.temp.cols() > j ? s.temp(at, j) : 0)
+                              : log.parts.rigid(at, j);
+  }
+  return size ? out.cwiseAbs() : out;
+}
+
+bool IsExcited(const Candidate& candidate, const Evidence& evidence) {
+  const int j = candidate.joints().empty() ? candidate.rows().back() : candidate.joints()[0];
+  const auto& joint = evidence.model->robot().joint[j];
+  const int rows = evidence.index[j].size();
+  if (rows < kFewRows) return false;
+  for (const std::string& need : candidate.record().needs) {
+    if (need == "low_speed" || need == "high_speed") {
+      const VectorXd v = OwnSignal(candidate, evidence, "qd").cwiseAbs();
+      const double fastest = v.maxCoeff();
+      if (need == "high_speed" && fastest < kSlow * joint.speed_limit_radps) return false;
+      if (need == "low_speed" &&
+          ((v.array() < kSlow * fastest).count() < kFewSlowRows || fastest < kAboveStiction * joint.v_min_radps))
+        return false;
+    } else if (need == "temp_span") {
+      const VectorXd temp = OwnSignal(candidate, evidence, "temp");
+      if (temp.maxCoeff() - temp.minCoeff() < kTempSpan_K) return false;
+    } else if (need == "load_span") {
+      const VectorXd load = OwnSignal(candidate, evidence, "tau_rigid").cwiseAbs();
+      if (load.maxCoeff() - load.minCoeff() < kLoadSpan * joint.torque_noise_Nm) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace armcal::diagnosis

@@ -1,0 +1,177 @@
+// verdict - a diagnosis as JSON; terms of a JSON become uses of their records again.
+#include "host_sim/diagnose/verdict/json.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/files.hpp"
+#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/diagnose/verdict/words.hpp"
+
+namespace armcal::verdict {
+
+namespace fs = std::filesystem;
+using diagnosis::Term;
+using nlohmann::ordered_json;
+
+namespace {
+
+std::vector<std::string> Signals(const Term& t) {
+  std::vector<std::string> out;
+  const std::string joint = t.joints.empty() ? "" : std::to_string(t.joints[0] + 1);
+  for (std::string s : t.record->signals) {
+    if (s == "t") out.push_back("time");
+    else if (s.ends_with("[k]")) out.push_back(s.substr(0, s.size() - 3) + std::to_string(t.joints.at(1) + 1));
+    else if (s.back() == ')') out.push_back(s.insert(s.size() - 1, joint));
+    else out.push_back(s == "tau_rigid" ? "load" + joint : s + joint);
+  }
+  return out;
+}
+
+nlohmann::ordered_json RefutedJson(const diagnosis::Refutation& why) {
+  nlohmann::ordered_json out;
+  if (why.joint < 0) out["joint"] = "all";
+  else out["joint"] = why.joint + 1;
+  out["without_it"] = why.beside_others ? "the other terms" : "the declared model";
+  out["factor"] = why.factor;
+  out["rms_with"] = ToList(why.with), out["rms_without"] = ToList(why.without);
+  return out;
+}
+
+}  // namespace
+
+nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
+  const auto& f = *v.finding;
+  nlohmann::ordered_json j;
+  j["verdict"] = AnyConfirmed(f) ? "effect" : "none";
+  j["joint_base"] = 1;
+  j["terms"] = nlohmann::ordered_json::array();
+  for (std::size_t n = 0; n < f.terms.size(); ++n) {
+    const Term& t = f.terms[n];
+    nlohmann::ordered_json term{
+        {"kind", t.record->kind}, {"record", t.record->name}, {"class", codegen::Word(t.record->effect_class)}};
+    if (t.joints.size() == 1 || IsUnknown(t)) term["joint"] = t.joints[0] + 1;
+    else term["joint"] = JointName(t);
+    const codegen::EffectUse use = Found(t);
+    term["joints"] = nlohmann::ordered_json::array();
+    for (const int joint : use.joints) term["joints"].push_back(joint + 1);
+    term["unknowns"] = use.nonlinear;
+    term["signals"] = Signals(t);
+    nlohmann::ordered_json parameters, deviations;
+    for (std::size_t k = 0; k < t.eta.size(); ++k) {
+      parameters[t.unknowns[k].name] = t.eta[k];
+      if (t.eta_sd[static_cast<Eigen::Index>(k)] > 0)
+        deviations[t.unknowns[k].name] = t.eta_sd[static_cast<Eigen::Index>(k)];
+    }
+    for (std::size_t c = 0; c < t.columns.size(); ++c)
+      parameters[t.columns[c].name] = t.amplitude[c], deviations[t.columns[c].name] = t.sd[c];
+    term["parameters"] = parameters;
+    term["parameter_sd"] = deviations;
+    term["also_fits"] = t.also_fits;
+    term["confirmed"] = t.confirmed;
+    if (t.refuted) term["refuted"] = RefutedJson(*t.refuted);
+    if (t.confirmed && !t.training_only) {
+      const Dependence d = DependenceOf(v, n);
+      term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true));
+      term["dependence"] = {
+          {"over", d.signal}, {"torque", d.torque}, {"x", d.term.x}, {"without", d.without.y}, {"term", d.term.y}};
+    }
+    term["score"] = t.score;
+    term["folds"] = ToList(t.folds);
+    term["runner_up"] = t.rivals.empty() ? "" : RivalName(t.rivals[0]);
+    term["runner_up_score"] = t.rivals.empty() ? 0 : t.rivals[0].score;
+    term["separate"] = nlohmann::ordered_json::array();
+    for (const Separation& apart : v.separation[n])
+      term["separate"].push_back({{"from", apart.from}, {"how", apart.how}, {"command", apart.command}});
+    term["training_only"] = t.training_only;
+    term["in_model"] = t.confirmed && t.record->on_target;
+    if (!t.record->on_target) term["remedy"] = t.record->remedy;
+    j["terms"].push_back(term);
+  }
+  const auto& test = *v.test;
+  j["before"] = ToList(calibration::Rms(test, v.held_out->before, false));
+  j["after"] = ToList(calibration::Rms(test, v.held_out->after, false));
+  j["before_moving"] = ToList(calibration::Rms(test, v.held_out->before, true));
+  j["after_moving"] = ToList(calibration::Rms(test, v.held_out->after, true));
+  j["torque_moving"] = ToList(calibration::Rms(test, test.tau, true));
+  std::vector<double> share;
+  for (int k = 0; k < test.joints(); ++k) share.push_back(test.moving.col(k).cast<double>().mean());
+  j["moving_share"] = share;
+  j["noise_floor"] = ToList(f.sigma);
+  j["noise_innovation"] = ToList(f.innovation);
+  j["smallest_detectable"] = ToList(f.smallest);
+  if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
+  j["exogeneity"] = ToJson(v.exogeneity);
+  j["seconds"] = v.seconds;
+  return j;
+}
+
+namespace {
+
+bool IsAmong(const codegen::EffectUse& use, const std::vector<std::string>& effects) {
+  const std::string word = EffectWord(use.effect, use.joints);
+  return std::any_of(effects.begin(), effects.end(),
+                     [&](const std::string& e) { return e == use.effect || e == word; });
+}
+
+bool IsVerdict(const ordered_json& j) {
+  if (!j.is_object() || !j.contains("verdict") || !j["verdict"].is_string()) return false;
+  if (j["verdict"] == "failed") return j.contains("error") && j["error"].is_string();
+  return (j["verdict"] == "none" || j["verdict"] == "effect") && j.contains("terms") && j["terms"].is_array() &&
+         j.contains("before_moving") && j.contains("after_moving");
+}
+
+}  // namespace
+
+std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::vector<std::string>& effects) {
+  std::vector<codegen::EffectUse> out;
+  if (path.empty()) return out;
+  try {
+    const auto verdict = nlohmann::json::parse(files::ReadWholeFile(path));
+    for (const auto& term : verdict.at("terms")) {
+      codegen::EffectUse use;
+      use.effect = term.at("record").get<std::string>();
+      for (const int joint : term.at("joints")) use.joints.push_back(joint - 1);
+      use.nonlinear = term.at("unknowns").get<std::map<std::string, double>>();
+      if (!use.nonlinear.empty() && IsAmong(use, effects)) out.push_back(use);
+    }
+  } catch (const nlohmann::json::exception&) {
+    throw io::InputError(path + ": expected a verdict that armcal diagnose --json wrote");
+  }
+  if (out.empty())
+    throw io::InputError(
+        fmt::format("{}: expected a term with nonlinear parameters among {}", path, fmt::join(effects, ", ")));
+  return out;
+}
+
+std::string JointText(const ordered_json& joint) { return joint.is_string() ? joint.get<std::string>() : joint.dump(); }
+
+ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed"}, {"error", why}}; }
+
+ordered_json ReadVerdict(const fs::path& path) {
+  ordered_json j = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
+  return IsVerdict(j) ? j : FailedVerdict(path.filename().string() + " holds no verdict");
+}
+
+Verdicts ReadVerdicts(const std::vector<std::string>& paths) {
+  Verdicts out;
+  const auto add = [&](const fs::path& path) {
+    const std::string name = path.stem().string();
+    if (!out.emplace(name, ReadVerdict(path)).second)
+      throw io::InputError(path.string() + ": expected one verdict of the name " + name);
+  };
+  for (const std::string& p : paths) {
+    if (!fs::is_directory(p)) {
+      add(p);
+      continue;
+    }
+    for (const auto& e : fs::directory_iterator(p))
+      if (e.path().extension() == ".json") add(e.path());
+  }
+  return out;
+}
+
+}  // namespace armcal::verdict

@@ -1,0 +1,59 @@
+// verdict - which terms hold whatever run of an arm is held out, as text, JSON, page and pictures.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "host_sim/diagnose/verdict/json.hpp"
+
+namespace armcal::verdict {
+
+// A term as one split has it. Its joint is the one whose error it lowers most; RMS where that joint moves. other_joint:
+// what the split's terms together do worst to another joint; change: after over before, less one; -1: there is none.
+struct Occurrence {
+  std::string held_out, kind;
+  int joint = 0;                              // 0-based
+  double before = 0, after = 0, without = 0;  // without: after, with this term's torque put back
+  int other_joint = -1;
+  double change = -1;
+  nlohmann::ordered_json term;  // as in the verdict
+};
+
+struct Agreement {
+  std::vector<std::string> kinds;  // that every split allows; empty: one split only has a curve over these signals
+  std::string joint;
+  std::vector<std::string> signals;
+  std::vector<Occurrence> split;  // one a held-out run
+};
+
+struct Disagreement {
+  std::string held_out, kind, joint, why;
+};
+
+// A term holds if every split found it from its training runs alone: on the same joint, of the same kind (or kinds that
+// fit equally, or a curve over the same signals), and of the same form. The held-out run must have confirmed it, and
+// there it takes half a per cent off a joint's error: of the declared model's, and of the model's without it.
+struct Agreed {
+  std::vector<Agreement> holds;
+  std::vector<Disagreement> does_not;
+};
+Agreed Agree(const Verdicts& splits);
+
+// "gravity_spring or cable_pack", or "unknown over qd1".
+std::string Name(const Agreement& agreement);
+
+std::string SplitsText(const Verdicts& splits, const Agreed& agreed);
+
+// {"verdict", "holds": [{"kinds", "joint", "signals", "splits": {run: {"kind", "torque_of", "before", "after",
+// "without", "other_joint", "other_change", "parameters", "score", "folds"}}}], "does_not_hold": [{"held_out", "kind",
+// "joint", "why"}], "splits": {run: {"before_moving", "after_moving", "torque_moving"} or {"error"}}}
+nlohmann::ordered_json SplitsJson(const Verdicts& splits, const Agreed& agreed);
+
+// errors.svg: error over torque of every held-out run; term_1.svg, ...: what holds, over the signal it depends on.
+void WritePictures(const std::filesystem::path& folder, const Verdicts& splits, const Agreed& agreed);
+
+void WriteSplitsPage(const std::filesystem::path& path, const std::string& robot, const Verdicts& splits,
+                     const Agreed& agreed);
+
+}  // namespace armcal::verdict

@@ -1,0 +1,114 @@
+// verdict - counts verdicts by kind and joint.
+#include "host_sim/diagnose/verdict/summary.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "host_sim/data/report/page.hpp"
+
+namespace armcal::verdict {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+namespace {
+
+// Confirmed terms as "kind joint".
+std::string Terms(const ordered_json& verdict) {
+  std::string text;
+  for (const auto& t : verdict["terms"])
+    text += (text.empty() ? "" : "; ") + t["kind"].get<std::string>() + " " + JointText(t["joint"]);
+  return text;
+}
+
+report::Table FindingTable(const ordered_json& summary) {
+  report::Table t{{"finding", "joint", "logs", "share %", "first in"}, {}};
+  for (const auto& f : summary["findings"])
+    t.rows.push_back({f["kind"], JointText(f["joint"]), std::to_string(f["logs"].size()),
+                      fmt::format("{:.0f}", 100.0 * static_cast<double>(f["logs"].size()) /
+                                                static_cast<double>(summary["verdicts"].size())),
+                      f["logs"][0]});
+  return t;
+}
+
+// The largest share of a joint's error that the terms removed.
+std::string Gain(const ordered_json& verdict) {
+  double best = 0;
+  for (std::size_t j = 0; j < verdict["before_moving"].size(); ++j) {
+    const double before = verdict["before_moving"][j], after = verdict["after_moving"][j];
+    if (before > 0) best = std::max(best, 1 - after / before);
+  }
+  return fmt::format("{:.1f}", 100 * best);
+}
+
+report::Table VerdictTable(const ordered_json& summary) {
+  report::Table t{{"log", "verdict", "error removed %", "terms, or what is wrong"}, {}};
+  for (const auto& v : summary["verdicts"]) {
+    const bool failed = v["verdict"] == "failed", effect = v["verdict"] == "effect";
+    t.rows.push_back(
+        {v["name"], v["verdict"], effect ? Gain(v) : "-", failed ? v["error"].get<std::string>() : Terms(v)});
+  }
+  return t;
+}
+
+std::string Headline(const ordered_json& s) {
+  return fmt::format("{} logs: {} with an effect, {} without, {} failed", s["verdicts"].size(), s["effect"].get<int>(),
+                     s["none"].get<int>(), s["failed"].get<int>());
+}
+
+}  // namespace
+
+ordered_json SummaryJson(const Verdicts& verdicts) {
+  ordered_json s{{"effect", 0}, {"none", 0}, {"failed", 0}, {"findings", ordered_json::array()}};
+  s["verdicts"] = ordered_json::array();
+  std::map<std::pair<std::string, std::string>, ordered_json> findings;  // by kind and joint
+  for (const auto& [name, v] : verdicts) {
+    const std::string verdict = v["verdict"];
+    s[verdict] = s[verdict].get<int>() + 1;
+    ordered_json row{{"name", name}, {"verdict", verdict}};
+    if (verdict == "failed") {
+      row["error"] = v["error"];
+      s["verdicts"].push_back(row);
+      continue;
+    }
+    row["terms"] = ordered_json::array();
+    for (const auto& t : v["terms"]) {
+      if (!t.value("confirmed", true)) continue;
+      row["terms"].push_back({{"kind", t["kind"]}, {"joint", t["joint"]}, {"parameters", t["parameters"]}});
+      ordered_json& f = findings[{t["kind"].get<std::string>(), JointText(t["joint"])}];
+      if (f.is_null()) f = {{"kind", t["kind"]}, {"joint", t["joint"]}, {"logs", ordered_json::array()}};
+      f["logs"].push_back(name);
+    }
+    row["before_moving"] = v["before_moving"], row["after_moving"] = v["after_moving"];
+    s["verdicts"].push_back(row);
+  }
+  std::vector<ordered_json> sorted;
+  for (auto& [key, f] : findings) sorted.push_back(std::move(f));
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return a["logs"].size() > b["logs"].size(); });
+  for (auto& f : sorted) s["findings"].push_back(std::move(f));
+  return s;
+}
+
+std::string SummaryText(const ordered_json& s) {
+  std::string text = report::Text(VerdictTable(s));
+  if (!s["findings"].empty()) text += "\n" + report::Text(FindingTable(s));
+  return text + Headline(s) + "\n";
+}
+
+void WriteSummaryPage(const fs::path& path, const ordered_json& s) {
+  report::Page page("What the models of many arms lack", "One verdict a log; terms that held on its held-out log.");
+  page.Box(s["failed"] > 0 ? report::Tone::kWarning : report::Tone::kNeutral, Headline(s));
+  if (!s["findings"].empty()) {
+    page.Section("What was found");
+    page.Add(FindingTable(s));
+  }
+  page.Section("Log by log");
+  report::Table logs = VerdictTable(s);
+  logs.caption = "Error removed: RMS on the held-out log where the joint moves, of the joint that gained most.";
+  page.Add(logs);
+  page.Write(path);
+}
+
+}  // namespace armcal::verdict

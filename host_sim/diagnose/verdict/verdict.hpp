@@ -1,0 +1,46 @@
+// verdict - one diagnosis and everything that it has to show a person: lines for the terminal, and a page.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host_sim/data/report/page.hpp"
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
+#include "host_sim/identify/methods/exogeneity.hpp"
+
+namespace armcal::verdict {
+
+// How to tell a term from a rival on the same joints: in their records' words and, where a motion alone does it, as a
+// command for a shell.
+struct Separation {
+  std::string from, how, command;  // command: empty where a motion does not do
+};
+
+// Everything that one diagnosis has to show.
+struct DiagnosisView {
+  const codegen::Model* model = nullptr;
+  const diagnosis::Finding* finding = nullptr;
+  const calibration::Dataset* test = nullptr;
+  const diagnosis::HeldOut* held_out = nullptr;
+  std::vector<Eigen::MatrixXd> term_torque;  // on the test log
+  double seconds = 0;
+  calibration::Exogeneity exogeneity;               // of the training logs, with the terms in
+  std::vector<std::vector<Separation>> separation;  // per term
+};
+
+// Means over bins of a signal, over the held-out log where the joint moves: the residual with the term's torque put
+// back, the term, and the residual.
+struct Dependence {
+  int joint = 0;
+  std::string signal, torque;  // what they are, with unit
+  report::Series without, term, remains;
+};
+Dependence DependenceOf(const DiagnosisView& v, std::size_t term);
+
+// Verdict, table before / after, and for each term the residual over time and over the signal that gave it away.
+void AddDiagnosis(report::Page& page, const DiagnosisView& v);
+
+// Short lines for the terminal.
+std::string DiagnosisText(const DiagnosisView& v);
+
+}  // namespace armcal::verdict

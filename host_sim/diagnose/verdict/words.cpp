@@ -1,0 +1,150 @@
+// verdict - puts scores, rivals, and what would tell them apart into words.
+#include "host_sim/diagnose/verdict/words.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host_sim/identify/excitation/target.hpp"
+
+namespace armcal::verdict {
+
+using diagnosis::Rival;
+using diagnosis::Term;
+
+namespace {
+
+std::string Value(const std::string& name, double value, double sd, const std::string& unit) {
+  return fmt::format("{} = {:.4g}{} {}", name, value, sd > 0 ? fmt::format(" +- {:.2g}", sd) : "", unit);
+}
+
+bool Apart(const std::vector<int>& a, const std::vector<int>& b) {
+  return !a.empty() && !b.empty() &&
+         std::none_of(a.begin(), a.end(), [&](int j) { return std::find(b.begin(), b.end(), j) != b.end(); });
+}
+
+}  // namespace
+
+bool AnyConfirmed(const diagnosis::Finding& f) {
+  return std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed; });
+}
+
+std::string Headline(const diagnosis::Finding& f) {
+  if (f.terms.empty())
+    return "none. Nothing is missing that these logs could show; what they would have shown is in the table: smallest "
+           "effect seen";
+  if (!AnyConfirmed(f)) return "none. What the training logs suggested did not hold on the held-out log";
+  const bool of_the_arm =
+      std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed && !t.training_only; });
+  return of_the_arm ? "effect" : "effect, in the training log only: it says nothing about the arm";
+}
+
+std::string Remark(const Term& t) {
+  if (!t.confirmed) return " (NOT CONFIRMED on the held-out log)";
+  return t.training_only ? " (in the training log only)" : "";
+}
+
+std::string JointName(const Term& t) {
+  if (t.joints.size() == 1 || IsUnknown(t)) return std::to_string(t.joints[0] + 1);
+  return t.joints.empty() ? t.record->place : JointNumbers(t.joints);
+}
+
+std::string JointNumbers(const std::vector<int>& joints) {
+  std::string out;
+  for (const int j : joints) out += fmt::format("{}{}", out.empty() ? "" : "-", j + 1);
+  return out;
+}
+
+std::string EffectWord(const std::string& record, const std::vector<int>& joints) {
+  return record + (joints.empty() ? "" : ":") + JointNumbers(joints);
+}
+
+std::string Parameters(const Term& t) {
+  constexpr std::size_t kShown = 4;
+  std::vector<std::string> out;
+  for (std::size_t k = 0; k < t.eta.size(); ++k)
+    out.push_back(Value(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Eigen::Index>(k)], t.unknowns[k].unit));
+  for (std::size_t c = 0; c < std::min(kShown, t.columns.size()); ++c)
+    out.push_back(Value(t.columns[c].name, t.amplitude[static_cast<Eigen::Index>(c)],
+                        t.sd[static_cast<Eigen::Index>(c)], t.columns[c].unit));
+  if (t.columns.size() > kShown) out.push_back("...");
+  return fmt::format("{}", fmt::join(out, ", "));
+}
+
+std::string ScoreText(const Term& t) {
+  return fmt::format("{:.0f} (accepted above {:g})", t.score, diagnosis::kAccept);
+}
+
+std::string FoldText(const Term& t) {
+  if (t.training_only) return "not asked blocks that it was not fitted to: an event of one part is in no other";
+  return fmt::format("improves {} of {} blocks of the training log that it was not fitted to",
+                     (t.folds.array() > 0).count(), t.folds.size());
+}
+
+std::string RivalName(const Rival& rival) {
+  return rival.record->name + ", joint " + (rival.joints.empty() ? rival.record->place : JointNumbers(rival.joints));
+}
+
+std::string RunnerUp(const Term& t) {
+  return t.rivals.empty() ? "none" : fmt::format("{} (score {:.0f})", RivalName(t.rivals[0]), t.rivals[0].score);
+}
+
+std::string AlsoFits(const Term& t) {
+  return t.also_fits.empty() ? "nothing else in the catalogue" : fmt::format("{}", fmt::join(t.also_fits, ", "));
+}
+
+codegen::EffectUse Found(const Term& t) {
+  codegen::EffectUse use;
+  use.effect = t.record->name, use.joints = t.joints;
+  for (std::size_t k = 0; k < t.eta.size(); ++k) use.nonlinear.emplace(t.unknowns[k].key, t.eta[k]);
+  return use;
+}
+
+std::vector<Separation> Separations(const Term& t, const diagnosis::Finding& finding, const codegen::Model& model,
+                                    const codegen::Catalogue& records, const std::string& robot,
+                                    const std::string& verdict) {
+  std::vector<codegen::EffectUse> found;
+  for (const Term& term : finding.terms)
+    if (!term.eta.empty() && !verdict.empty()) found.push_back(Found(term));
+  const auto is_found = [&](const codegen::EffectRecord& record, const std::vector<int>& joints) {
+    return std::any_of(found.begin(), found.end(),
+                       [&](const auto& use) { return use.effect == record.name && use.joints == joints; });
+  };
+  std::vector<Separation> out;
+  for (const Rival& rival : t.rivals) {
+    if (Apart(t.joints, rival.joints) || (rival.record == t.record && rival.joints == t.joints)) continue;
+    Separation s{RivalName(rival), t.record->separate, ""};
+    const std::string& other = rival.record->separate;
+    if (other != s.how && !other.empty()) s.how += (s.how.empty() ? "" : "; ") + other;
+    if (s.how.empty()) s.how = "motion in which what they depend on does not go together";
+    const std::string one = EffectWord(t.record->name, t.joints),
+                      another = EffectWord(rival.record->name, rival.joints);
+    if (excitation::CanSeparate(model.robot(), records, {one, another}, found)) {
+      s.command = fmt::format("armcal excite --separate {},{}", one, another);
+      if (is_found(*t.record, t.joints) || is_found(*rival.record, rival.joints)) s.command += " --from " + verdict;
+      s.command += fmt::format(" --robot {} --out separate.csv", robot);
+    }
+    out.push_back(s);
+  }
+  return out;
+}
+
+std::string WhyRefuted(const Term& t, const codegen::Robot& robot) {
+  const diagnosis::Refutation& why = *t.refuted;
+  const char* without = why.beside_others ? "with the other terms alone" : "by the declared model";
+  if (why.joint < 0)
+    return fmt::format(
+        "all joints together are predicted worse with it than {}: the product of their errors is {:.4g} "
+        "times as large",
+        without, why.factor);
+  const bool slides = robot.joint[why.joint].kinematics.type == codegen::JointType::kPrismatic;
+  return fmt::format("joint {} is predicted worse with it than {}: {:.4g} instead of {:.4g} {}", why.joint + 1, without,
+                     why.with[why.joint], why.without[why.joint], slides ? "N" : "N m");
+}
+
+std::string InTheModel(const Term& t, const codegen::Robot& robot) {
+  if (!t.confirmed) return "left out; refuted on the held-out log: " + WhyRefuted(t, robot);
+  return t.record->on_target ? "yes, as an estimated effect" : "no model can hold it: " + t.record->remedy;
+}
+
+}  // namespace armcal::verdict

@@ -1,0 +1,60 @@
+// verdict - what a diagnosis says, in words that its text, its page and its JSON share.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host_sim/diagnose/verdict/verdict.hpp"
+
+namespace armcal::verdict {
+
+// Of a curve that names no cause the joint is the one whose torque it changes; the other is among the signals.
+inline bool IsUnknown(const diagnosis::Term& t) { return t.record->kind != t.record->name; }
+
+// At least one term held on the held-out log.
+bool AnyConfirmed(const diagnosis::Finding& finding);
+
+// The verdict in one sentence; what it means in numbers is in the table of errors.
+std::string Headline(const diagnosis::Finding& finding);
+
+// "3", "5-6", "all", "base", "flange": how a report names the joints of a term.
+std::string JointName(const diagnosis::Term& term);
+
+// "5-6" of joints counted from 0.
+std::string JointNumbers(const std::vector<int>& joints);
+
+// "stribeck:2", "wrist_coupling:5-6", "base_tilt": an effect as armcal excite --separate takes it.
+std::string EffectWord(const std::string& record, const std::vector<int>& joints);
+
+// What must be said with a term's name: " (NOT CONFIRMED ...)", " (in the training log only)", or nothing.
+std::string Remark(const diagnosis::Term& t);
+
+// "vs2 = 0.08 +- 0.002 rad/s, ..."; a curve's first coefficients only.
+std::string Parameters(const diagnosis::Term& t);
+
+// "512 (accepted above 15)", "improves 5 of 5 blocks ...", "presliding_dahl, joint 2 (score 480)".
+std::string ScoreText(const diagnosis::Term& t);
+std::string FoldText(const diagnosis::Term& t);
+std::string RivalName(const diagnosis::Rival& rival);
+std::string RunnerUp(const diagnosis::Term& t);
+std::string AlsoFits(const diagnosis::Term& t);
+
+// The term as a robot file would use its record, with the nonlinear parameters that were found; of several uses the
+// first.
+codegen::EffectUse Found(const diagnosis::Term& t);
+
+// Of one term of the finding. robot, verdict: as the user named the robot file and the JSON, which may be empty.
+std::vector<Separation> Separations(const diagnosis::Term& t, const diagnosis::Finding& finding,
+                                    const codegen::Model& model, const codegen::Catalogue& records,
+                                    const std::string& robot, const std::string& verdict);
+
+// What the words say where there is no command.
+inline constexpr const char* kNoMotion = "armcal excite cannot search a motion for it";
+
+// "joint 3 is predicted worse with it than by the declared model: 0.412 instead of 0.398 N m"; of one not confirmed.
+std::string WhyRefuted(const diagnosis::Term& t, const codegen::Robot& robot);
+
+// What the new model file makes of the term.
+std::string InTheModel(const diagnosis::Term& t, const codegen::Robot& robot);
+
+}  // namespace armcal::verdict

@@ -1,14 +1,19 @@
-// client - brings a drive's traces home, of a trajectory that it plays or of what it does anyway; knows no log.
+// client - records the traces of a drive, while it plays a trajectory or does its own work, and turns them into logs.
 #pragma once
 
 #include <string>
 
 #include "codegen/src/robot/robot.hpp"
 #include "host_sim/client/drive_client.hpp"
-#include "host_sim/client/trace_log.hpp"
 #include "host_sim/client/trace_reader.hpp"
+#include "host_sim/data/logs/log.hpp"
 
 namespace armcal::client {
+
+// Ticks of the motion without its blend.
+struct PlayedTicks {
+  std::uint32_t first, last;
+};
 
 struct RecordOptions {
   std::string connect, robot, trajectory, out, samples, json;
@@ -26,5 +31,14 @@ struct Recording {
 // RefusedError (the drive serves no trace or plays none; the motion was stopped), LinkError (records
 // were lost).
 Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot);
+
+// Trace 0, with motion and flags and whatever else its channels hold. Records whose whole window lies inside the played
+// part; first_tick: of the first of them. Throws LinkError if there are too few for a log.
+logs::Log RawLog(const TraceRecords& records, const codegen::Robot& robot, const PlayedTicks& played,
+                 std::uint32_t& first_tick);
+
+// Trace 1, the drive's processed samples; `tauff` is the committed model's torque at the measured state. All, or the
+// played part.
+logs::Log SampleLog(const TraceRecords& records, const codegen::Robot& robot, const PlayedTicks& played, bool all);
 
 }  // namespace armcal::client

@@ -49,14 +49,9 @@ void Print(const nlohmann::ordered_json& result) {
 }
 
 int RunBench(const BenchOptions& o) {
-  namespace fs = std::filesystem;
   const codegen::Robot robot = codegen::ReadRobot(RobotPath(o.robot));
-  const fs::path program = o.program.empty()
-                               ? fs::read_symlink("/proc/self/exe").parent_path() / ("armcal-bench-" + robot.name)
-                               : fs::path(o.program);
-  if (!fs::is_regular_file(program))
-    throw io::InputError(program.string() + ": no bench program has been built for robot " + robot.name);
-  std::vector<std::string> words{program.string()};
+  const std::string program = ProgramFor("armcal-bench", robot.name, o.program, "bench program");
+  std::vector<std::string> words{program};
   if (o.quick) words.push_back("--quick");
   const auto shape = Shape(robot);
   words.insert(words.end(), shape.begin(), shape.end());
@@ -65,8 +60,8 @@ int RunBench(const BenchOptions& o) {
   const int code = bench.Wait(&rest);
   const auto result = nlohmann::ordered_json::parse(bench.first_line() + rest, nullptr, false);
   if (code != 0 || result.is_discarded())
-    throw io::InputError(program.string() + ": ended with code " + std::to_string(code) +
-                         "; its model is not that of " + robot.name);
+    throw io::InputError(program + ": ended with code " + std::to_string(code) + "; its model is not that of " +
+                         robot.name);
   Print(result);
   WriteJson(o.json, result);
   return kOk;

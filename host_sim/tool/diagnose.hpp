@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/diagnose/verdict/diagnosis_report.hpp"
+#include "host_sim/diagnose/verdict/verdict.hpp"
+#include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
 
@@ -29,5 +30,19 @@ struct DiagnosisRun {
 
 // Train, decide, write the model file and take its hash; only then open the held-out log. Prints the verdict.
 std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options);
+
+// --batch: the logs of many arms. --splits: every run of one arm held out once. (diagnose_batch.cpp)
+struct BatchOptions {
+  std::string folder, out, part;
+  std::vector<std::string> summary, splits;
+  int jobs = 0;
+  bool asked() const { return !folder.empty() || !summary.empty() || !splits.empty(); }
+};
+
+void AddBatchOptions(CLI::App& verb, BatchOptions& options);
+
+// kOk, or kPartial where a log has no verdict; the summary has a line for each such log. Throws io::InputError: an
+// option is missing or in vain, or there is nothing to diagnose.
+int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch);
 
 }  // namespace armcal::tool

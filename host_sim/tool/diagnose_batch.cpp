@@ -1,19 +1,84 @@
-// tool - armcal diagnose --batch: which logs of a folder belong together, and what they came to.
-#include "host_sim/tool/diagnose_batch.hpp"
-
+// tool - armcal diagnose --batch and --splits: many diagnoses, one process each on all cores, so that a bad log ends
+// alone; and what they come to.
 #include <fmt/core.h>
+
 #include <map>
+#include <mutex>
+#include <set>
+#include <sstream>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/diagnose/verdict/diagnose_summary.hpp"
-#include "host_sim/tool/diagnose_cases.hpp"
-#include "host_sim/tool/diagnose_splits.hpp"
+#include "host_sim/data/files/files.hpp"
+#include "host_sim/data/report/progress.hpp"
+#include "host_sim/diagnose/verdict/splits.hpp"
+#include "host_sim/diagnose/verdict/summary.hpp"
+#include "host_sim/identify/search/parallel.hpp"
+#include "host_sim/tool/diagnose.hpp"
+#include "host_sim/tool/process.hpp"
+#include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+// What is empty is not there: the verdict then says so.
+struct DiagnosisCase {
+  std::string name;
+  std::vector<std::string> train, test;  // test: one
+  std::string robot;
+};
+
+// What a failed run said: its last line, which is the message.
+std::string Reason(const fs::path& log, int code) {
+  std::string text = files::ReadWholeFile(log);
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  const std::string last = text.substr(text.rfind('\n') + 1), mark = "armcal: ";
+  return last.starts_with(mark) ? last.substr(mark.size()) : fmt::format("ended with code {}", code);
+}
+
+nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& one, const fs::path& out) {
+  const auto file = [&](const char* end) { return (out / (c.name + end)).string(); };
+  for (const char* end : {".json", ".html", ".toml", ".log"}) fs::remove(file(end));
+  std::string why = c.train.empty()   ? "no train log"
+                    : c.test.empty()  ? "no test log"
+                    : c.robot.empty() ? "no robot: expected --robot, or robot.toml beside the logs"
+                                      : "";
+  if (why.empty()) {
+    std::vector<std::string> words{OwnProgram(), "diagnose", "--robot", c.robot};
+    const auto add = [&](const char* option, const std::vector<std::string>& values) {
+      words.push_back(option);
+      words.insert(words.end(), values.begin(), values.end());
+    };
+    add("--train", c.train), add("--test", c.test);
+    add("--json", {file(".json")}), add("--report", {file(".html")}), add("--model-out", {file(".toml")});
+    if (!one.channels.empty()) add("--channels", {one.channels});
+    if (one.cutoff_Hz > 0) add("--cutoff", {fmt::format("{}", one.cutoff_Hz)});
+    const int code = RunProgram(words, file(".log"));
+    if (code == kOk) return verdict::ReadVerdict(file(".json"));
+    why = Reason(file(".log"), code);
+  }
+  WriteJson(file(".json"), verdict::FailedVerdict(why));
+  return verdict::FailedVerdict(why);
+}
+
+// NAME.json, .html, .toml and .log of each case go to `out`. one: how each log is read. jobs: at a time; 0: one a core.
+verdict::Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const DiagnoseOptions& one, const fs::path& out,
+                              int jobs) {
+  fs::create_directories(out);
+  verdict::Verdicts verdicts;
+  report::Progress progress(fmt::format("{} logs", cases.size()));
+  std::mutex mutex;
+  search::InParallel(static_cast<int>(cases.size()), jobs, [&](int k) {
+    const DiagnosisCase& c = cases[static_cast<std::size_t>(k)];
+    const nlohmann::ordered_json verdict = Diagnose(c, one, out);
+    const std::lock_guard lock(mutex);
+    verdicts[c.name] = verdict;
+    progress.Set(static_cast<double>(verdicts.size()) / static_cast<double>(cases.size()));
+  });
+  return verdicts;
+}
 
 const char* const kLayout =
     "NAME.train.csv and NAME.test.csv (or .csv.gz), or folders NAME with train.csv and test.csv";
@@ -98,6 +163,57 @@ void Check(const DiagnoseOptions& one, const BatchOptions& batch) {
   if (!batch.summary.empty()) return;
   if (batch.out.empty()) throw io::InputError("--batch, --splits: expected --out FOLDER for the verdicts");
   if (batch.jobs < 0) throw io::InputError("--jobs: expected 1 or more, or 0 for one a core");
+}
+
+// "runs/a.csv.gz" -> "a".
+std::string RunName(const std::string& path) {
+  const std::string file = fs::path(path).filename().string();
+  return file.substr(0, file.find(".csv"));
+}
+
+// Each run with everything outside of its group to train on.
+std::vector<DiagnosisCase> MakeSplits(const std::vector<std::string>& groups, const std::string& robot) {
+  std::vector<std::vector<std::string>> runs;
+  std::set<std::string> names;
+  for (const std::string& group : groups) {
+    runs.emplace_back();
+    std::istringstream in(group);
+    for (std::string run; std::getline(in, run, ',');) {
+      if (!names.insert(RunName(run)).second) throw io::InputError(run + ": expected one run of this name");
+      runs.back().push_back(run);
+    }
+  }
+  if (runs.size() < 2) throw io::InputError("--splits: expected two groups of runs or more");
+  std::vector<DiagnosisCase> cases;
+  for (std::size_t out = 0; out < runs.size(); ++out)
+    for (const std::string& held_out : runs[out]) {
+      DiagnosisCase c{RunName(held_out), {}, {held_out}, robot};
+      for (std::size_t g = 0; g < runs.size(); ++g)
+        if (g != out) c.train.insert(c.train.end(), runs[g].begin(), runs[g].end());
+      cases.push_back(c);
+    }
+  return cases;
+}
+
+// kOk, or kPartial where a split has no verdict. Throws io::InputError: fewer than two groups of runs, or two runs of
+// one name.
+int RunSplits(const DiagnoseOptions& one, const BatchOptions& options) {
+  const std::vector<DiagnosisCase> cases = MakeSplits(options.splits, one.robot);
+  const verdict::Verdicts verdicts = DiagnoseAll(cases, one, options.out, options.jobs);
+  const verdict::Agreed agreed = verdict::Agree(verdicts);
+  fmt::print("{}", verdict::SplitsText(verdicts, agreed));
+  nlohmann::ordered_json json = verdict::SplitsJson(verdicts, agreed);
+  for (const DiagnosisCase& c : cases)
+    for (const std::string& run : c.train) json["splits"][c.name]["train"].push_back(RunName(run));
+  WriteJson(one.json, json);
+  verdict::WritePictures(options.out, verdicts, agreed);
+  if (!one.report.empty()) {
+    verdict::WriteSplitsPage(one.report, one.robot, verdicts, agreed);
+    fmt::print("report: {}\n", one.report);
+  }
+  for (const auto& [name, v] : verdicts)
+    if (v["verdict"] == "failed") return kPartial;
+  return kOk;
 }
 
 }  // namespace

@@ -1,8 +1,7 @@
 // tool - armcal estimate: starts the host port of the estimator that was compiled for a robot.
-#include <unistd.h>
-
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/tool/connect.hpp"
+#include "host_sim/tool/process.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -13,16 +12,11 @@ struct EstimateOptions {
 };
 
 int RunEstimate(const EstimateOptions& o) {
-  namespace fs = std::filesystem;
-  const fs::path robot = RobotPath(o.robot);
+  const std::filesystem::path robot = RobotPath(o.robot);
   const std::string name = codegen::ReadRobot(robot).name;
-  const fs::path program = o.program.empty()
-                               ? fs::read_symlink("/proc/self/exe").parent_path() / ("armcal-estimate-" + name)
-                               : fs::path(o.program);
-  if (!fs::is_regular_file(program))
-    throw io::InputError(program.string() + ": no estimator has been built for robot " + name);
+  const std::string program = ProgramFor("armcal-estimate", name, o.program, "estimator");
   if (o.connect.empty() == o.log.empty()) throw io::InputError("estimate: expected either --connect or --log");
-  std::vector<std::string> words{program.string(), "--robot", robot.string(), "--effects",
+  std::vector<std::string> words{program, "--robot", robot.string(), "--effects",
                                  (Home() / "codegen" / "effects").string()};
   if (!o.connect.empty()) {
     if (IsSerialLine(o.connect))
@@ -33,11 +27,7 @@ int RunEstimate(const EstimateOptions& o) {
   for (const auto& [key, value] :
        {std::pair{"--log", o.log}, {"--table", o.table}, {"--records", o.records}, {"--json", o.json}})
     if (!value.empty()) words.insert(words.end(), {key, value});
-  std::vector<char*> arguments;
-  for (std::string& w : words) arguments.push_back(w.data());
-  arguments.push_back(nullptr);
-  execv(arguments[0], arguments.data());
-  throw io::InputError(program.string() + ": cannot be started");
+  Become(words);
 }
 
 }  // namespace

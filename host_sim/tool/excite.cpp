@@ -5,7 +5,7 @@
 
 #include <unistd.h>
 
-#include "host_sim/diagnose/verdict/verdict_file.hpp"
+#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/identify/excitation/compose.hpp"
 #include "host_sim/identify/excitation/optimise.hpp"
 #include "host_sim/identify/excitation/target.hpp"

@@ -5,6 +5,7 @@
 
 #include "host_sim/client/residual_reader.hpp"
 #include "host_sim/diagnose/health/joint_health.hpp"
+#include "host_sim/diagnose/health/shapes.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/verb.hpp"
 

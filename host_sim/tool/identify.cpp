@@ -1,18 +1,254 @@
-// tool - armcal identify: logs -> parameters with their standard deviations -> a table file.
+// tool - armcal identify: logs -> parameters with their standard deviations -> a table file; by the weighted fit, by
+// another method, or by a payload.
 #include <fmt/core.h>
 
+#include <cmath>
+
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/identify/calibration/information.hpp"
+#include "host_sim/identify/calibration/payload.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
-#include "host_sim/tool/identify_method.hpp"
-#include "host_sim/tool/identify_payload.hpp"
+#include "host_sim/identify/methods/closed_loop.hpp"
+#include "host_sim/identify/methods/method.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
+
+using calibration::DriveGain;
+
 namespace {
 
+// --method: any method of the survey, or one that beats it.
+struct MethodOptions {
+  std::string robot, method, channels, test, json;
+  std::vector<std::string> train;
+  double band_Hz = 0, cutoff_Hz = 0;
+  nlohmann::ordered_json exogeneity;  // the test that chose the method, for the JSON; null: it was asked for
+};
+
+// Name, value and standard deviation of every unknown.
+nlohmann::ordered_json PrintUnknowns(const codegen::Model& model, const calibration::Solution& s) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  report::Table t{{"parameter", "unit", "value", "sd"}, {}};
+  for (Eigen::Index k = 0; k < s.z.size(); ++k) {
+    const int column = static_cast<int>(k), unknown = column - model.columns();
+    const std::string name = unknown < 0 ? model.column_name(column) : model.unknowns()[unknown].name;
+    const std::string unit = unknown < 0 ? model.column_unit(column) : model.unknowns()[unknown].unit;
+    const bool has_sd = s.covariance.size() > 0;
+    const double sd = has_sd ? std::sqrt(std::max(0.0, s.covariance(k, k))) : 0;
+    t.rows.push_back({name, unit, fmt::format("{:.5g}", s.z[k]), has_sd ? fmt::format("{:.3g}", sd) : "-"});
+    out.push_back({{"name", name}, {"unit", unit}, {"value", s.z[k]}});
+    if (has_sd) out.back()["sd"] = sd;
+  }
+  fmt::print("{}", report::Text(t));
+  return out;
+}
+
+// The arm under its control law along what the logs say was commanded; empty where that is not known.
+calibration::ClosedLoop Loop(const codegen::Model& model, const std::vector<calibration::Dataset>& data) {
+  const std::map<std::string, Eigen::MatrixXd> reference = calibration::References(data);
+  if (reference.empty() || model.robot().control.structure.empty()) return {};
+  return calibration::MakeClosedLoop(model, reference);
+}
+
+// Where the robot file has no prior, a search still needs a start and ranges: those of weighted least squares. Returns
+// what to tell the user.
+std::string RangesFromLeastSquares(calibration::Problem& problem) {
+  constexpr double kDeviations = 10;
+  calibration::Problem plain = problem;
+  plain.covariance.resize(0, 0);
+  const calibration::Solution s = calibration::Solve(calibration::FindMethod("weighted_pseudo_inverse"), plain);
+  const Eigen::VectorXd reach = kDeviations * s.covariance.diagonal().cwiseSqrt();
+  problem.start = s.z;
+  problem.lower = problem.lower.cwiseMax(s.z - reach), problem.upper = problem.upper.cwiseMin(s.z + reach);
+  problem.start = problem.start.cwiseMax(problem.lower).cwiseMin(problem.upper);
+  return fmt::format("ranges: weighted least squares +- {:g} standard deviations; the robot file has no prior",
+                     kDeviations);
+}
+
+// kOk, or kPartial where the method says that it did not converge. Throws io::InputError: unknown method, or a log that
+// lacks what the method needs.
+int RunMethod(const MethodOptions& o) {
+  const calibration::Method& method = calibration::FindMethod(o.method);
+  const codegen::Model model = LoadModel(o.robot);
+  const LogReader read(model, o.channels, o.cutoff_Hz);
+  const std::vector<calibration::Dataset> train = read.All(o.train);
+  calibration::Problem problem = calibration::MakeProblem(model, calibration::Pointers(train));
+  if (method.needs_loop) problem.closed_loop = Loop(model, train);
+  const std::string ranges =
+      method.needs_ranges && !model.robot().has_prior ? RangesFromLeastSquares(problem) : std::string();
+  if (!ranges.empty()) fmt::print("{}\n", ranges);
+  const calibration::Solution s = calibration::Solve(method, problem);
+  nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}, {"method", method.name}};
+  json["parameters"] = PrintUnknowns(model, s);
+  json["physical"] = s.physical, json["converged"] = s.converged, json["iterations"] = s.iterations;
+  json["seconds"] = s.seconds, json["memory_bytes"] = s.memory_bytes, json["from_prior"] = s.from_prior;
+  json["remark"] = s.remark;
+  if (!ranges.empty()) json["ranges"] = ranges;
+  if (!o.exogeneity.is_null()) json["exogeneity"] = o.exogeneity;
+  fmt::print("{}{}{}: {} iterations, {}, {:.3f} s, {:.1f} MB, bodies physical: {}{}{}\n", method.title,
+             *method.equation ? " " : "", method.equation, s.iterations, s.converged ? "converged" : "NOT converged",
+             s.seconds, 1e-6 * static_cast<double>(s.memory_bytes), s.physical ? "yes" : "no",
+             s.remark.empty() ? "" : "; ", s.remark);
+  if (!o.test.empty()) {
+    const calibration::Dataset test = read.One(o.test);
+    const int columns = model.columns(), unknowns = model.nonlinear();
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(columns + model.joints());  // no torque gains here
+    x.head(columns) = s.z.head(columns);
+    const verdict::HeldOutError e = verdict::CompareHeldOut(
+        test, calibration::Predict(model, test, x, {s.z.data() + columns, static_cast<std::size_t>(unknowns)}),
+        o.band_Hz);
+    verdict::PrintHeldOut(e, o.test);
+    json["test"] = o.test;
+    json["held_out"] = verdict::ToJson(e);
+  }
+  WriteJson(o.json, json);
+  return s.converged ? kOk : kPartial;
+}
+
+// --with, --without: a known payload gives the drives' gains, an unknown one is identified.
+struct PayloadOptions {
+  std::string robot, channels, payload, payload_out, table, json;
+  std::vector<std::string> with, without;
+  double cutoff_Hz = 0;
+  bool asked() const { return !with.empty() || !without.empty() || !payload.empty() || !payload_out.empty(); }
+};
+
+const char* const kName[] = {"m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"};
+const char* const kUnit[] = {"kg", "m", "m", "m", "kg*m^2", "kg*m^2", "kg*m^2", "kg*m^2", "kg*m^2", "kg*m^2"};
+
+void Check(const PayloadOptions& o) {
+  if (o.with.empty()) throw io::InputError("--with: expected log(s) of runs with the payload");
+  if (o.without.empty()) throw io::InputError("--without: expected log(s) of runs without the payload");
+  if (!o.payload.empty() && !o.payload_out.empty())
+    throw io::InputError("--payload-out: expected no --payload; what is known is not identified");
+  if (o.payload.empty() && !o.table.empty())
+    throw io::InputError("--table-out: expected --payload FILE; a load at the flange has no place in a table");
+}
+
+// The declared model fitted to the runs without payload in true torque; the gains become the table's torque scales.
+void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vector<calibration::Dataset> without,
+                const std::vector<DriveGain>& gains) {
+  if (!model.robot().has_prior)
+    throw io::InputError(o.robot + ": prior = \"none\": a table needs standard parameters, and those need a prior");
+  codegen::Robot exact = model.robot();
+  std::vector<double> scale(gains.size(), 1);
+  for (std::size_t j = 0; j < gains.size(); ++j) {
+    if (!gains[j].determined) continue;
+    scale[j] = gains[j].value;
+    exact.joint[j].motor.torque_constant_tolerance = 0;  // known by experiment: no unknown of the fit
+    for (calibration::Dataset& d : without) d.tau.col(static_cast<Eigen::Index>(j)) *= scale[j];
+  }
+  const codegen::Model known(exact, LoadCatalogue());
+  const calibration::Fit all = calibration::WeightedFit(known, calibration::Pointers(without));
+  const calibration::Fit held =
+      calibration::WeightedFit(known, calibration::Pointers(without), calibration::HardlyDetermined(known, all));
+  calibration::TableFile table = calibration::IdentifiedTable(
+      known, all, held, calibration::ReadOutPhysical(known, held), without[0].s.t[1] - without[0].s.t[0]);
+  for (std::size_t j = 0; j < scale.size(); ++j) table.joint[j].torque_scale *= scale[j];
+  calibration::WriteTable(o.table, table);
+  fmt::print("written: {}\n", o.table);
+}
+
+int RunGains(const PayloadOptions& o, const codegen::Model& model, const LogReader& read) {
+  const codegen::Payload known = codegen::ReadPayload(std::filesystem::path(o.payload));
+  const std::vector<calibration::Dataset> with = read.All(o.with), without = read.All(o.without);
+  const auto gains =
+      calibration::FindDriveGains(model, {calibration::Pointers(without), calibration::Pointers(with)}, known);
+  nlohmann::ordered_json json{{"robot", model.robot().name}, {"with", o.with}, {"without", o.without}};
+  json["payload_kg"] = known.mass_kg;
+  report::Table t{{"joint", "gain", "sd", "stated N m/A", "true N m/A", ""}, {}};
+  bool all = true;
+  for (std::size_t j = 0; j < gains.size(); ++j) {
+    const DriveGain& g = gains[j];
+    const codegen::Joint& joint = model.robot().joint[j];
+    all = all && g.determined;
+    nlohmann::ordered_json row{{"joint", j + 1}, {"gain", g.value}, {"sd", g.sd}, {"determined", g.determined}};
+    std::vector<std::string> cells{std::to_string(j + 1),
+                                   fmt::format("{:.4f}", g.value),
+                                   fmt::format("{:.2g}", g.sd),
+                                   "-",
+                                   "-",
+                                   g.determined ? "" : "not determined by these logs"};
+    if (joint.has_motor) {
+      row["torque_constant_NmpA"] = g.value * joint.motor.torque_constant_NmpA;
+      cells[3] = fmt::format("{:.5g}", joint.motor.torque_constant_NmpA);
+      cells[4] = fmt::format("{:.5g}", g.value * joint.motor.torque_constant_NmpA);
+    }
+    json["gains"].push_back(row);
+    t.rows.push_back(cells);
+  }
+  t.caption = fmt::format("true torque = gain x measured torque, by a payload of {:g} kg", known.mass_kg);
+  fmt::print("{}", report::Text(t));
+  if (!o.table.empty()) WriteTable(o, model, without, gains);
+  WriteJson(o.json, json);
+  return all ? kOk : kPartial;
+}
+
+std::string Snippet(const calibration::Load& load) {
+  const auto list = [](const auto& v) {
+    std::string text;
+    for (Eigen::Index k = 0; k < v.size(); ++k) text += fmt::format("{}{:.6g}", k ? ", " : "", v[k]);
+    return "[" + text + "]";
+  };
+  return fmt::format(
+      "# Flange axes (tool_frame); inertia about the centre: xx xy xz yy yz zz. At the end of a robot file the last "
+      "link\n"
+      "# carries it; armcal identify --payload takes it as known.\n[payload]\nmass_kg = {:.6g}  # +- {:.2g}\n"
+      "center_m = {}\ninertia_kgm2 = {}\n",
+      load.body[0], load.sd[0], list(load.body.segment(1, 3)), list(load.body.segment(4, 6)));
+}
+
+int RunLoad(const PayloadOptions& o, const codegen::Model& model, const LogReader& read) {
+  const std::vector<calibration::Dataset> with = read.All(o.with), without = read.All(o.without);
+  const calibration::Load load =
+      calibration::FindLoad(model, {calibration::Pointers(without), calibration::Pointers(with)});
+  nlohmann::ordered_json json{{"robot", model.robot().name}, {"with", o.with}, {"without", o.without}};
+  report::Table t{{"load", "unit", "value", "sd", ""}, {}, "flange axes, inertia about the centre"};
+  for (int i = 0; i < load.body.size(); ++i) {
+    const bool determined = load.determined[static_cast<std::size_t>(i)];
+    t.rows.push_back({kName[i], kUnit[i], fmt::format("{:.5g}", load.body[i]), fmt::format("{:.2g}", load.sd[i]),
+                      determined ? "" : "not determined by these logs"});
+    json["load"].push_back({{"name", kName[i]},
+                            {"unit", kUnit[i]},
+                            {"value", load.body[i]},
+                            {"sd", load.sd[i]},
+                            {"determined", determined}});
+  }
+  json["least_squares_physical"] = load.was_physical;
+  fmt::print("{}", report::Text(t));
+  if (!load.was_physical) fmt::print("least squares alone gave no body that can exist; this one can\n");
+  if (!o.payload_out.empty()) {
+    files::WriteWholeFile(o.payload_out, Snippet(load));
+    fmt::print("written: {}\n", o.payload_out);
+  }
+  WriteJson(o.json, json);
+  return kOk;
+}
+
+void AddPayloadOptions(CLI::App& verb, PayloadOptions& o) {
+  verb.add_option("--with", o.with, "log(s) of runs with a payload at the flange; with --without, instead of --train");
+  verb.add_option("--without", o.without, "log(s) of runs without it, any trajectory");
+  verb.add_option("--payload", o.payload,
+                  "file with a [payload] table (mass_kg; center_m, inertia_kgm2 if known): find the drives' gains; "
+                  "without this option the payload itself is found");
+  verb.add_option("--payload-out", o.payload_out, "the [payload] table found, to append to a robot file");
+}
+
+// kOk, or kPartial where the logs do not determine every gain. Throws io::InputError: an option is missing or in vain,
+// no load is seen, or a log cannot be one of this arm.
+int RunPayload(const PayloadOptions& o) {
+  Check(o);
+  const codegen::Model model = LoadModel(o.robot);
+  const LogReader read(model, o.channels, o.cutoff_Hz);
+  return o.payload.empty() ? RunLoad(o, model, read) : RunGains(o, model, read);
+}
+
+// Else: the weighted fit with the prior.
 struct IdentifyOptions {
   std::string robot, channels, table, json, test, method;
   std::vector<std::string> train;

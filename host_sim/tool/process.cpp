@@ -1,4 +1,4 @@
-// tool - fork, exec, pipe, wait.
+// tool - starts programs by fork and exec, reads what they print through a pipe, and waits for their end.
 #include "host_sim/tool/process.hpp"
 
 #include <fcntl.h>
@@ -6,23 +6,45 @@
 #include <unistd.h>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 
 #include "codegen/src/io/input_error.hpp"
 
 namespace armcal::tool {
 namespace {
 
-[[noreturn]] void Become(const std::vector<std::string>& words) {
+// As exec takes them; they point into the words.
+std::vector<char*> Arguments(const std::vector<std::string>& words) {
   std::vector<char*> arguments;
   for (const std::string& w : words) arguments.push_back(const_cast<char*>(w.c_str()));
   arguments.push_back(nullptr);
-  execvp(arguments[0], arguments.data());
+  return arguments;
+}
+
+[[noreturn]] void BecomeAsChild(const std::vector<std::string>& words) {
+  execvp(words[0].c_str(), Arguments(words).data());  // also a program of the search path, such as cmake
   _exit(127);
 }
 
 int CodeOf(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
 
 }  // namespace
+
+std::string OwnProgram() { return std::filesystem::read_symlink("/proc/self/exe").string(); }
+
+std::string ProgramFor(const std::string& stem, const std::string& robot, const std::string& chosen,
+                       const std::string& what) {
+  const std::filesystem::path beside = std::filesystem::path(OwnProgram()).parent_path() / (stem + "-" + robot);
+  const std::string program = chosen.empty() ? beside.string() : chosen;
+  if (!std::filesystem::is_regular_file(program))
+    throw io::InputError(program + ": no " + what + " has been built for robot " + robot);
+  return program;
+}
+
+void Become(const std::vector<std::string>& words) {
+  execv(words[0].c_str(), Arguments(words).data());
+  throw io::InputError(words[0] + ": cannot be started");
+}
 
 int RunProgram(const std::vector<std::string>& words, const std::string& log) {
   const pid_t child = fork();
@@ -32,7 +54,7 @@ int RunProgram(const std::vector<std::string>& words, const std::string& log) {
       dup2(file, 1);
       dup2(file, 2);
     }
-    Become(words);
+    BecomeAsChild(words);
   }
   int status = 0;
   waitpid(child, &status, 0);
@@ -47,7 +69,7 @@ Background::Background(const std::vector<std::string>& words) {
     dup2(ends[1], 1);
     close(ends[0]);
     close(ends[1]);
-    Become(words);
+    BecomeAsChild(words);
   }
   close(ends[1]);
   pipe_ = ends[0];

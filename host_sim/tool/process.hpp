@@ -1,4 +1,4 @@
-// tool - other programs: run one and wait, or keep one running; knows no verb.
+// tool - starts other programs: in place of this one, until it ends, or in the background.
 #pragma once
 
 #include <string>
@@ -7,6 +7,17 @@
 #include <sys/types.h>
 
 namespace armcal::tool {
+
+// This program.
+std::string OwnProgram();
+
+// `chosen`, or else the program STEM-ROBOT beside this one. Throws io::InputError if it is not there: "no WHAT has been
+// built for robot ROBOT".
+std::string ProgramFor(const std::string& stem, const std::string& robot, const std::string& chosen,
+                       const std::string& what);
+
+// Puts the program words[0] in the place of this one. Throws io::InputError if it cannot be started.
+[[noreturn]] void Become(const std::vector<std::string>& words);
 
 // Runs, waits, returns the exit code. Output goes where ours goes, or to `log` if it is given.
 int RunProgram(const std::vector<std::string>& words, const std::string& log = "");

@@ -1,8 +1,5 @@
-// tool - armcal simulate: starts the simulated drive that was compiled for a robot; knows nothing of what happens in
-// it.
-#include <unistd.h>
-
-#include "codegen/src/io/input_error.hpp"
+// tool - armcal simulate: starts the simulated drive that was compiled for a robot.
+#include "host_sim/tool/process.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -17,27 +14,15 @@ struct SimulateOptions {
 int RunSimulate(const SimulateOptions& o) {
   namespace fs = std::filesystem;
   const fs::path robot = RobotPath(o.robot);
-  const fs::path scenario = fs::is_regular_file(o.scenario)
-                                ? fs::path(o.scenario)
-                                : Home() / "host_sim" / "scenarios" / (o.scenario + ".toml");
-  if (!fs::is_regular_file(scenario))
-    throw io::InputError("scenario " + o.scenario + ": expected a file, or a name in host_sim/scenarios");
+  const fs::path scenario = ScenarioPath(o.scenario);
   const std::string name = codegen::ReadRobot(robot).name;
-  const fs::path drive =
-      o.drive.empty() ? fs::read_symlink("/proc/self/exe").parent_path() / ("armcal-drive-" + name) : fs::path(o.drive);
-  if (!fs::is_regular_file(drive))
-    throw io::InputError(drive.string() + ": no simulated drive has been built for robot " + name);
+  const std::string drive = ProgramFor("armcal-drive", name, o.drive, "simulated drive");
   if (const auto folder = fs::path(o.storage).parent_path(); !folder.empty()) fs::create_directories(folder);
-  std::vector<std::string> words{drive.string(), "--scenario",   scenario.string(),
-                                 "--robot",      robot.string(), "--storage",
-                                 o.storage,      "--port",       std::to_string(o.port)};
+  std::vector<std::string> words{drive,     "--scenario", scenario.string(),     "--robot", robot.string(), "--storage",
+                                 o.storage, "--port",     std::to_string(o.port)};
   if (!o.truth_log.empty()) words.insert(words.end(), {"--truth-log", o.truth_log});
   if (o.real_time) words.push_back("--real-time");
-  std::vector<char*> arguments;
-  for (std::string& w : words) arguments.push_back(w.data());
-  arguments.push_back(nullptr);
-  execv(arguments[0], arguments.data());
-  throw io::InputError(drive.string() + ": cannot be started");
+  Become(words);
 }
 
 }  // namespace

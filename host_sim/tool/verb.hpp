@@ -1,4 +1,4 @@
-// tool - what every verb shares: exit codes and JSON output. One file a verb implements the rest.
+// tool - what every verb shares: exit codes, JSON output, and where the files that a user names lie.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,6 +8,8 @@
 #include <string>
 
 #include "codegen/src/generator/load.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/files.hpp"
 
 namespace armcal::tool {
 
@@ -38,6 +40,18 @@ using codegen::LoadModel;
 using codegen::RobotPath;
 
 // Writes j to `path` if it is not empty; whole or not at all.
-void WriteJson(const std::string& path, const nlohmann::ordered_json& j);
+inline void WriteJson(const std::string& path, const nlohmann::ordered_json& j) {
+  if (!path.empty()) files::WriteWholeFile(path, j.dump(1) + "\n");
+}
+
+// A scenario file by its path, or by its name in host_sim/scenarios. Throws io::InputError if there is none.
+inline std::filesystem::path ScenarioPath(const std::string& scenario) {
+  const std::filesystem::path path = std::filesystem::is_regular_file(scenario)
+                                         ? std::filesystem::path(scenario)
+                                         : Home() / "host_sim" / "scenarios" / (scenario + ".toml");
+  if (!std::filesystem::is_regular_file(path))
+    throw io::InputError("scenario " + scenario + ": expected a file, or a name in host_sim/scenarios");
+  return path;
+}
 
 }  // namespace armcal::tool

@@ -49,4 +49,9 @@ struct Bandwidth {
 // inertias, fewer than 8 samples, a cut-off from half the sample rate on or so low that no sample is settled.
 Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const Bandwidth& bandwidth = {});
 
+// The frequency [Hz] above which evenly sampled q shows less power than white noise of this standard deviation would.
+// Welch's periodogram of the second difference. 0 if q only holds noise;
+// half the rate if it is too short to tell.
+double MotionBand_Hz(const Eigen::VectorXd& q, double noise, double rate_Hz);
+
 }  // namespace armcal::logs

@@ -1,4 +1,4 @@
-// report - colours and line styles of every picture; the room's own.
+// report - the colours and line styles of every picture, and a picture that carries them in a file of its own.
 #pragma once
 
 #include <string>
@@ -14,5 +14,9 @@ inline constexpr std::string_view kLight =
 
 // Rules for what a canvas draws, in terms of the variables.
 std::string PictureStyle();
+
+// What Svg() of a plot or of bars returns, as a complete SVG file: light ground, no variables, so that any viewer shows
+// it. The same picture gives the same bytes.
+std::string SvgFile(std::string_view svg);
 
 }  // namespace armcal::report

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/diagnose/diagnosis/search.hpp"
+#include "codegen/src/generator/model.hpp"
+#include "host_sim/identify/calibration/dataset.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::diagnosis {
@@ -88,5 +89,9 @@ class Diagnosis {
   Finding finding_;
   std::unique_ptr<Work> work_;
 };
+
+// The robot file with the confirmed terms added: each with its record, parameters and standard deviations, `provenance`
+// and score as comments. What a model can hold is an [[effect]] table; of the rest a comment says what to do about it.
+std::string ModelFile(const codegen::Model& model, const Finding& finding, const std::string& provenance);
 
 }  // namespace armcal::diagnosis

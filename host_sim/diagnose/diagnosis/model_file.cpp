@@ -1,5 +1,5 @@
 // diagnosis - terms as [[effect]] tables, and what no model holds as comments.
-#include "host_sim/diagnose/diagnosis/model_file.hpp"
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
 
 #include <fmt/format.h>
 

@@ -62,7 +62,4 @@ class Searcher {
   Projection seen_;  // of the best
 };
 
-// A signal of the candidate's joint j ("q", "abs(qd)") or of its other one ("q[k]") in the rows of joint j.
-Eigen::VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::string name);
-
 }  // namespace armcal::diagnosis

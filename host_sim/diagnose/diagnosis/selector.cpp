@@ -1,8 +1,10 @@
-// diagnosis - which candidate is the next term, and whether one still earns its place.
+// diagnosis - ranks the candidates, accepts the next term, and checks whether a chosen one still earns its place.
 #include "host_sim/diagnose/diagnosis/selector.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
 
 #include "host_sim/identify/methods/exogeneity.hpp"
 
@@ -12,8 +14,10 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kRescored = 14;             // candidates whose likelihood is computed with their own noise model
-constexpr int kCurvesOfAJoint = 3;        // among these
+constexpr int kThinnedRows = 2500;  // of a log: a coarse grid needs to see where the gain is, not how large
+constexpr double kClearly = 0.9;    // of a joint's noise: below this a found effect was most of what looked like noise
+constexpr int kRescored = 14;       // candidates whose likelihood is computed with their own noise model
+constexpr int kCurvesOfAJoint = 3;  // among these
 constexpr double kKeepsOutOfFold = 0.35;  // of its gain
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kOnce = 0.8;              // of a trace in one fold: the others cannot tell of it
@@ -33,6 +37,71 @@ bool SharesJoint(const Candidate& a, const Candidate& b) {
 }
 
 }  // namespace
+
+// What the candidates of one pass are tried on: the base with the terms so far, whole and thinned.
+class Grounds {
+ public:
+  // Fits the base with the given terms and takes its residuals' spread as white noise. only: the one candidate that is
+  // tried on it; null: any.
+  Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms, const Candidate* only = nullptr);
+
+  Ground ground() const { return {work_.evidence, *thinned_, *metric_, *thin_metric_}; }
+  const Metric& metric() const { return *metric_; }
+  // Deviance of these joints with no further column.
+  double DevianceWithout(const std::vector<int>& joints) const;
+  // Takes as noise what the fit with these columns leaves; true if it is clearly less.
+  bool Sharpen(const Columns& with);
+
+ private:
+  void MakeMetrics(const std::vector<NoiseModel>& noise);
+
+  Diagnosis::Work& work_;
+  std::unique_ptr<Thinned> thinned_;
+  BaseRows thin_rows_;
+  std::unique_ptr<Metric> metric_, thin_metric_;
+  mutable std::map<std::vector<int>, double> without_;
+};
+
+Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms, const Candidate* only) : work_(work) {
+  work_.Solve(terms);
+  work_.FollowEstimate(only ? work_.Reads(terms, only) : work_.all_reads);
+  work_.Prepare(terms);
+  thinned_ = std::make_unique<Thinned>(work_.evidence, kThinnedRows);
+  thin_rows_ = thinned_->Average(work_.rows);
+  MakeMetrics(work_.WhiteNoise());
+}
+
+void Grounds::MakeMetrics(const std::vector<NoiseModel>& noise) {
+  metric_ = std::make_unique<Metric>(work_.rows, noise);
+  std::vector<NoiseModel> averaged = noise;
+  for (NoiseModel& joint : averaged) joint.innovation *= thinned_->noise();
+  thin_metric_ = std::make_unique<Metric>(thin_rows_, averaged);
+  without_.clear();
+}
+
+double Grounds::DevianceWithout(const std::vector<int>& joints) const {
+  const auto [at, fresh] = without_.try_emplace(joints, 0);
+  if (!fresh) return at->second;
+  Columns none;
+  none.joints = joints;
+  for (const int j : joints) none.block.emplace_back(work_.rows.index[j].size(), 0);
+  return at->second = metric_->RefittedDeviance(none);
+}
+
+bool Grounds::Sharpen(const Columns& with) {
+  std::vector<NoiseModel> noise = metric_->noise();
+  bool clearly = false;
+  for (int j = 0; j < work_.rows.joints(); ++j) {
+    const Eigen::VectorXd e = metric_->ResidualWith(with, j);
+    if (e.size() == 0) continue;
+    const double spread = std::sqrt(e.squaredNorm() / static_cast<double>(e.size()));
+    if (spread > kClearly * noise[j].innovation) continue;
+    noise[j].innovation = std::max(spread, 1e-12);
+    clearly = true;
+  }
+  if (clearly) MakeMetrics(noise);
+  return clearly;
+}
 
 bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
   Grounds grounds(w_, terms);

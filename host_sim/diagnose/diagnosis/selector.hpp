@@ -5,10 +5,11 @@
 #include <map>
 #include <vector>
 
-#include "host_sim/diagnose/diagnosis/grounds.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 
 namespace armcal::diagnosis {
+
+class Grounds;  // what the candidates of one pass are tried on
 
 class Selector {
  public:

@@ -1,11 +1,15 @@
-// diagnosis - fits the base model with the current terms.
+// diagnosis - fits the base model with the current terms, and rebuilds its rows at the estimate.
 #include "host_sim/diagnose/diagnosis/work.hpp"
+
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "codegen/src/generator/state_path.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/diagnose/diagnosis/noise.hpp"
 #include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::diagnosis {
@@ -150,6 +154,201 @@ void Diagnosis::Work::Solve(const std::vector<const Chosen*>& terms) {
     estimate = out;
     if (settled) break;
   }
+}
+
+std::set<codegen::InputId> Diagnosis::Work::Reads(const std::vector<const Chosen*>& terms,
+                                                  const Candidate* further) const {
+  std::set<codegen::InputId> out;
+  for (const Chosen* t : terms) out.merge(t->candidate->inputs());
+  if (further) out.merge(further->inputs());
+  return out;
+}
+
+// Candidates read the model's torque as the estimate has it.
+void Diagnosis::Work::FollowEstimate(const std::set<codegen::InputId>& reads) {
+  if (evidence.logs.empty()) {
+    for (const auto* d : train) evidence.logs.push_back(MakeQuantities(model, *d, all_reads));
+    followed.resize(0);
+  }
+  if (followed.size() != estimate.x.size() || followed != estimate.x) followed_reads.clear();
+  std::set<codegen::InputId> stale;
+  std::set_difference(reads.begin(), reads.end(), followed_reads.begin(), followed_reads.end(),
+                      std::inserter(stale, stale.end()));
+  if (stale.empty()) return;
+  for (Quantities& log : evidence.logs) Follow(model, arm, estimate.x, declared.eta, stale, log);
+  followed = estimate.x;
+  followed_reads.merge(stale);
+}
+
+// What of the declared model's rows no estimate changes; coordinates declared.active.
+void Diagnosis::Work::StartRows() {
+  const int n = model.joints(), columns = model.columns(), active = static_cast<int>(declared.active.size());
+  rows = BaseRows{};
+  rows.index = evidence.index;
+  rows.informative = prior.informative;
+  rows.columns.resize(n), rows.design.resize(n), rows.target.resize(n);
+  bent.assign(n, 1);
+  const VectorXd x = estimate.x.head(columns);
+  regressor.resize(train.size());
+  for (std::size_t log = 0; log < train.size(); ++log)
+    model.Regressor(train[log]->s, {x.data(), static_cast<std::size_t>(columns)}, declared.eta, regressor[log]);
+  for (int j = 0; j < n; ++j)
+    for (int a = 0; a < active; ++a) {
+      const int c = declared.active[a];
+      if (c != columns + j && (c >= columns || model.rows()[j][c].IsZero())) continue;
+      rows.columns[j].push_back(a);
+      if (c >= columns || model.is_rigid(c) || model.column_joint(c) != j) continue;
+      const auto& p = model.table()[model.table_index(c)];
+      if (std::isfinite(p.lower) || std::isfinite(p.upper)) rows.bounded.push_back({j, a, p.lower, p.upper});
+    }
+}
+
+// The declared model's rows of one joint over the used samples.
+void Diagnosis::Work::FillDeclared(int j) {
+  const int columns = model.columns();
+  const RowIndex& index = rows.index[j];
+  const VectorXd mean = prior.mean.head(columns);
+  std::vector<VectorXd> at_mean;
+  for (const auto& row : regressor) at_mean.push_back(row[j] * mean);
+  rows.design[j].resize(index.size(), static_cast<Eigen::Index>(rows.columns[j].size()));
+  for (std::size_t i = 0; i < rows.columns[j].size(); ++i)
+    if (const int c = declared.active[rows.columns[j][i]]; c < columns)
+      for (int k = 0; k < index.size(); ++k)
+        rows.design[j](k, static_cast<Eigen::Index>(i)) = regressor[index.dataset[k]][j](index.sample[k], c);
+  rows.target[j].resize(index.size());
+  for (int k = 0; k < index.size(); ++k)
+    rows.target[j][k] = train[index.dataset[k]]->tau(index.sample[k], j) - at_mean[index.dataset[k]][index.sample[k]];
+}
+
+// The column of the joint's torque gain, its last one: the model's torque at the estimate. False if there is none.
+bool Diagnosis::Work::FillGain(int j) {
+  const auto& own = rows.columns[j];
+  const Eigen::Index last = static_cast<Eigen::Index>(own.size()) - 1;
+  if (last < 0 || declared.active[own.back()] < model.columns()) return false;
+  VectorXd off(last);  // from the prior mean
+  for (Eigen::Index i = 0; i < last; ++i) {
+    const int c = declared.active[own[static_cast<std::size_t>(i)]];
+    off[i] = estimate.x[c] - prior.mean[c];
+  }
+  VectorXd torque = rows.design[j].leftCols(last) * off - rows.target[j];
+  for (int k = 0; k < torque.size(); ++k) torque[k] += train[rows.index[j].dataset[k]]->tau(rows.index[j].sample[k], j);
+  rows.design[j].col(last) = torque;
+  return true;
+}
+
+// What the terms' torque on joint j changes by per unit of the model torque that their columns read there, at the last
+// amplitudes; empty if none reads it.
+VectorXd Diagnosis::Work::SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j) {
+  const double step = 1e-6 * model.robot().joint[j].torque_limit_Nm;
+  VectorXd sum;
+  for (std::size_t t = 0; t < terms.size() && t < estimate.amplitude.size(); ++t) {
+    const Candidate& c = *terms[t]->candidate;
+    const auto row = std::find(c.rows().begin(), c.rows().end(), j) - c.rows().begin();
+    if (row == static_cast<long>(c.rows().size()) || c.has_memory() || !c.reads(codegen::Quantity::kModelTorque))
+      continue;
+    const auto torque = [&](double shift) {  // with the model torque so much larger
+      std::vector<VectorXd> kept;
+      for (Quantities& log : evidence.logs) {
+        kept.push_back(log.tau_model.col(j));
+        log.tau_model.col(j).array() += shift;
+      }
+      VectorXd out =
+          GatherColumns(c, evidence, terms[t]->eta).block[static_cast<std::size_t>(row)] * estimate.amplitude[t];
+      for (std::size_t l = 0; l < kept.size(); ++l) evidence.logs[l].tau_model.col(j) = kept[l];
+      return out;
+    };
+    const VectorXd slope = (torque(step) - torque(-step)) / (2 * step);
+    sum = sum.size() ? VectorXd(sum + slope) : slope;
+  }
+  return sum;
+}
+
+void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
+  const int active = static_cast<int>(declared.active.size());
+  const auto follows = [](const Chosen* t) { return t->candidate->record().depends_on_estimate; };
+  if (evidence.logs.empty() || std::any_of(terms.begin(), terms.end(), follows)) FollowEstimate(Reads(terms));
+  if (model.depends_on_estimate() || regressor.empty()) StartRows();
+  rows.mean.resize(active);
+  for (int a = 0; a < active; ++a) rows.mean[a] = prior.mean[declared.active[a]];
+  std::vector<Columns> added;
+  for (const Chosen* t : terms) added.push_back(GatherColumns(*t->candidate, evidence, t->eta));
+  for (int j = 0; j < model.joints(); ++j) {
+    std::erase_if(rows.columns[j], [&](int c) { return c >= active; });
+    const auto declared_columns = static_cast<Eigen::Index>(rows.columns[j].size());
+    if (bent[j]) FillDeclared(j);
+    else rows.design[j].conservativeResize(Eigen::NoChange, declared_columns);
+    Eigen::Index same = bent[j] ? 0 : declared_columns;
+    if (FillGain(j)) same = std::min(same, declared_columns - 1);
+    bent[j] = 0;
+    if (const VectorXd slope = SlopeOverModelTorque(terms, j); slope.size()) Bend(j, slope), same = 0;
+    int at = active;
+    for (const Columns& c : added) {
+      if (const auto r = std::find(c.joints.begin(), c.joints.end(), j); r != c.joints.end()) {
+        rows.design[j].conservativeResize(Eigen::NoChange, rows.design[j].cols() + c.count());
+        rows.design[j].rightCols(c.count()) = c.block[static_cast<std::size_t>(r - c.joints.begin())];
+        for (int i = 0; i < c.count(); ++i) rows.columns[j].push_back(at + i);
+      }
+      at += c.count();
+    }
+    rows.Multiply(j, same);
+  }
+  int size = active;
+  std::vector<std::pair<int, const MatrixXd*>> curves;
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (terms[t]->found.precision.size()) curves.emplace_back(size, &terms[t]->found.precision);
+    size += added[t].count();
+  }
+  rows.precision = curves.empty() ? MatrixXd() : MatrixXd::Zero(size, size);
+  for (const auto& [at, precision] : curves)
+    rows.precision.block(at, at, precision->rows(), precision->cols()) = *precision;
+  rows.mean.conservativeResize(size);
+  rows.mean.tail(size - active).setZero();
+  MakeCoordinates(size);
+}
+
+// A term that reads the model's torque changes with the parameters, too: where it cuts torque off they change nothing.
+void Diagnosis::Work::Bend(int j, const VectorXd& slope) {
+  for (int k = 0; k < slope.size(); ++k) {
+    const int log = rows.index[j].dataset[k], sample = rows.index[j].sample[k];
+    const double at_mean = train[log]->tau(sample, j) - rows.target[j][k];
+    rows.target[j][k] += slope[k] * (evidence.logs[log].tau_model(sample, j) - at_mean);
+  }
+  rows.design[j].array().colwise() *= 1 + slope.array();
+  bent[j] = 1;
+}
+
+// Coordinates z in which the prior is unit and directions that nobody sees are left out.
+void Diagnosis::Work::MakeCoordinates(int size) {
+  const int active = static_cast<int>(declared.active.size());
+  MatrixXd H = MatrixXd::Zero(size, size);
+  for (int j = 0; j < model.joints(); ++j) {
+    const auto& columns = rows.columns[j];
+    const double weight = 1 / (estimate.sigma[j] * estimate.sigma[j]);
+    H(columns, columns) += weight * rows.gram[j];
+  }
+  VectorXd scale(size);
+  for (int i = 0; i < size; ++i) scale[i] = H(i, i) > 0 ? 1 / std::sqrt(H(i, i)) : 0;
+  if (prior.informative) {
+    MatrixXd P0(active, active);
+    for (int i = 0; i < active; ++i)
+      for (int k = 0; k < active; ++k) P0(i, k) = prior.covariance(declared.active[i], declared.active[k]);
+    const VectorXd sd = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
+        MatrixXd(sd.cwiseInverse().asDiagonal() * P0 * sd.cwiseInverse().asDiagonal()));
+    rows.L = MatrixXd::Zero(size, size);
+    rows.L.topLeftCorner(active, active) =
+        sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+    // a term has no prior worth the name: a thousand times what one whitened unit in every row of it would need
+    for (int i = active; i < size; ++i)
+      rows.L(i, i) = 1e3 * scale[i] * std::sqrt(static_cast<double>(evidence.index[0].size()));
+    return;
+  }
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(scale.asDiagonal() * H * scale.asDiagonal()));
+  const double floor = 1e-10 * eigen.eigenvalues()[size - 1];
+  int keep = 0;
+  for (int i = 0; i < size; ++i) keep += eigen.eigenvalues()[i] > floor;
+  rows.L = scale.asDiagonal() * eigen.eigenvectors().rightCols(keep) *
+           eigen.eigenvalues().tail(keep).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
 }  // namespace armcal::diagnosis

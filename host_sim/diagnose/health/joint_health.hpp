@@ -1,11 +1,10 @@
-// health - does a joint still fit its committed model, what does the change look like, since when; knows no connection.
+// health - tells whether a joint still fits its committed model, what its change looks like, and since when.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "host_sim/client/residual_reader.hpp"
-#include "host_sim/diagnose/health/onset.hpp"
 #include "host_sim/diagnose/health/shapes.hpp"
 
 namespace armcal::health {
@@ -15,6 +14,12 @@ enum class Verdict {
   kNoLongerFits,  // the residual has grown since
   kNeverFitted,   // the residual was large from the start
   kTooEarly,      // the joint has moved too little since the adoption
+};
+
+// Seconds since the adoption.
+struct Onset {
+  double at_s = 0;
+  double earliest_s = 0, latest_s = 0;  // the two slices at the step
 };
 
 struct JointHealth {
@@ -33,6 +38,10 @@ inline constexpr double kSmallestInSigma = 0.4;
 inline constexpr double kNeverInSigma = 2.0;
 // Latest rows below which nothing is said: 16 s of motion at 125 Hz.
 inline constexpr double kFewestLatestRows = 2048;
+
+// The step of the mean square that is most likely under Gaussian residuals. Nothing: no slice, or the residual did not
+// grow.
+std::optional<Onset> FindOnset(const std::vector<client::ResidualSlice>& slices, double elapsed_s);
 
 JointHealth Judge(const client::JointResiduals& joint);
 

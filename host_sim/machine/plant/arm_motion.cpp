@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "host_sim/machine/plant/arm.hpp"
+#include "host_sim/machine/plant/joint_effects.hpp"
 
 namespace armcal::plant {
 

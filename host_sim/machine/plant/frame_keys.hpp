@@ -5,14 +5,14 @@
 
 #include <kdl/frames.hpp>
 
-#include "host_sim/machine/plant/toml_keys.hpp"
+#include "codegen/src/io/toml_reader.hpp"
 
 namespace armcal::plant {
 
 inline constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 // xyz_m: origin; rpy_deg: rotation about the fixed x, then y, then z axis (Rz Ry Rx). Each may be absent: zero.
-inline KDL::Frame ReadFrame(TomlKeys keys) {
+inline KDL::Frame ReadFrame(const io::TomlReader& keys) {
   KDL::Frame frame;
   if (keys.Has("xyz_m")) {
     const auto xyz = keys.Numbers("xyz_m", 3);

@@ -12,7 +12,8 @@ namespace {
 // Mixed lubrication: the share of the load carried by asperities falls as the film builds up, ~ 1 / (1 + (v/vs)^2).
 class Stribeck : public JointEffect {
  public:
-  explicit Stribeck(TomlKeys& keys) : excess_Nm_(keys.Positive("excess_Nm")), speed_(keys.Positive("speed_radps")) {}
+  explicit Stribeck(const io::TomlReader& keys)
+      : excess_Nm_(keys.Positive("excess_Nm")), speed_(keys.Positive("speed_radps")) {}
   double DryLevel(const JointState& s) const override {
     const double ratio = s.qd_radps / speed_;
     return excess_Nm_ / (1 + ratio * ratio);
@@ -26,7 +27,8 @@ class Stribeck : public JointEffect {
 // preload).
 class GearMesh : public JointEffect {
  public:
-  explicit GearMesh(TomlKeys& keys) : mu_(keys.Positive("mu")), preload_Nm_(keys.NotNegative("preload_Nm", 0)) {}
+  explicit GearMesh(const io::TomlReader& keys)
+      : mu_(keys.Positive("mu")), preload_Nm_(keys.NotNegative("preload_Nm", 0)) {}
   double DryLevel(const JointState& s) const override {
     return mu_ * (std::hypot(s.load_Nm, preload_Nm_) - preload_Nm_);
   }
@@ -39,7 +41,7 @@ class GearMesh : public JointEffect {
 // own.
 class Asymmetry : public JointEffect {
  public:
-  explicit Asymmetry(TomlKeys& keys)
+  explicit Asymmetry(const io::TomlReader& keys)
       : forward_ratio_(keys.NotNegative("forward_ratio")), backward_ratio_(keys.NotNegative("backward_ratio")) {}
   double DryLevel(const JointState& s) const override {
     return s.coulomb_Nm * ((s.direction > 0 ? forward_ratio_ : backward_ratio_) - 1);
@@ -53,7 +55,7 @@ class Asymmetry : public JointEffect {
 // constant torque such as a brush bias or a wrong sensor zero gives.
 class Counterweight : public JointEffect {
  public:
-  explicit Counterweight(TomlKeys& keys)
+  explicit Counterweight(const io::TomlReader& keys)
       : torque_Nm_(keys.Number("torque_Nm")), compression_(keys.NotNegative("compression_per_rad", 0)) {
     if (compression_ > 0.2) keys.Fail("compression_per_rad", "a number from 0 to 0.2");
   }
@@ -68,7 +70,7 @@ class Counterweight : public JointEffect {
 // Lubricant viscosity by Vogel's law, nu(T) ~ exp(B / (T - T_vogel)), 1 at the reference temperature.
 class Lubricant : public JointEffect {
  public:
-  explicit Lubricant(TomlKeys& keys)
+  explicit Lubricant(const io::TomlReader& keys)
       : b_K_(keys.Positive("vogel_b_K")),
         vogel_degC_(keys.Number("vogel_degC")),
         reference_degC_(keys.Number("reference_degC")) {
@@ -86,7 +88,7 @@ class Lubricant : public JointEffect {
 // Periodic torque of motor poles, gear teeth or an eccentric: two harmonics of `per_motor_turn` in the MOTOR's angle.
 class Ripple : public JointEffect {
  public:
-  explicit Ripple(TomlKeys& keys)
+  explicit Ripple(const io::TomlReader& keys)
       : per_turn_(keys.Positive("per_motor_turn")),
         first_Nm_(keys.NotNegative("first_Nm")),
         second_Nm_(keys.NotNegative("second_Nm", 0)),
@@ -103,7 +105,7 @@ class Ripple : public JointEffect {
 // A hose and cable pack twisted about its neutral angle stiffens: k s sinh((q - q0) / s).
 class CablePack : public JointEffect {
  public:
-  explicit CablePack(TomlKeys& keys)
+  explicit CablePack(const io::TomlReader& keys)
       : stiffness_(keys.Positive("stiffness_Nmprad")),
         neutral_rad_(keys.Number("neutral_rad", 0)),
         stiffening_rad_(keys.Positive("stiffening_rad")) {}
@@ -118,7 +120,7 @@ class CablePack : public JointEffect {
 // Gears churning in oil: drag ~ |v|^p with p between 2 and 3.
 class Churning : public JointEffect {
  public:
-  explicit Churning(TomlKeys& keys)
+  explicit Churning(const io::TomlReader& keys)
       : at_one_Nm_(keys.Positive("drag_at_1radps_Nm")), exponent_(keys.Positive("exponent", 2.7)) {}
   double Drag(const JointState& s) const override {
     return std::copysign(at_one_Nm_ * std::pow(std::abs(s.qd_radps), exponent_), s.qd_radps);
@@ -131,7 +133,7 @@ class Churning : public JointEffect {
 // A weight balancer: a spring of free length l0 between a point at radius r on the link and an anchor at distance h.
 class SpringBalancer : public JointEffect {
  public:
-  explicit SpringBalancer(TomlKeys& keys)
+  explicit SpringBalancer(const io::TomlReader& keys)
       : rate_Npm_(keys.Positive("rate_Npm")),
         crank_m_(keys.Positive("crank_m")),
         anchor_m_(keys.Positive("anchor_m")),
@@ -151,11 +153,11 @@ class SpringBalancer : public JointEffect {
   double rate_Npm_, crank_m_, anchor_m_, free_m_, top_rad_;
 };
 
-using Reader = std::function<std::unique_ptr<const JointEffect>(TomlKeys&)>;
+using Reader = std::function<std::unique_ptr<const JointEffect>(const io::TomlReader&)>;
 
 template <class Effect>
 Reader ReaderOf() {
-  return [](TomlKeys& keys) { return std::make_unique<const Effect>(keys); };
+  return [](const io::TomlReader& keys) { return std::make_unique<const Effect>(keys); };
 }
 
 const std::map<std::string, Reader>& Readers() {
@@ -173,7 +175,7 @@ const std::map<std::string, Reader>& Readers() {
 
 }  // namespace
 
-std::unique_ptr<const JointEffect> ReadJointEffect(const std::string& kind, TomlKeys& keys) {
+std::unique_ptr<const JointEffect> ReadJointEffect(const std::string& kind, const io::TomlReader& keys) {
   const auto reader = Readers().find(kind);
   if (reader == Readers().end()) keys.Fail("kind", "one of: " + JointEffectKinds() + ", payload_step, base_tilt");
   return reader->second(keys);

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "host_sim/machine/plant/toml_keys.hpp"
+#include "codegen/src/io/toml_reader.hpp"
 
 namespace armcal::plant {
 
@@ -38,7 +38,7 @@ class JointEffect {
 
 // kind -> effect. Reads the effect's own keys (documented in host_sim/scenarios/README.md); the caller has read `kind`
 // and `joint` and calls keys.Finish(). Throws io::InputError for an unknown kind or a bad value.
-std::unique_ptr<const JointEffect> ReadJointEffect(const std::string& kind, TomlKeys& keys);
+std::unique_ptr<const JointEffect> ReadJointEffect(const std::string& kind, const io::TomlReader& keys);
 
 // The kinds that ReadJointEffect knows, for messages: "stribeck, load_friction, ...".
 std::string JointEffectKinds();

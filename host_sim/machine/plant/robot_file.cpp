@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "codegen/src/io/toml_reader.hpp"
 #include "host_sim/machine/plant/frame_keys.hpp"
-#include "host_sim/machine/plant/toml_keys.hpp"
 
 namespace armcal::plant {
 namespace {
 
-Body ReadBody(TomlKeys link) {
+Body ReadBody(const io::TomlReader& link) {
   Body body;
   body.mass_kg = link.Positive("mass_kg");
   const auto center = link.Numbers("center_m", 3);
@@ -20,7 +20,7 @@ Body ReadBody(TomlKeys link) {
   return body;
 }
 
-void ReadMotor(TomlKeys encoder, TomlKeys motor, JointData& joint) {
+void ReadMotor(const io::TomlReader& encoder, const io::TomlReader& motor, JointData& joint) {
   joint.counts_per_turn = encoder.Positive("counts_per_turn");
   joint.zero_counts = encoder.Integer("zero_counts", INT32_MIN, INT32_MAX, 0);
   joint.gear_ratio = motor.Number("gear_ratio");
@@ -30,7 +30,7 @@ void ReadMotor(TomlKeys encoder, TomlKeys motor, JointData& joint) {
   joint.rotor_inertia_kgm2 = motor.NotNegative("rotor_inertia_kgm2", 0);
 }
 
-JointData ReadJoint(TomlKeys keys) {
+JointData ReadJoint(const io::TomlReader& keys) {
   JointData joint;
   joint.name = keys.Text("name");
   const std::string type = keys.Text("type");
@@ -80,8 +80,8 @@ KDL::RigidBodyInertia ToKdl(const Body& body) {
 }
 
 RobotFile ReadRobotFile(const std::string& path) {
-  const toml::table table = ParseTomlFile(path);
-  TomlKeys keys(table, path + ": ");
+  const toml::table table = io::ParseToml(path);
+  const io::TomlReader keys(table, path);
   RobotFile robot;
   robot.path = path;
   robot.name = keys.Text("name");
@@ -90,7 +90,7 @@ RobotFile ReadRobotFile(const std::string& path) {
   robot.tick_rate_Hz = keys.Positive("tick_rate_Hz", 1000);
   if (keys.Has("base_frame")) robot.base_frame = ReadFrame(keys.Table("base_frame"));
   if (keys.Has("tool_frame")) robot.tool_frame = ReadFrame(keys.Table("tool_frame"));
-  for (const TomlKeys& joint : keys.Tables("joint")) robot.joint.push_back(ReadJoint(joint));
+  for (const io::TomlReader& joint : keys.Tables("joint")) robot.joint.push_back(ReadJoint(joint));
   if (robot.joint.empty()) keys.Fail("joint", "at least one [[joint]]");
   const std::string dh = keys.Text("dh");
   if (dh != "modified" && dh != "standard") keys.Fail("dh", "\"modified\" or \"standard\"");

@@ -13,13 +13,13 @@ namespace {
 constexpr int kMostJoints = 16;  // only a bound for the message; Arm compares with the robot
 
 // A factor 1 - spread must stay positive, or friction and torque constants could vanish.
-double ReadSpread(TomlKeys& keys, const std::string& key, double fallback) {
+double ReadSpread(const io::TomlReader& keys, const std::string& key, double fallback) {
   const double value = keys.NotNegative(key, fallback);
   if (value >= 1) keys.Fail(key, "a number from 0 to below 1");
   return value;
 }
 
-Thermal ReadThermal(TomlKeys keys) {
+Thermal ReadThermal(const io::TomlReader& keys) {
   Thermal thermal;
   thermal.ambient_degC = keys.Number("ambient_degC", thermal.ambient_degC);
   thermal.start_degC = keys.NumberOrNumbers("start_degC", {thermal.ambient_degC});
@@ -33,7 +33,7 @@ Thermal ReadThermal(TomlKeys keys) {
   return thermal;
 }
 
-PayloadStep ReadPayload(TomlKeys& keys) {
+PayloadStep ReadPayload(const io::TomlReader& keys) {
   PayloadStep payload;
   payload.body.mass_kg = keys.Positive("mass_kg");
   const auto center = keys.Numbers("center_m", 3);
@@ -47,7 +47,7 @@ PayloadStep ReadPayload(TomlKeys& keys) {
   return payload;
 }
 
-void ReadEffect(TomlKeys keys, Scenario& scenario) {
+void ReadEffect(const io::TomlReader& keys, Scenario& scenario) {
   const std::string kind = keys.Text("kind");
   if (kind == "payload_step") {
     if (scenario.payload) keys.Fail("kind", "payload_step only once");
@@ -75,8 +75,8 @@ std::vector<Undeclared> Scenario::undeclared() const {
 }
 
 Scenario ReadScenario(const std::string& path) {
-  const toml::table table = ParseTomlFile(path);
-  TomlKeys keys(table, path + ": ");
+  const toml::table table = io::ParseToml(path);
+  const io::TomlReader keys(table, path);
   Scenario scenario;
   scenario.path = path;
   scenario.title = keys.Text("title");
@@ -91,19 +91,19 @@ Scenario ReadScenario(const std::string& path) {
   if (keys.Has("flange")) scenario.flange = ReadFrame(keys.Table("flange"));
   if (keys.Has("thermal")) scenario.thermal = ReadThermal(keys.Table("thermal"));
   if (keys.Has("truth")) {
-    TomlKeys truth = keys.Table("truth");
+    const io::TomlReader truth = keys.Table("truth");
     scenario.spread.inertial = ReadSpread(truth, "inertial_spread", scenario.spread.inertial);
     scenario.spread.friction = ReadSpread(truth, "friction_spread", scenario.spread.friction);
     scenario.spread.torque_constant = ReadSpread(truth, "torque_constant_spread", scenario.spread.torque_constant);
     truth.Finish();
   }
   if (keys.Has("sensors")) {
-    TomlKeys sensors = keys.Table("sensors");
+    const io::TomlReader sensors = keys.Table("sensors");
     scenario.torque_noise_scale = sensors.NotNegative("torque_noise_scale", scenario.torque_noise_scale);
     scenario.temperature_noise_degC = sensors.NotNegative("temperature_noise_degC", scenario.temperature_noise_degC);
     sensors.Finish();
   }
-  for (const TomlKeys& effect : keys.Tables("effect")) ReadEffect(effect, scenario);
+  for (const io::TomlReader& effect : keys.Tables("effect")) ReadEffect(effect, scenario);
   keys.Finish();
   return scenario;
 }

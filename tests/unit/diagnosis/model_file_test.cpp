@@ -9,7 +9,7 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/diagnose/diagnosis/model_file.hpp"
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
 
 namespace armcal::diagnosis {
 namespace {

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "host_sim/diagnose/diagnosis/metric.hpp"
+#include "host_sim/diagnose/diagnosis/noise.hpp"
 
 namespace armcal::diagnosis {
 namespace {

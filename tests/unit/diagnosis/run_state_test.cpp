@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 
-#include "host_sim/diagnose/diagnosis/run_state.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 

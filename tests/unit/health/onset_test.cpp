@@ -1,5 +1,5 @@
 // health - a step in a history that is written down by hand.
-#include "host_sim/diagnose/health/onset.hpp"
+#include "host_sim/diagnose/health/joint_health.hpp"
 
 #include <gtest/gtest.h>
 

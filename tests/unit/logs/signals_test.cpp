@@ -1,6 +1,5 @@
 // io tests - derivatives against analytic motion: no fake elasticity, no phase, and the cut-off by its own rule.
 #include "host_sim/data/logs/signals.hpp"
-#include "host_sim/data/logs/motion_band.hpp"
 
 #include <gtest/gtest.h>
 

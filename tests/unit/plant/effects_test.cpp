@@ -8,7 +8,7 @@ using namespace bench;
 
 std::unique_ptr<const JointEffect> Make(const std::string& kind, const std::string& keys) {
   const toml::table table = toml::parse(keys);
-  TomlKeys reader(table, "test: ");
+  const io::TomlReader reader(table, "test");
   auto effect = ReadJointEffect(kind, reader);
   reader.Finish();
   return effect;

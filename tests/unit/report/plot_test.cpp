@@ -1,6 +1,6 @@
 // report tests - pictures: every sample's peak survives, nothing is drawn from what is not a number.
 #include "host_sim/data/report/plot.hpp"
-#include "host_sim/data/report/svg_file.hpp"
+#include "host_sim/data/report/style.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
-// report - the style of pictures, and a picture that carries it along.
-#include "host_sim/data/report/svg_file.hpp"
+// report - writes the style of pictures, with variables for a page or with plain colours for a file.
+#include "host_sim/data/report/style.hpp"
 
 #include <fmt/format.h>
 
 #include "host_sim/data/report/canvas.hpp"
-#include "host_sim/data/report/style.hpp"
 
 namespace armcal::report {
+
 namespace {
 
 constexpr std::string_view kRules =

@@ -1,9 +1,8 @@
-// verdict - one diagnosis, and what shows it: text, JSON, page; knows no search.
+// verdict - one diagnosis and everything that it has to show a person: lines for the terminal, and a page.
 #pragma once
 
 #include <string>
-
-#include <nlohmann/json.hpp>
+#include <vector>
 
 #include "host_sim/data/report/page.hpp"
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
@@ -30,16 +29,13 @@ struct DiagnosisView {
 };
 
 // Means over bins of a signal, over the held-out log where the joint moves: the residual with the term's torque put
-// back, the term, and the residual. (diagnosis_dependence.cpp)
+// back, the term, and the residual.
 struct Dependence {
   int joint = 0;
   std::string signal, torque;  // what they are, with unit
   report::Series without, term, remains;
 };
 Dependence DependenceOf(const DiagnosisView& v, std::size_t term);
-
-// The verdict, its terms with their evidence, and the errors. (diagnosis_json.cpp)
-nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);
 
 // Verdict, table before / after, and for each term the residual over time and over the signal that gave it away.
 void AddDiagnosis(report::Page& page, const DiagnosisView& v);

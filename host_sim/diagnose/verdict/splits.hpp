@@ -1,10 +1,11 @@
-// verdict - which terms hold whatever run is held out; knows verdicts, no log.
+// verdict - which terms hold whatever run of an arm is held out, as text, JSON, page and pictures.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "host_sim/diagnose/verdict/diagnose_summary.hpp"
+#include "host_sim/diagnose/verdict/json.hpp"
 
 namespace armcal::verdict {
 
@@ -41,5 +42,18 @@ Agreed Agree(const Verdicts& splits);
 
 // "gravity_spring or cable_pack", or "unknown over qd1".
 std::string Name(const Agreement& agreement);
+
+std::string SplitsText(const Verdicts& splits, const Agreed& agreed);
+
+// {"verdict", "holds": [{"kinds", "joint", "signals", "splits": {run: {"kind", "torque_of", "before", "after",
+// "without", "other_joint", "other_change", "parameters", "score", "folds"}}}], "does_not_hold": [{"held_out", "kind",
+// "joint", "why"}], "splits": {run: {"before_moving", "after_moving", "torque_moving"} or {"error"}}}
+nlohmann::ordered_json SplitsJson(const Verdicts& splits, const Agreed& agreed);
+
+// errors.svg: error over torque of every held-out run; term_1.svg, ...: what holds, over the signal it depends on.
+void WritePictures(const std::filesystem::path& folder, const Verdicts& splits, const Agreed& agreed);
+
+void WriteSplitsPage(const std::filesystem::path& path, const std::string& robot, const Verdicts& splits,
+                     const Agreed& agreed);
 
 }  // namespace armcal::verdict

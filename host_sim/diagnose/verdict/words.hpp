@@ -1,10 +1,10 @@
-// verdict - what a diagnosis says, in words that its text, its page and its JSON share; knows no layout.
+// verdict - what a diagnosis says, in words that its text, its page and its JSON share.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "host_sim/diagnose/verdict/diagnosis_report.hpp"
+#include "host_sim/diagnose/verdict/verdict.hpp"
 
 namespace armcal::verdict {
 
@@ -19,6 +19,12 @@ std::string Headline(const diagnosis::Finding& finding);
 
 // "3", "5-6", "all", "base", "flange": how a report names the joints of a term.
 std::string JointName(const diagnosis::Term& term);
+
+// "5-6" of joints counted from 0.
+std::string JointNumbers(const std::vector<int>& joints);
+
+// "stribeck:2", "wrist_coupling:5-6", "base_tilt": an effect as armcal excite --separate takes it.
+std::string EffectWord(const std::string& record, const std::vector<int>& joints);
 
 // What must be said with a term's name: " (NOT CONFIRMED ...)", " (in the training log only)", or nothing.
 std::string Remark(const diagnosis::Term& t);

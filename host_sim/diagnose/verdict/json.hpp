@@ -1,4 +1,4 @@
-// verdict - many verdicts as one: text, JSON, page; knows verdict files, no log.
+// verdict - writes one diagnosis as JSON, and reads such files again.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,17 @@
 
 #include <nlohmann/json.hpp>
 
+#include "codegen/src/robot/robot.hpp"
+#include "host_sim/diagnose/verdict/verdict.hpp"
+
 namespace armcal::verdict {
+
+// The verdict, its terms with their evidence, and the errors.
+nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);
+
+// What a verdict found of these effects ("record", "record:2", "record:1-2"): joints and nonlinear parameters. An empty
+// path: nothing. Throws io::InputError: no verdict, or none of its terms is among them and has such parameters.
+std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::vector<std::string>& effects);
 
 // By name of the log: what it came to, as armcal diagnose --json writes it, or why there is nothing.
 using Verdicts = std::map<std::string, nlohmann::ordered_json>;
@@ -24,10 +34,5 @@ nlohmann::ordered_json ReadVerdict(const std::filesystem::path& path);
 
 // Every NAME.json of folders, and files as they are. InputError: no such file, or two of one name.
 Verdicts ReadVerdicts(const std::vector<std::string>& paths);
-
-// By name and by kind; nothing in it depends on when or where a verdict was made.
-nlohmann::ordered_json SummaryJson(const Verdicts& verdicts);
-std::string SummaryText(const nlohmann::ordered_json& summary);
-void WriteSummaryPage(const std::filesystem::path& path, const nlohmann::ordered_json& summary);
 
 }  // namespace armcal::verdict

@@ -1,11 +1,10 @@
-// verdict - words for scores, rivals, and what would separate them.
-#include "host_sim/diagnose/verdict/diagnosis_words.hpp"
+// verdict - puts scores, rivals, and what would tell them apart into words.
+#include "host_sim/diagnose/verdict/words.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "host_sim/diagnose/verdict/verdict_file.hpp"
 #include "host_sim/identify/excitation/target.hpp"
 
 namespace armcal::verdict {
@@ -48,6 +47,16 @@ std::string Remark(const Term& t) {
 std::string JointName(const Term& t) {
   if (t.joints.size() == 1 || IsUnknown(t)) return std::to_string(t.joints[0] + 1);
   return t.joints.empty() ? t.record->place : JointNumbers(t.joints);
+}
+
+std::string JointNumbers(const std::vector<int>& joints) {
+  std::string out;
+  for (const int j : joints) out += fmt::format("{}{}", out.empty() ? "" : "-", j + 1);
+  return out;
+}
+
+std::string EffectWord(const std::string& record, const std::vector<int>& joints) {
+  return record + (joints.empty() ? "" : ":") + JointNumbers(joints);
 }
 
 std::string Parameters(const Term& t) {

@@ -1,11 +1,10 @@
-// verdict - counts verdicts by kind and joint; knows verdict files, no log.
-#include "host_sim/diagnose/verdict/diagnose_summary.hpp"
+// verdict - counts verdicts by kind and joint.
+#include "host_sim/diagnose/verdict/summary.hpp"
 
 #include <fmt/core.h>
+
 #include <algorithm>
 
-#include "codegen/src/io/input_error.hpp"
-#include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/page.hpp"
 
 namespace armcal::verdict {
@@ -14,13 +13,6 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 namespace {
-
-bool IsVerdict(const ordered_json& j) {
-  if (!j.is_object() || !j.contains("verdict") || !j["verdict"].is_string()) return false;
-  if (j["verdict"] == "failed") return j.contains("error") && j["error"].is_string();
-  return (j["verdict"] == "none" || j["verdict"] == "effect") && j.contains("terms") && j["terms"].is_array() &&
-         j.contains("before_moving") && j.contains("after_moving");
-}
 
 // Confirmed terms as "kind joint".
 std::string Terms(const ordered_json& verdict) {
@@ -66,33 +58,6 @@ std::string Headline(const ordered_json& s) {
 }
 
 }  // namespace
-
-std::string JointText(const ordered_json& joint) { return joint.is_string() ? joint.get<std::string>() : joint.dump(); }
-
-ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed"}, {"error", why}}; }
-
-ordered_json ReadVerdict(const fs::path& path) {
-  ordered_json j = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
-  return IsVerdict(j) ? j : FailedVerdict(path.filename().string() + " holds no verdict");
-}
-
-Verdicts ReadVerdicts(const std::vector<std::string>& paths) {
-  Verdicts out;
-  const auto add = [&](const fs::path& path) {
-    const std::string name = path.stem().string();
-    if (!out.emplace(name, ReadVerdict(path)).second)
-      throw io::InputError(path.string() + ": expected one verdict of the name " + name);
-  };
-  for (const std::string& p : paths) {
-    if (!fs::is_directory(p)) {
-      add(p);
-      continue;
-    }
-    for (const auto& e : fs::directory_iterator(p))
-      if (e.path().extension() == ".json") add(e.path());
-  }
-  return out;
-}
 
 ordered_json SummaryJson(const Verdicts& verdicts) {
   ordered_json s{{"effect", 0}, {"none", 0}, {"failed", 0}, {"findings", ordered_json::array()}};

@@ -1,10 +1,21 @@
-// verdict - a diagnosis as JSON.
-#include "host_sim/diagnose/verdict/diagnosis_words.hpp"
+// verdict - a diagnosis as JSON; terms of a JSON become uses of their records again.
+#include "host_sim/diagnose/verdict/json.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/files/files.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/diagnose/verdict/words.hpp"
 
 namespace armcal::verdict {
 
+namespace fs = std::filesystem;
 using diagnosis::Term;
+using nlohmann::ordered_json;
 
 namespace {
 
@@ -40,7 +51,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["terms"] = nlohmann::ordered_json::array();
   for (std::size_t n = 0; n < f.terms.size(); ++n) {
     const Term& t = f.terms[n];
-    nlohmann::ordered_json term{{"kind", t.record->kind}, {"record", t.record->name}, {"class", codegen::Word(t.record->effect_class)}};
+    nlohmann::ordered_json term{
+        {"kind", t.record->kind}, {"record", t.record->name}, {"class", codegen::Word(t.record->effect_class)}};
     if (t.joints.size() == 1 || IsUnknown(t)) term["joint"] = t.joints[0] + 1;
     else term["joint"] = JointName(t);
     const codegen::EffectUse use = Found(t);
@@ -95,6 +107,71 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["exogeneity"] = ToJson(v.exogeneity);
   j["seconds"] = v.seconds;
   return j;
+}
+
+namespace {
+
+bool IsAmong(const codegen::EffectUse& use, const std::vector<std::string>& effects) {
+  const std::string word = EffectWord(use.effect, use.joints);
+  return std::any_of(effects.begin(), effects.end(),
+                     [&](const std::string& e) { return e == use.effect || e == word; });
+}
+
+bool IsVerdict(const ordered_json& j) {
+  if (!j.is_object() || !j.contains("verdict") || !j["verdict"].is_string()) return false;
+  if (j["verdict"] == "failed") return j.contains("error") && j["error"].is_string();
+  return (j["verdict"] == "none" || j["verdict"] == "effect") && j.contains("terms") && j["terms"].is_array() &&
+         j.contains("before_moving") && j.contains("after_moving");
+}
+
+}  // namespace
+
+std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::vector<std::string>& effects) {
+  std::vector<codegen::EffectUse> out;
+  if (path.empty()) return out;
+  try {
+    const auto verdict = nlohmann::json::parse(files::ReadWholeFile(path));
+    for (const auto& term : verdict.at("terms")) {
+      codegen::EffectUse use;
+      use.effect = term.at("record").get<std::string>();
+      for (const int joint : term.at("joints")) use.joints.push_back(joint - 1);
+      use.nonlinear = term.at("unknowns").get<std::map<std::string, double>>();
+      if (!use.nonlinear.empty() && IsAmong(use, effects)) out.push_back(use);
+    }
+  } catch (const nlohmann::json::exception&) {
+    throw io::InputError(path + ": expected a verdict that armcal diagnose --json wrote");
+  }
+  if (out.empty())
+    throw io::InputError(
+        fmt::format("{}: expected a term with nonlinear parameters among {}", path, fmt::join(effects, ", ")));
+  return out;
+}
+
+std::string JointText(const ordered_json& joint) { return joint.is_string() ? joint.get<std::string>() : joint.dump(); }
+
+ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed"}, {"error", why}}; }
+
+ordered_json ReadVerdict(const fs::path& path) {
+  ordered_json j = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
+  return IsVerdict(j) ? j : FailedVerdict(path.filename().string() + " holds no verdict");
+}
+
+Verdicts ReadVerdicts(const std::vector<std::string>& paths) {
+  Verdicts out;
+  const auto add = [&](const fs::path& path) {
+    const std::string name = path.stem().string();
+    if (!out.emplace(name, ReadVerdict(path)).second)
+      throw io::InputError(path.string() + ": expected one verdict of the name " + name);
+  };
+  for (const std::string& p : paths) {
+    if (!fs::is_directory(p)) {
+      add(p);
+      continue;
+    }
+    for (const auto& e : fs::directory_iterator(p))
+      if (e.path().extension() == ".json") add(e.path());
+  }
+  return out;
 }
 
 }  // namespace armcal::verdict

@@ -1,0 +1,50 @@
+// diagnosis - what the training logs show of a candidate: its columns over the rows, its signals, its excitation.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host_sim/diagnose/diagnosis/metric.hpp"
+#include "host_sim/diagnose/diagnosis/noise.hpp"
+
+namespace armcal::diagnosis {
+
+// All training logs with the current estimate's model torque.
+struct Evidence {
+  const codegen::Model* model = nullptr;
+  std::vector<Quantities> logs;
+  std::vector<RowIndex> index;  // [n] used rows over all logs
+};
+
+// The candidate's columns at eta over the used rows of its joints.
+Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, const std::vector<double>& eta);
+
+// Every m-th sample of the evidence, for a rough search. Torque is averaged about it, so that little of what the log
+// tells is lost. So are columns that all samples must be evaluated for; the others are smooth over so short a time.
+struct Thinned {
+  // Keeps about `rows` samples a log.
+  Thinned(const Evidence& evidence, int rows);
+  Columns Gather(const Candidate& candidate, const std::vector<double>& eta) const;
+  BaseRows Average(const BaseRows& all) const;
+  Eigen::MatrixXd AverageRows(const Eigen::MatrixXd& m, int j) const;
+  // Noise of an averaged row, and how much of a gain is left, of white noise.
+  double noise() const { return 1 / std::sqrt(2.0 * reach + 1); }
+  double share() const { return (2.0 * reach + 1) / every; }
+
+  const Evidence& all;
+  int every = 1, reach = 0;  // a row stands for the samples that far about it
+  std::vector<std::unique_ptr<calibration::Dataset>> data;
+  std::vector<Quantities> logs;
+  std::vector<std::vector<int>> kept;  // [n] places in all.index[j]
+  std::vector<RowIndex> index;         // [n] of the shorter logs
+};
+
+// A signal of the candidate's joint j ("q", "abs(qd)") or of its other one ("q[k]") in the rows of joint j.
+Eigen::VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::string name);
+
+// The excitation the record asks for is in the logs.
+bool IsExcited(const Candidate& candidate, const Evidence& evidence);
+
+}  // namespace armcal::diagnosis

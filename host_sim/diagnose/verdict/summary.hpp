@@ -1,0 +1,16 @@
+// verdict - many verdicts as one: text, JSON and page.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "host_sim/diagnose/verdict/json.hpp"
+
+namespace armcal::verdict {
+
+// By name and by kind; nothing in it depends on when or where a verdict was made.
+nlohmann::ordered_json SummaryJson(const Verdicts& verdicts);
+std::string SummaryText(const nlohmann::ordered_json& summary);
+void WriteSummaryPage(const std::filesystem::path& path, const nlohmann::ordered_json& summary);
+
+}  // namespace armcal::verdict

@@ -13,9 +13,9 @@
 #include "armcal/controller/trace_records.hpp"
 #include "armcal/link/registers.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/vendor_registers.hpp"
 #include "host_sim/data/report/progress.hpp"
 #include "host_sim/data/trajectory/trajectory.hpp"
-#include "host_sim/machine/drive/vendor_registers.hpp"
 
 namespace armcal::client {
 
@@ -27,24 +27,24 @@ namespace {
 namespace reg = link::reg;
 
 struct Player {
-  drive::PlayerState state;
-  drive::StopReason reason;
+  PlayerState state;
+  StopReason reason;
   std::uint32_t points, first_tick, last_tick;
-  bool moving() const { return state == drive::PlayerState::kBlending || state == drive::PlayerState::kPlaying; }
+  bool moving() const { return state == PlayerState::kBlending || state == PlayerState::kPlaying; }
 };
 
 Player ReadPlayer(DriveClient& drive) {
-  const auto w = drive.ReadInput(drive::kPlayerStatus, drive::kPlayerStatusCount);
-  return {static_cast<drive::PlayerState>(w[0]), static_cast<drive::StopReason>(w[1]), core::GetU32(&w[2]),
-          core::GetU32(&w[4]), core::GetU32(&w[6])};
+  const auto w = drive.ReadInput(kPlayerStatus, kPlayerStatusCount);
+  return {static_cast<PlayerState>(w[0]), static_cast<StopReason>(w[1]), core::GetU32(&w[2]), core::GetU32(&w[4]),
+          core::GetU32(&w[6])};
 }
 
 void Upload(DriveClient& drive, const trajectory::Trajectory& t) {
-  const int n = t.joints(), points = static_cast<int>(t.q.rows()), chunk = (drive::kPlayerPointsCount - 2) / (2 * n);
+  const int n = t.joints(), points = static_cast<int>(t.q.rows()), chunk = (kPlayerPointsCount - 2) / (2 * n);
   std::uint16_t setup[4];
   core::PutU32(setup, points);
   core::PutU32(setup + 2, static_cast<std::uint32_t>(std::lround(t.step_s * 1e6)));
-  drive.Write(drive::kPlayerSetup, setup);
+  drive.Write(kPlayerSetup, setup);
   report::Progress progress("load trajectory");
   std::vector<std::uint16_t> w;
   for (int first = 0; first < points; first += chunk) {
@@ -52,7 +52,7 @@ void Upload(DriveClient& drive, const trajectory::Trajectory& t) {
     w.assign(2 + 2 * n * count, 0);
     core::PutU32(w.data(), first);
     for (int k = 0; k < count * n; ++k) core::PutF32(&w[2 + 2 * k], static_cast<float>(t.q(first + k / n, k % n)));
-    drive.Write(drive::kPlayerPoints, w);
+    drive.Write(kPlayerPoints, w);
     progress.Set(static_cast<double>(first + count) / points);
   }
 }
@@ -69,13 +69,13 @@ void WaitFor(DriveClient& drive, const char* what, Done done) {
 
 std::string Describe(const Player& p) {
   switch (p.reason) {
-    case drive::StopReason::kTrackingError:
+    case StopReason::kTrackingError:
       return "tracking error";
-    case drive::StopReason::kNoTrajectory:
+    case StopReason::kNoTrajectory:
       return "no trajectory";
-    case drive::StopReason::kCommand:
+    case StopReason::kCommand:
       return "stop command";
-    case drive::StopReason::kNone:
+    case StopReason::kNone:
       break;
   }
   return "no reason given";
@@ -120,11 +120,11 @@ class Traces {
 Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
   const trajectory::Trajectory trajectory = trajectory::ReadTrajectory(o.trajectory, robot.joints());
   Upload(drive, trajectory);
-  drive.WriteSingle(drive::kPlayerSpeed, static_cast<std::uint16_t>(o.speed_percent));
-  drive.WriteSingle(drive::kPlayerCommand, static_cast<std::uint16_t>(drive::PlayerCommand::kEnable));
-  WaitFor(drive, "axes enabled", [&] { return ReadPlayer(drive).state != drive::PlayerState::kDisabled; });
+  drive.WriteSingle(kPlayerSpeed, static_cast<std::uint16_t>(o.speed_percent));
+  drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kEnable));
+  WaitFor(drive, "axes enabled", [&] { return ReadPlayer(drive).state != PlayerState::kDisabled; });
   Traces traces(drive, o, robot.sample_ticks);
-  drive.WriteSingle(drive::kPlayerCommand, static_cast<std::uint16_t>(drive::PlayerCommand::kStart));
+  drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kStart));
   Recording recording;
   Player player;
   {
@@ -133,9 +133,9 @@ Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot&
     for (bool moved = false; quiet < 10;) {
       const std::size_t got = traces.Take(recording);
       player = ReadPlayer(drive);
-      moved = moved || player.moving() || player.state == drive::PlayerState::kFinished ||
-              player.state == drive::PlayerState::kStopped;
-      if (player.state == drive::PlayerState::kPlaying && !recording.raw.ticks.empty())
+      moved =
+          moved || player.moving() || player.state == PlayerState::kFinished || player.state == PlayerState::kStopped;
+      if (player.state == PlayerState::kPlaying && !recording.raw.ticks.empty())
         progress.Set(std::max(
             0.0, static_cast<double>(static_cast<std::int32_t>(recording.raw.ticks.back() - player.first_tick)) /
                      robot.tick_rate_Hz / trajectory.duration_s() * o.speed_percent / 100));
@@ -143,9 +143,9 @@ Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot&
     }
   }
   traces.Stop();
-  drive.WriteSingle(drive::kPlayerCommand, static_cast<std::uint16_t>(drive::PlayerCommand::kDisable));
-  WaitFor(drive, "axes disabled", [&] { return ReadPlayer(drive).state == drive::PlayerState::kDisabled; });
-  if (player.state == drive::PlayerState::kStopped)
+  drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kDisable));
+  WaitFor(drive, "axes disabled", [&] { return ReadPlayer(drive).state == PlayerState::kDisabled; });
+  if (player.state == PlayerState::kStopped)
     throw RefusedError(drive.name() + ": the motion was stopped: " + Describe(player), 0, core::Status::kHeld);
   recording.played = {player.first_tick, player.last_tick};
   return recording;

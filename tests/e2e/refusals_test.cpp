@@ -5,7 +5,7 @@
 
 #include "host_sim/client/drive_client.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
-#include "host_sim/machine/drive/vendor_registers.hpp"
+#include "host_sim/client/vendor_registers.hpp"
 #include "tests/e2e/tool.hpp"
 
 namespace armcal::tests {
@@ -176,18 +176,18 @@ TEST_F(Flashing, ADifferentTable_DoesNotVerify) {
 
 TEST_F(Flashing, WhileAnAxisIsEnabled_IsRefused) {
   client::DriveClient drive("127.0.0.1", drive_.port());
-  const auto command = [&](drive::PlayerCommand c) {
-    drive.WriteSingle(drive::kPlayerCommand, static_cast<std::uint16_t>(c));
-    const bool enable = c == drive::PlayerCommand::kEnable;
+  const auto command = [&](client::PlayerCommand c) {
+    drive.WriteSingle(client::kPlayerCommand, static_cast<std::uint16_t>(c));
+    const bool enable = c == client::PlayerCommand::kEnable;
     for (int k = 0; k < 20000 && (drive.ReadStatus().enabled_axes != 0) != enable; ++k) std::this_thread::yield();
     ASSERT_EQ(drive.ReadStatus().enabled_axes != 0, enable);
   };
   calibration::TableFile t = table_;
   t.row[67].mean *= 1.5;
   const std::string other = File("other.toml", t);
-  command(drive::PlayerCommand::kEnable);
+  command(client::PlayerCommand::kEnable);
   ExpectFlashRefused(other, kRefused, "nabled");
-  command(drive::PlayerCommand::kDisable);
+  command(client::PlayerCommand::kDisable);
   EXPECT_EQ(Verb("flash", other).code, 0);
   EXPECT_EQ(Verb("verify", other).code, 0);
 }

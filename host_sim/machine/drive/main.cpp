@@ -170,7 +170,7 @@ class Drive {
   // One control tick. Context: tick.
   void Tick() {
     const std::uint32_t tick = tick_.load();
-    const PlayerState before = player_.state();
+    const client::PlayerState before = player_.state();
     Eigen::VectorXd q(n), qd(n);
     for (int j = 0; j < n; ++j) {
       const model::AxisInfo& axis = Model::kAxes[j];
@@ -221,7 +221,7 @@ class Drive {
       raw.temperature_degC[j] = static_cast<float>(sensors_.temperature_degC[j]);
     }
     (void)controller_.Push(raw);  // a refused sample is counted and served
-    if (truth_ && (player_.moving() || before == PlayerState::kPlaying)) WriteTruth(tick);
+    if (truth_ && (player_.moving() || before == client::PlayerState::kPlaying)) WriteTruth(tick);
     tick_ = tick + 1;
     if (!player_.moving()) grant_ = std::max(0, grant_.load() - 1);
     if (before != player_.state()) grant_ = kSettleTicks;

@@ -25,32 +25,32 @@ void Player::Hold(const Eigen::VectorXd& q) {
   set_.qd = set_.qdd = Eigen::VectorXd::Zero(joints_);
 }
 
-void Player::Stop(StopReason reason, const Eigen::VectorXd& q) {
+void Player::Stop(client::StopReason reason, const Eigen::VectorXd& q) {
   Hold(q);
   reason_ = reason;
-  state_ = PlayerState::kStopped;
+  state_ = client::PlayerState::kStopped;
 }
 
-void Player::Obey(PlayerCommand command, const Eigen::VectorXd& q) {
+void Player::Obey(client::PlayerCommand command, const Eigen::VectorXd& q) {
   switch (command) {
-    case PlayerCommand::kNone:
+    case client::PlayerCommand::kNone:
       return;
-    case PlayerCommand::kEnable:
-      if (state() != PlayerState::kDisabled) return;
+    case client::PlayerCommand::kEnable:
+      if (state() != client::PlayerState::kDisabled) return;
       Hold(q);
-      reason_ = StopReason::kNone;
-      state_ = PlayerState::kHolding;
+      reason_ = client::StopReason::kNone;
+      state_ = client::PlayerState::kHolding;
       return;
-    case PlayerCommand::kDisable:
-      state_ = PlayerState::kDisabled;
+    case client::PlayerCommand::kDisable:
+      state_ = client::PlayerState::kDisabled;
       return;
-    case PlayerCommand::kStop:
-      if (moving()) Stop(StopReason::kCommand, q);
+    case client::PlayerCommand::kStop:
+      if (moving()) Stop(client::StopReason::kCommand, q);
       return;
-    case PlayerCommand::kStart:
-      if (state() == PlayerState::kDisabled || moving()) return;
+    case client::PlayerCommand::kStart:
+      if (state() == client::PlayerState::kDisabled || moving()) return;
       playing_ = loaded_;
-      if (!playing_) return Stop(StopReason::kNoTrajectory, set_.q);
+      if (!playing_) return Stop(client::StopReason::kNoTrajectory, set_.q);
       share_ = std::clamp(speed_.load(), 0.01, 1.0);
       blend_from_ = set_.q;
       blend_to_ = playing_->Position(0);
@@ -61,17 +61,17 @@ void Player::Obey(PlayerCommand command, const Eigen::VectorXd& q) {
                              std::sqrt(5.7736 * d / (kBlendAccelerationShare * limits_.acceleration_radps2[j]))});
       }
       time_s_ = 0;
-      reason_ = StopReason::kNone;
-      state_ = PlayerState::kBlending;
+      reason_ = client::StopReason::kNone;
+      state_ = client::PlayerState::kBlending;
   }
 }
 
 const SetPoint& Player::Step(std::uint32_t tick, const Eigen::VectorXd& q_measured) {
-  Obey(command_.exchange(PlayerCommand::kNone), q_measured);
+  Obey(command_.exchange(client::PlayerCommand::kNone), q_measured);
   if (!enabled()) Hold(q_measured);
   if (moving() && (q_measured - set_.q).cwiseAbs().maxCoeff() > kMaxTrackingError_rad)
-    Stop(StopReason::kTrackingError, q_measured);
-  if (state() == PlayerState::kBlending) {
+    Stop(client::StopReason::kTrackingError, q_measured);
+  if (state() == client::PlayerState::kBlending) {
     time_s_ += tick_s_;
     const double u = std::min(1.0, time_s_ / blend_s_);
     const Eigen::VectorXd d = blend_to_ - blend_from_;
@@ -81,9 +81,9 @@ const SetPoint& Player::Step(std::uint32_t tick, const Eigen::VectorXd& q_measur
     if (u >= 1) {
       time_s_ = 0;
       first_tick_ = tick + 1;
-      state_ = PlayerState::kPlaying;
+      state_ = client::PlayerState::kPlaying;
     }
-  } else if (state() == PlayerState::kPlaying) {
+  } else if (state() == client::PlayerState::kPlaying) {
     time_s_ += tick_s_ * share_;
     set_.q = playing_->Position(time_s_);
     set_.qd = share_ * playing_->Speed(time_s_);
@@ -91,7 +91,7 @@ const SetPoint& Player::Step(std::uint32_t tick, const Eigen::VectorXd& q_measur
     last_tick_ = tick;
     if (time_s_ >= playing_->duration_s()) {
       Hold(playing_->Position(playing_->duration_s()));
-      state_ = PlayerState::kFinished;
+      state_ = client::PlayerState::kFinished;
     }
   }
   return set_;

@@ -7,8 +7,8 @@
 
 #include <Eigen/Core>
 
+#include "host_sim/client/vendor_registers.hpp"
 #include "host_sim/data/trajectory/trajectory.hpp"
-#include "host_sim/machine/drive/vendor_registers.hpp"
 
 namespace armcal::drive {
 
@@ -31,32 +31,32 @@ class Player {
   // False while a motion runs.
   bool Load(const trajectory::Trajectory& trajectory);
   void SetSpeed(double share) { speed_.store(share); }
-  void Command(PlayerCommand command) { command_.store(command); }
+  void Command(client::PlayerCommand command) { command_.store(command); }
 
-  PlayerState state() const { return state_.load(); }
-  StopReason reason() const { return reason_.load(); }
+  client::PlayerState state() const { return state_.load(); }
+  client::StopReason reason() const { return reason_.load(); }
   std::uint32_t first_tick() const { return first_tick_.load(); }  // of the played part
   std::uint32_t last_tick() const { return last_tick_.load(); }
-  bool enabled() const { return state() != PlayerState::kDisabled; }
-  bool moving() const { return state() == PlayerState::kBlending || state() == PlayerState::kPlaying; }
-  bool command_pending() const { return command_.load() != PlayerCommand::kNone; }
+  bool enabled() const { return state() != client::PlayerState::kDisabled; }
+  bool moving() const { return state() == client::PlayerState::kBlending || state() == client::PlayerState::kPlaying; }
+  bool command_pending() const { return command_.load() != client::PlayerCommand::kNone; }
 
   // One tick: takes a command, moves the set-point. Context: tick.
   const SetPoint& Step(std::uint32_t tick, const Eigen::VectorXd& q_measured);
 
  private:
-  void Obey(PlayerCommand command, const Eigen::VectorXd& q_measured);
+  void Obey(client::PlayerCommand command, const Eigen::VectorXd& q_measured);
   void Hold(const Eigen::VectorXd& q);
-  void Stop(StopReason reason, const Eigen::VectorXd& q);
+  void Stop(client::StopReason reason, const Eigen::VectorXd& q);
 
   int joints_;
   double tick_s_;
   MotionLimits limits_;
   std::shared_ptr<const trajectory::TrajectorySpline> loaded_, playing_;
   std::atomic<double> speed_{1.0};
-  std::atomic<PlayerCommand> command_{PlayerCommand::kNone};
-  std::atomic<PlayerState> state_{PlayerState::kDisabled};
-  std::atomic<StopReason> reason_{StopReason::kNone};
+  std::atomic<client::PlayerCommand> command_{client::PlayerCommand::kNone};
+  std::atomic<client::PlayerState> state_{client::PlayerState::kDisabled};
+  std::atomic<client::StopReason> reason_{client::StopReason::kNone};
   std::atomic<std::uint32_t> first_tick_{0}, last_tick_{0};
   SetPoint set_;
   Eigen::VectorXd blend_from_, blend_to_;

@@ -19,10 +19,12 @@ Status VendorBlock::Serve(link::RegisterMap& map) {
   using link::RegisterKind;
   using link::WriteRule;
   const link::Block blocks[] = {
-      {RegisterKind::kInput, kPlayerStatus, kPlayerStatusCount, this, &ReadStatus, nullptr, WriteRule::kWords},
-      {RegisterKind::kHolding, kPlayerCommand, 2, this, &ReadControl, &WriteControl, WriteRule::kWords},
-      {RegisterKind::kHolding, kPlayerSetup, 4, this, &ReadNothing, &WriteSetup, WriteRule::kWhole},
-      {RegisterKind::kHolding, kPlayerPoints, kPlayerPointsCount, this, &ReadNothing, &WritePoints, WriteRule::kPairs}};
+      {RegisterKind::kInput, client::kPlayerStatus, client::kPlayerStatusCount, this, &ReadStatus, nullptr,
+       WriteRule::kWords},
+      {RegisterKind::kHolding, client::kPlayerCommand, 2, this, &ReadControl, &WriteControl, WriteRule::kWords},
+      {RegisterKind::kHolding, client::kPlayerSetup, 4, this, &ReadNothing, &WriteSetup, WriteRule::kWhole},
+      {RegisterKind::kHolding, client::kPlayerPoints, client::kPlayerPointsCount, this, &ReadNothing, &WritePoints,
+       WriteRule::kPairs}};
   for (const link::Block& b : blocks)
     if (const Status s = map.Add(b); !core::IsOk(s)) return s;
   return Status::kOk;
@@ -30,8 +32,8 @@ Status VendorBlock::Serve(link::RegisterMap& map) {
 
 Status VendorBlock::ReadStatus(void* self, std::uint16_t offset, std::uint16_t count, std::uint16_t* out) {
   const auto& b = *static_cast<VendorBlock*>(self);
-  std::uint16_t w[kPlayerStatusCount] = {static_cast<std::uint16_t>(b.player_.state()),
-                                         static_cast<std::uint16_t>(b.player_.reason())};
+  std::uint16_t w[client::kPlayerStatusCount] = {static_cast<std::uint16_t>(b.player_.state()),
+                                                 static_cast<std::uint16_t>(b.player_.reason())};
   core::PutU32(w + 2, static_cast<std::uint32_t>(std::count(b.loaded_.begin(), b.loaded_.end(), 1)));
   core::PutU32(w + 4, b.player_.first_tick());
   core::PutU32(w + 6, b.player_.last_tick());
@@ -56,16 +58,16 @@ Status VendorBlock::WriteControl(void* self, std::uint16_t offset, std::uint16_t
   const bool with_speed = offset + count > 1, with_command = offset == 0;
   const std::uint16_t percent = with_speed ? w[1 - offset] : b.speed_percent_;
   if (percent < 1 || percent > 100) return Status::kOutOfRange;
-  if (with_command && w[0] > static_cast<std::uint16_t>(PlayerCommand::kStop)) return Status::kOutOfRange;
+  if (with_command && w[0] > static_cast<std::uint16_t>(client::PlayerCommand::kStop)) return Status::kOutOfRange;
   if (with_speed) {
     b.speed_percent_ = percent;
     b.player_.SetSpeed(percent / 100.0);
   }
-  return with_command ? b.Obey(static_cast<PlayerCommand>(w[0])) : Status::kOk;
+  return with_command ? b.Obey(static_cast<client::PlayerCommand>(w[0])) : Status::kOk;
 }
 
-Status VendorBlock::Obey(PlayerCommand command) {
-  if (command == PlayerCommand::kStart) {
+Status VendorBlock::Obey(client::PlayerCommand command) {
+  if (command == client::PlayerCommand::kStart) {
     const bool complete = points_ > 0 && std::count(loaded_.begin(), loaded_.end(), 1) == static_cast<long>(points_);
     if (!complete || !player_.enabled() || player_.moving()) return Status::kWrongOrder;
     trajectory::Trajectory t;

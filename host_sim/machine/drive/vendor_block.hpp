@@ -23,7 +23,7 @@ class VendorBlock {
   static core::Status ReadNothing(void* self, std::uint16_t offset, std::uint16_t count, std::uint16_t* words);
   static core::Status WriteSetup(void* self, std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
   static core::Status WritePoints(void* self, std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
-  core::Status Obey(PlayerCommand command);
+  core::Status Obey(client::PlayerCommand command);
 
   Player& player_;
   int joints_;

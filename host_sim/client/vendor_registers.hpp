@@ -1,9 +1,9 @@
-// drive - the simulated drive's own registers: its trajectory player. They lie outside lib's map; knows no model.
+// client - the registers of the simulated drive that play a trajectory. The drive serves them, the tool uses them.
 #pragma once
 
 #include <cstdint>
 
-namespace armcal::drive {
+namespace armcal::client {
 
 // Holding registers.
 inline constexpr std::uint16_t kPlayerCommand = 0x8000;  // u16: PlayerCommand; written alone
@@ -32,4 +32,4 @@ enum class PlayerState : std::uint16_t {
 
 enum class StopReason : std::uint16_t { kNone = 0, kCommand = 1, kTrackingError = 2, kNoTrajectory = 3 };
 
-}  // namespace armcal::drive
+}  // namespace armcal::client

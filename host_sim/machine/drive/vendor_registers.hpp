@@ -1,4 +1,4 @@
-// drive - the simulated drive's own registers: its trajectory player. They lie outside lib's map; knows no model.
+// drive - lists the registers of the trajectory player. They lie outside lib's register map.
 #pragma once
 
 #include <cstdint>

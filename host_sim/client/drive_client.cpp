@@ -1,4 +1,4 @@
-// client - libmodbus with time-outs, retries and reasons.
+// client - calls libmodbus with time-outs and retries, and gives the reason of a failure.
 #include "host_sim/client/drive_client.hpp"
 
 #include <fmt/core.h>

@@ -1,4 +1,4 @@
-// client - the ways in which talking to a drive fails.
+// client - names the ways in which talking to a drive fails.
 #pragma once
 
 #include <stdexcept>

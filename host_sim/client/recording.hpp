@@ -1,4 +1,4 @@
-// client - records the traces of a drive, while it plays a trajectory or does its own work, and turns them into logs.
+// client - records the traces of a drive, which plays a trajectory or does its own work, and makes logs of them.
 #pragma once
 
 #include <string>

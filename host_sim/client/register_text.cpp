@@ -1,4 +1,4 @@
-// client - prints registers.hpp and status.hpp.
+// client - prints the registers of registers.hpp and the status numbers of status.hpp.
 #include "host_sim/client/register_text.hpp"
 
 #include <fmt/core.h>

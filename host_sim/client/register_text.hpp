@@ -1,4 +1,4 @@
-// client - the register map and the status numbers as text, for people and for tools.
+// client - gives the register map and the status numbers as text, for people and for tools.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// client - the flashing transaction seen from the PC (SPEC.md).
+// client - plays the PC's part of flashing a table (SPEC.md).
 #include "host_sim/client/table_flash.hpp"
 
 #include <fmt/core.h>

@@ -1,4 +1,4 @@
-// client - the page protocol seen from the PC (SPEC.md).
+// client - plays the PC's part of the page protocol (SPEC.md).
 #include "host_sim/client/trace_reader.hpp"
 
 #include <fmt/core.h>

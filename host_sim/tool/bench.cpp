@@ -1,5 +1,5 @@
-// tool - armcal bench: starts the bench program that was compiled for a robot, shows and keeps its ratios; measures
-// nothing itself, so that code compiled with other flags never meets the code that is timed.
+// tool - armcal bench: starts the bench program that was compiled for a robot, and prints its ratios.
+// It measures nothing itself: code that is compiled with other flags must not meet the code that is timed.
 #include <fmt/core.h>
 
 #include "codegen/src/io/input_error.hpp"

@@ -1,4 +1,4 @@
-// tool - connects and checks that drive and model speak of the same table.
+// tool - connects to a drive, and checks that drive and model have the same schema.
 #include "host_sim/tool/connect.hpp"
 
 #include <fmt/core.h>

@@ -1,4 +1,4 @@
-// tool - a drive's address and the table layout of the drive that answers there; knows no verb.
+// tool - reads the address of a drive, connects, and gives the layout of its table.
 #pragma once
 
 #include <string>

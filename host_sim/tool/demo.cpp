@@ -1,5 +1,4 @@
-// tool - armcal demo: every stage of the closed loop on the simulated drive, each by the verb that a user would call;
-// then its figures and its page.
+// tool - armcal demo: closes the loop on the simulated drive, each stage by its own verb, and reports the result.
 #include <fmt/core.h>
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>

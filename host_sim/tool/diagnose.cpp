@@ -1,4 +1,4 @@
-// tool - armcal diagnose: logs -> what the model lacks, decided on train, judged on test.
+// tool - armcal diagnose: finds in the training logs what the model lacks, and judges it on the test log.
 #include <fmt/core.h>
 #include <algorithm>
 #include <chrono>

@@ -1,4 +1,4 @@
-// tool - one diagnosis from files to files; armcal diagnose, its batches and the demo run it.
+// tool - runs one diagnosis from files to files, or a batch of them.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,4 @@
-// tool - armcal diagnose --batch and --splits: many diagnoses, one process each on all cores, so that a bad log ends
-// alone; and what they come to.
+// tool - armcal diagnose --batch and --splits: runs many diagnoses, one process each, and sums up what they found.
 #include <fmt/core.h>
 
 #include <map>

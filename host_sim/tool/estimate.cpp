@@ -1,4 +1,4 @@
-// tool - armcal estimate: starts the host port of the estimator that was compiled for a robot.
+// tool - armcal estimate: starts the estimator program that was compiled for a robot.
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/process.hpp"

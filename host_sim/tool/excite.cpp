@@ -1,4 +1,4 @@
-// tool - armcal excite: searches an excitation trajectory, checks it against the limits, writes it; plays nothing.
+// tool - armcal excite: searches an excitation trajectory, checks it against the limits, and writes it.
 #include <fmt/format.h>
 
 #include <cstdio>

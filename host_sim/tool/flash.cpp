@@ -1,4 +1,4 @@
-// tool - armcal flash: a table file into the drive, by name; armcal verify: is this table in force.
+// tool - armcal flash: brings a table file into the drive. armcal verify: tells whether this table is in force.
 #include <fmt/core.h>
 #include <algorithm>
 #include <cmath>

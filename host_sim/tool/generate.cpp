@@ -1,4 +1,4 @@
-// tool - armcal generate: the work of armcal-generate as a verb.
+// tool - armcal generate: does the work of the program armcal-generate.
 #include "codegen/src/generate/generate.hpp"
 
 #include "host_sim/tool/verb.hpp"

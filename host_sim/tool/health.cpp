@@ -1,5 +1,4 @@
-// tool - armcal health: reads a drive's residual statistics and says which joint no longer fits its model; knows no
-// log.
+// tool - armcal health: reads the residual statistics of a drive, and says which joint no longer fits its model.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 

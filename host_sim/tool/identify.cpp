@@ -1,5 +1,4 @@
-// tool - armcal identify: logs -> parameters with their standard deviations -> a table file; by the weighted fit, by
-// another method, or by a payload.
+// tool - armcal identify: fits parameters to logs, by the weighted fit, by another method, or with a payload.
 #include <fmt/core.h>
 
 #include <cmath>

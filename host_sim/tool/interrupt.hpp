@@ -1,4 +1,4 @@
-// tool - Ctrl-C ends the work and not the program, while a guard lives.
+// tool - lets Ctrl-C end the work but not the program, as long as a guard lives.
 #pragma once
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// tool - armcal learning: a drive's estimators on hold, going on, or without what they knew of a joint; knows no model.
+// tool - armcal learning: puts the estimators of a drive on hold, lets them go on, or makes them forget a joint.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 

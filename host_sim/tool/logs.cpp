@@ -1,4 +1,4 @@
-// tool - reads logs by name or channel map and checks them against the model.
+// tool - reads logs, with a channel map if one is given, and checks them against the model.
 #include "host_sim/tool/logs.hpp"
 
 #include <fmt/core.h>

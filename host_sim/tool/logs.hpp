@@ -1,4 +1,4 @@
-// tool - logs made ready for a model, as the options of a verb ask for them.
+// tool - reads logs for a model, as the options of a verb ask for.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// tool - the armcal tool: parses, runs one verb, turns every failure into one line and an exit code.
+// tool - reads the command line, runs one verb, and turns every failure into one line and an exit code.
 #include <cstdio>
 #include <exception>
 

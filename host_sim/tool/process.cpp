@@ -1,4 +1,4 @@
-// tool - starts programs by fork and exec, reads what they print through a pipe, and waits for their end.
+// tool - starts programs by fork and exec, reads their output through a pipe, and waits for their end.
 #include "host_sim/tool/process.hpp"
 
 #include <fcntl.h>

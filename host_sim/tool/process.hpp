@@ -1,4 +1,4 @@
-// tool - starts other programs: in place of this one, until it ends, or in the background.
+// tool - starts another program: in place of this one, until it ends, or in the background.
 #pragma once
 
 #include <string>

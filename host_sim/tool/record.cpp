@@ -1,4 +1,4 @@
-// tool - armcal record: a drive's traces as logs, and what they say of the motion.
+// tool - armcal record: writes the traces of a drive as logs, and prints how the arm moved.
 #include <fmt/core.h>
 #include <cmath>
 

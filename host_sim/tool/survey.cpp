@@ -1,4 +1,4 @@
-// tool - armcal survey: reproduces the survey's tables and figures, with better methods beside them.
+// tool - armcal survey: makes the tables and figures of the survey again, with better methods beside them.
 #include <fmt/core.h>
 
 #include <cstdlib>

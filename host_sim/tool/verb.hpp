@@ -1,4 +1,4 @@
-// tool - what every verb shares: exit codes, JSON output, and where the files that a user names lie.
+// tool - holds what every verb shares: exit codes, JSON output, and the search for files that a user names.
 #pragma once
 
 #include <CLI/CLI.hpp>

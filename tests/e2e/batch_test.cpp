@@ -1,5 +1,4 @@
-// end-to-end tests - many logs at once: a folder of small arms, one of them lacking a term, some of them bad; and runs
-// of one arm, each held out once.
+// end-to-end tests - diagnose many logs at once, some of them bad, and the runs of one arm with each held out once.
 #include "host_sim/data/logs/log.hpp"
 #include "tests/e2e/tool.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"

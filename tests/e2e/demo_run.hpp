@@ -1,4 +1,4 @@
-// end-to-end tests - one run of the closed loop and what every such run has to keep; knows no scenario.
+// end-to-end tests - run the closed loop once, and check what every such run must give.
 #pragma once
 
 #include <regex>

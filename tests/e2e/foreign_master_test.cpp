@@ -1,4 +1,4 @@
-// end-to-end tests - a Modbus master that is not ours reads a running drive as SPEC.md says.
+// end-to-end tests - read a running drive with a Modbus master that is not ours, as SPEC.md says.
 #include "tests/e2e/tool.hpp"
 
 namespace armcal::tests {

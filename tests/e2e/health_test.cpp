@@ -1,5 +1,4 @@
-// end-to-end tests - a drive whose arm changes while it works: armcal health says which joint, what and since when,
-// armcal learning holds and resets its estimators.
+// end-to-end tests - change an arm while it works: armcal health names the joint, armcal learning holds and resets.
 #include <cmath>
 #include <fstream>
 #include <numbers>

@@ -1,4 +1,4 @@
-// end-to-end tests - public measured logs through the verbs, against published parameters and a bar of our own.
+// end-to-end tests - compare the verbs on public measured logs with published parameters and a bar of our own.
 #include <cstdlib>
 #include <iterator>
 #include <sstream>

@@ -1,5 +1,4 @@
-// end-to-end tests - armcal diagnose --model-out where no model can hold what was found: said, not written as an
-// effect.
+// end-to-end tests - write a finding that no model can hold: --model-out says so and writes no effect.
 #include <iomanip>
 #include <numbers>
 #include <random>

@@ -1,4 +1,4 @@
-// end-to-end tests - drives' gains and a payload from two runs of the simulated drive, whose truth the scenario draws.
+// end-to-end tests - find the gains of drives and a payload in two runs of a simulated drive with a known truth.
 #include "host_sim/machine/plant/truth.hpp"
 #include "tests/e2e/tool.hpp"
 

@@ -1,4 +1,4 @@
-// end-to-end tests - the loop in which the model is generated anew and the drive rebuilt; with a stranger's scenario.
+// end-to-end tests - close the loop with a model that is generated anew, and with a scenario of a stranger.
 #include "tests/e2e/demo_run.hpp"
 
 namespace armcal::tests {

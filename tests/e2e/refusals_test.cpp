@@ -1,4 +1,4 @@
-// end-to-end tests - bad files, bad tables and bad links: the documented exit code, one line, nothing half written.
+// end-to-end tests - give bad files, tables and links: each ends in its exit code and one line, nothing half written.
 #include <cmath>
 #include <functional>
 #include <thread>

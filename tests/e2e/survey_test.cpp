@@ -1,4 +1,4 @@
-// end-to-end tests - armcal survey shows the survey's picture on fresh draws; excite with every curve and criterion.
+// end-to-end tests - compare armcal survey on fresh draws with the survey, and try every curve of armcal excite.
 #include "tests/e2e/tool.hpp"
 
 namespace armcal::tests {

@@ -1,4 +1,4 @@
-// end-to-end tests - the loop in which a table is enough, its control, and the drive's estimate against double algebra.
+// end-to-end tests - close the loop by a table alone, with a control run, and check the drive's estimate in double.
 #include "armcal/controller/trace_records.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "codegen/generated/er20_like/model.hpp"

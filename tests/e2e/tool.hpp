@@ -1,4 +1,4 @@
-// end-to-end tests - the built tool as a user runs it: words in; exit code, output and files out.
+// end-to-end tests - run the built tool as a user does, and keep its exit code, output and files.
 #pragma once
 
 #include <arpa/inet.h>

@@ -1,4 +1,4 @@
-// judged set - arms and motions by chance.
+// judged set - draws arms and motions by chance.
 #include "tests/judged/arm.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// judged set - an arm as it is and as its CAD file says; torques by KDL; knows no effect.
+// judged set - holds an arm as it is and as its CAD file says, with torques by KDL.
 #pragma once
 
 #include <Eigen/Core>

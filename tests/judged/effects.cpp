@@ -1,4 +1,4 @@
-// judged set - the effects, one function each.
+// judged set - computes the effects, one function each.
 #include "tests/judged/effects.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// judged set - what a declared model may lack, from physics; knows no effect record and no estimator.
+// judged set - computes from physics what a declared model may lack. It uses no effect record.
 #pragma once
 
 #include <functional>

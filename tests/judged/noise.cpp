@@ -1,4 +1,4 @@
-// judged set - noise of each class.
+// judged set - draws the noise of each class.
 #include "tests/judged/noise.hpp"
 
 #include <cmath>

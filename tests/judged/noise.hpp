@@ -1,4 +1,4 @@
-// judged set - torque noise and encoders; knows no arm.
+// judged set - adds torque noise and encoder steps.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// judged set - verdicts against the truth, with intervals; knows no model.
+// judged set - compares verdicts with the truth, and gives shares with their intervals.
 //   judged_score CASES VERDICTS [OUT.json [NAME=PERCENT...]]: CASES/<case>/truth.json against VERDICTS/<case>.json
 // Exit code 1: a case without a verdict, or a share of that name below the percentage.
 #include <fmt/core.h>

@@ -1,4 +1,4 @@
-// practice - a case's arm and declared model as a robot file of armcal; knows no log.
+// practice - writes the declared model of a case as a robot file of armcal.
 //   practice_robot CASE_DIR ROBOTS_DIR > robot.toml
 #include <fmt/core.h>
 #include <fstream>

@@ -1,4 +1,4 @@
-// practice - compares verdicts with the truth that lies beside each case; knows no model.
+// practice - compares verdicts with the truth that lies beside each case.
 //   practice_score CASES_DIR VERDICTS_DIR: one line a case, one total; VERDICTS_DIR holds <case>.json
 #include <fmt/core.h>
 

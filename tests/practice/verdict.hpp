@@ -1,4 +1,4 @@
-// practice - what a verdict says of one effect, and whether that is the truth; knows no folder.
+// practice - reads what a verdict says of an effect, and whether it is the truth.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// files - the CSV scanner and printer; knows no meaning of the columns.
+// files - reads and prints CSV.
 #include "host_sim/data/files/csv.hpp"
 
 #include <algorithm>

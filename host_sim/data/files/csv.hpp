@@ -1,4 +1,4 @@
-// files - a table of numbers with a header line, as CSV or gzip CSV; knows no meaning of its columns.
+// files - reads and writes a table of numbers with a header line, as CSV or gzip CSV.
 #pragma once
 
 #include <Eigen/Core>

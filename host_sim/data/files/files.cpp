@@ -1,4 +1,4 @@
-// files - whole files, plain or gzip, and their hash.
+// files - reads, writes and hashes whole files, plain or gzip.
 #include "host_sim/data/files/files.hpp"
 
 #include <unistd.h>

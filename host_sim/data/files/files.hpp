@@ -1,4 +1,4 @@
-// files - whole files: read (plain or gzip), write, hash.
+// files - reads a whole file (plain or gzip), writes one, and gives its hash.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// files - SHA-256 (FIPS 180-4), for provenance only; knows no file.
+// files - computes SHA-256 (FIPS 180-4), which tells later from which file a result came.
 #include <array>
 #include <bit>
 #include <cstdint>

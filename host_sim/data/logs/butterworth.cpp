@@ -1,4 +1,4 @@
-// logs - order-4 Butterworth as two second-order sections; knows no joint.
+// logs - filters by a Butterworth filter of order 4, as two second-order sections.
 #include "host_sim/data/logs/butterworth.hpp"
 
 #include <algorithm>

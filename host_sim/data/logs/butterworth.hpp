@@ -1,4 +1,4 @@
-// logs - zero-phase low-pass for sampled signals; knows no joint.
+// logs - filters a sampled signal by a low-pass without phase.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// logs - reads a channel map; knows no robot.
+// logs - reads a channel map.
 #include "host_sim/data/logs/channels.hpp"
 
 #include <toml++/toml.h>

@@ -1,4 +1,4 @@
-// logs - which column of a foreign log is which quantity; knows no robot.
+// logs - says which column of a foreign log is which quantity.
 //
 // A map is a TOML file:
 //   joints = 6

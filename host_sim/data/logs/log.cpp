@@ -1,4 +1,4 @@
-// logs - reads and writes logs; knows no model and no drive.
+// logs - reads and writes logs.
 #include "host_sim/data/logs/log.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// logs - a log: what was measured on an arm, joint side, SI; knows no model and no drive.
+// logs - holds what was measured on an arm, on the joint side and in SI units.
 #pragma once
 
 #include <Eigen/Core>

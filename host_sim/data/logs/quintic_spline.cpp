@@ -1,4 +1,4 @@
-// logs - B-spline collocation with a banded factorisation; knows no joint and no filter.
+// logs - solves for the coefficients of a B-spline with a banded factorisation.
 #include "host_sim/data/logs/quintic_spline.hpp"
 
 #include <algorithm>

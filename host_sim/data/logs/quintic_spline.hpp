@@ -1,4 +1,4 @@
-// logs - quintic spline through samples of several signals, and its derivatives; knows no joint and no filter.
+// logs - puts a quintic spline through the samples of several signals, and gives its derivatives.
 #pragma once
 
 #include <Eigen/Core>

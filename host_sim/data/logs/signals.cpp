@@ -1,4 +1,4 @@
-// logs - the derivation of speed and acceleration; knows no model.
+// logs - derives speed and acceleration from positions, with a cut-off chosen from the log itself.
 #include "host_sim/data/logs/signals.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
-// logs - position, speed and acceleration of a log from its sampled positions; knows no model. Torque is never
-// filtered: a low-pass would remove the ripple that one looks for.
+// logs - derives speed and acceleration of a log from its sampled positions. Torque is never filtered: a low-pass
+// would remove the ripple that is looked for.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,7 +39,7 @@ double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz,
 // The cut-off of all joints: chosen for each, or the user's own.
 struct Bandwidth {
   double cutoff_Hz = 0;  // 0: ChooseCutoff_Hz
-  double scale = 1;      // multiplies either: 0.62 shows which findings hang on it
+  double scale = 1;      // multiplies either: 0.62 shows which findings depend on it
 };
 
 // q through a zero-phase Butterworth of order 4 (run forward and backward), then derivatives of a quintic spline.

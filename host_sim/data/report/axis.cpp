@@ -1,4 +1,4 @@
-// report - ticks at 1, 2, 5 x 10^k; knows no picture.
+// report - places ticks at 1, 2 and 5 x 10^k.
 #include "host_sim/data/report/axis.hpp"
 
 #include <fmt/format.h>

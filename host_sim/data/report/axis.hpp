@@ -1,4 +1,4 @@
-// report - a numeric axis: range, ticks, labels; knows no picture.
+// report - chooses the range, the ticks and the labels of a numeric axis.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// report - draws the frame of a picture; knows no series.
+// report - draws the frame of a picture.
 #include "host_sim/data/report/canvas.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// report - the frame of every picture: SVG with axes, grid, labels and legend; knows no series.
+// report - draws the frame of every picture as SVG: axes, grid, labels and legend.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// report - writes the page; knows no robot.
+// report - writes an HTML page.
 #include "host_sim/data/report/page.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// report - one self-contained HTML page: text, tables and pictures, no network; knows no robot.
+// report - writes text, tables and pictures as one HTML page that needs no other file and no network.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// report - draws series of samples, and grouped bars.
+// report - draws series of samples and groups of bars.
 #include "host_sim/data/report/plot.hpp"
 
 #include <fmt/format.h>

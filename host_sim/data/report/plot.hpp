@@ -1,4 +1,4 @@
-// report - lines and points over a numeric axis, and bars over names, as inline SVG; knows no robot.
+// report - draws lines and points over a numeric axis, and bars over names, as inline SVG.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// report - the progress line; knows no step.
+// report - prints the progress line.
 #include "host_sim/data/report/progress.hpp"
 
 #include <unistd.h>

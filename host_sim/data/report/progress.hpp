@@ -1,4 +1,4 @@
-// report - how far a long step is, on stderr; knows no step.
+// report - shows on stderr how far a long step is.
 #pragma once
 
 #include <cstdio>

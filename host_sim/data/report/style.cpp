@@ -1,4 +1,4 @@
-// report - writes the style of pictures, with variables for a page or with plain colours for a file.
+// report - writes the style of pictures: as variables for a page, as plain colours for a file.
 #include "host_sim/data/report/style.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// report - the colours and line styles of every picture, and a picture that carries them in a file of its own.
+// report - gives the colours and line styles of pictures, and makes a file of one picture.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// report - tables in plain text; knows no robot.
+// report - prints tables as plain text.
 #include "host_sim/data/report/table.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// report - a table of text cells, for the page and for the terminal; knows no robot.
+// report - holds a table of text cells, for a page or for the terminal.
 #pragma once
 
 #include <string>

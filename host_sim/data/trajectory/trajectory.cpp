@@ -1,4 +1,4 @@
-// trajectory - trajectory file and clamped cubic spline; knows no robot and no model.
+// trajectory - reads and writes trajectory files, and computes the clamped cubic spline.
 #include "host_sim/data/trajectory/trajectory.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// trajectory - a trajectory: its file and the one curve through its points; knows no robot and no model.
+// trajectory - holds a trajectory: the points of its file and the one curve through them.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// diagnosis - instantiates records and evaluates their expressions over whole logs.
+// diagnosis - instantiates an effect record on joints and evaluates its expressions over whole logs.
 #include "host_sim/diagnose/diagnosis/candidate.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// diagnosis - a record tried on given joints: its columns over the logs; knows no score. No kind is known here by name.
+// diagnosis - tries an effect record on given joints: its columns over the logs. No kind of effect is named here.
 #pragma once
 
 #include <map>
@@ -36,7 +36,8 @@ class Candidate {
   const codegen::EffectInstance& instance() const { return instance_; }
   const std::vector<codegen::EffectUnknown>& unknowns() const { return instance_.unknowns; }
   std::vector<codegen::EffectUnknown>& unknowns() { return instance_.unknowns; }
-  // The values of the unknowns may stand there several times: so many uses of the record, with columns of their own.
+  // eta may hold the values of the unknowns several times. The record is then used as often, each time with columns of
+  // its own.
   int columns(const std::vector<double>& eta) const {
     return static_cast<int>(instance_.columns.size() * (unknowns().empty() ? 1 : eta.size() / unknowns().size()));
   }
@@ -46,9 +47,10 @@ class Candidate {
   // What its columns read, and the load of its joints, which a search may ask for.
   std::set<codegen::InputId> inputs() const;
   bool is_curve() const { return record().generic_penalty > 0; }  // fits a form, names no cause
-  // At a time of the training log: what one part of a log shows of it says nothing about another part, or another log.
+  // It happens at one time of the training log. One part of a log says nothing about it in another part, or in another
+  // log.
   bool is_event() const { return record().search.how == codegen::SearchWay::kWindow; }
-  // Columns at one sample hang on others: they cannot be had from a thinned log.
+  // The columns at one sample depend on other samples, so they cannot be computed from a thinned log.
   bool has_memory() const { return !graph_->states().empty() || reads(codegen::Quantity::kDelayedTorque); }
   std::string name() const;  // "stribeck, joint 3"
 

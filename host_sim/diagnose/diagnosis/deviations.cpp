@@ -1,4 +1,4 @@
-// diagnosis - the terms' parameters, all free together: polished, and how sure they are.
+// diagnosis - refines the parameters of all terms together, and computes how sure they are.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// diagnosis - adds terms one at a time on the training logs, prunes them, and judges them on a log that was held out.
+// diagnosis - adds terms one by one on the training logs, prunes them, and judges them on a held-out log.
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
 
 #include <algorithm>
@@ -92,11 +92,12 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);
     ApplyDelay(w);
-    // What was found under an effect that nobody had named yet is a little off, and what is off looks like more terms.
+    // A term that was found while another one was still unknown is a little wrong, and its error looks like further
+    // terms.
     for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k) w.chosen[k].earns = StaysIn(w, select, w.chosen[k]);
     w.Polish();
   }
-  // All but the latest have been searched again since it came.
+  // All terms but the latest have been searched again since the latest came.
   bool searched = true;
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
     if (searched && k + 1 < w.chosen.size() ? w.chosen[k].earns : StaysIn(w, select, w.chosen[k])) {
@@ -187,8 +188,8 @@ Quantities AtEstimate(const Diagnosis::Work& w, const std::vector<const Chosen*>
   return q;
 }
 
-// What the declared model with these terms leaves of another log, [N x n]; w keeps their estimate. tracking: how run
-// states among them were followed.
+// The residual of another log with these terms in the model, [N x n]; w keeps their estimate. tracking: says how run
+// states were followed.
 MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
                 std::string* tracking = nullptr) {
   w.Solve(terms);
@@ -214,21 +215,21 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
   return left;
 }
 
-// Whether these errors with a term refute it beside those without it: those of a joint of its own, or all together.
+// Compares the errors with a term to those without it. One of its own joints can refute it, or all joints together.
 std::optional<Refutation> Worse(const Chosen& term, const VectorXd& with, const VectorXd& without) {
   const VectorXd change = (with.array().max(1e-12) / without.array().max(1e-12)).log();
   const auto& own = term.candidate->rows();
   const auto worst = std::max_element(own.begin(), own.end(), [&](int a, int b) { return change[a] < change[b]; });
   if (worst != own.end() && change[*worst] > std::log(kWorse))
     return Refutation{*worst, false, std::exp(change[*worst]), with, without};
-  // All joints: the base fit moves with every term, and where more is missing one joint's gain is another's loss.
+  // All joints together: the base fit moves with every term, so a term may help one joint and harm another.
   if (change.sum() > std::log(kWorse)) return Refutation{-1, false, std::exp(change.sum()), with, without};
   return {};
 }
 
-// The weakest term that makes a joint of its own worse, or all joints together: than the declared model is, or than the
-// other terms that could tell its cause are without it. A delay is judged with all others, which were found on logs
-// that it had aligned.
+// The weakest term that predicts one of its joints, or all joints together, worse than the declared model does, or
+// worse than the other terms do without it. A delay is not compared with the other terms: they were found on logs that
+// it had aligned.
 Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after,
                 std::optional<Refutation>& why) {
   for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
@@ -244,8 +245,8 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const Vecto
   return nullptr;
 }
 
-// Of kinds that training could not tell apart the held-out log has refuted one that would be the arm's own: what it
-// leaves of them belongs to the run. False if nothing does.
+// Training could not tell some kinds apart, and the held-out log has refuted the one that would belong to the arm. A
+// kind that belongs to the run takes its place. False if there is none.
 bool OfTheRunInstead(Diagnosis::Work& w, const Chosen& refuted, Chosen& out) {
   for (const Rival& rival : refuted.rivals) {
     const auto& names = refuted.also_fits;

@@ -1,5 +1,4 @@
-// diagnosis - residual -> named cause -> terms to add, decided on the training logs alone; and their error on a
-// held-out log.
+// diagnosis - finds the causes of what a model leaves. The training logs alone decide; a held-out log judges.
 #pragma once
 
 #include <memory>
@@ -22,9 +21,9 @@ struct Rival {
   double score = 0;
 };
 
-// How a held-out log refuted a term: who is predicted worse with it than without it.
+// How a held-out log refuted a term: which joint it predicts worse with the term than without it.
 struct Refutation {
-  int joint = -1;                 // 0-based, of the term's own the one that got worst; -1: all joints together
+  int joint = -1;                 // 0-based, the worst of the term's own joints; -1: all joints together
   bool beside_others = false;     // without it: the other terms alone; false: the declared model
   double factor = 1;              // by which it makes the joint's error, or the product of all errors, larger
   Eigen::VectorXd with, without;  // [n] RMS of measured minus predicted torque where the joint moves
@@ -65,8 +64,8 @@ struct HeldOut {
 class Diagnosis {
  public:
   struct Work;  // work.hpp; the room's own
-  // narrow: the training logs once more, derived with a lower bandwidth; a term that hangs on the bandwidth is then
-  // refused. Empty: not looked at.
+  // narrow: the training logs once more, derived with a lower bandwidth; a term that depends on the bandwidth is then
+  // refused. Empty: this is not checked.
   Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
             std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow = {});
   ~Diagnosis();

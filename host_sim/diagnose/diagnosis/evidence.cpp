@@ -1,4 +1,4 @@
-// diagnosis - evaluates candidates over the used rows, all of them or every m-th sample, and checks their excitation.
+// diagnosis - evaluates candidates over all used rows or every m-th sample, and checks their excitation.
 #include "host_sim/diagnose/diagnosis/evidence.hpp"
 
 #include <algorithm>

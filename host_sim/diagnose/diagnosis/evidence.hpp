@@ -1,4 +1,4 @@
-// diagnosis - what the training logs show of a candidate: its columns over the rows, its signals, its excitation.
+// diagnosis - shows what the training logs say of a candidate: its columns, its signals, its excitation.
 #pragma once
 
 #include <cmath>
@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "host_sim/diagnose/diagnosis/candidate.hpp"
 #include "host_sim/diagnose/diagnosis/metric.hpp"
 #include "host_sim/diagnose/diagnosis/noise.hpp"
 
@@ -21,15 +22,16 @@ struct Evidence {
 // The candidate's columns at eta over the used rows of its joints.
 Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, const std::vector<double>& eta);
 
-// Every m-th sample of the evidence, for a rough search. Torque is averaged about it, so that little of what the log
-// tells is lost. So are columns that all samples must be evaluated for; the others are smooth over so short a time.
+// Every m-th sample of the evidence, for a rough search. The torque about such a sample is averaged, so that little of
+// the log is lost. Columns with memory are evaluated at all samples and averaged, too. The others are smooth over so
+// short a time and are evaluated at that sample only.
 struct Thinned {
   // Keeps about `rows` samples a log.
   Thinned(const Evidence& evidence, int rows);
   Columns Gather(const Candidate& candidate, const std::vector<double>& eta) const;
   BaseRows Average(const BaseRows& all) const;
   Eigen::MatrixXd AverageRows(const Eigen::MatrixXd& m, int j) const;
-  // Noise of an averaged row, and how much of a gain is left, of white noise.
+  // The noise of an averaged row, and the share of a gain that averaging leaves; both for white noise.
   double noise() const { return 1 / std::sqrt(2.0 * reach + 1); }
   double share() const { return (2.0 * reach + 1) / every; }
 

@@ -1,4 +1,4 @@
-// diagnosis - fits the base in whitened rows; what columns gain on it, and the checks of such a gain.
+// diagnosis - fits the base model in whitened rows, computes what columns gain on it, and checks such a gain.
 #include "host_sim/diagnose/diagnosis/metric.hpp"
 
 #include <Eigen/Eigenvalues>

@@ -1,16 +1,14 @@
-// diagnosis - the declared model fitted in whitened rows, and what a further column would gain; knows no record.
+// diagnosis - fits the declared model in whitened rows, and computes what a further column would gain.
 //
 // Frisch-Waugh: with Q the base's whitened, orthonormal columns and r the residual, columns C gain g' S^-1 g with
 // S = C'C - (Q'C)'(Q'C), g = C'r. Trying a column never needs a refit.
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <memory>
+#include <utility>
 #include <vector>
 
-#include "host_sim/diagnose/diagnosis/candidate.hpp"
 #include "host_sim/diagnose/diagnosis/noise.hpp"
-#include "host_sim/identify/calibration/prior.hpp"
 
 namespace armcal::diagnosis {
 
@@ -53,8 +51,8 @@ struct BaseRows {
   void Multiply(int j, Eigen::Index from = 0);
 };
 
-// Columns against the base: their own products, B = Q'C, g = C'r. Those of columns that are nowhere at the same time
-// add up.
+// Columns against the base: their own products, B = Q'C, g = C'r. Projections of columns that never act at the same
+// time add up.
 struct Projection {
   Eigen::MatrixXd gram, B;
   Eigen::VectorXd g;

@@ -1,4 +1,4 @@
-// diagnosis - terms as [[effect]] tables, and what no model holds as comments.
+// diagnosis - writes the found terms into a robot file: as [[effect]] tables, or as comments if no model can hold them.
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
 
 #include <fmt/format.h>

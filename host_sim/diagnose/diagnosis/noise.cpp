@@ -1,4 +1,4 @@
-// diagnosis - Yule-Walker estimation and whitening across broken stretches of a log.
+// diagnosis - fits the noise model by Yule-Walker, and whitens the stretches of a log that have no gap.
 #include "host_sim/diagnose/diagnosis/noise.hpp"
 
 #include <algorithm>

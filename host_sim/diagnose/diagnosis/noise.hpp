@@ -1,4 +1,4 @@
-// diagnosis - the noise of one joint as an autoregressive process; knows no model.
+// diagnosis - models the noise of one joint as an autoregressive process.
 #pragma once
 
 #include <Eigen/Core>

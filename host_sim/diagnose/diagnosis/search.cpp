@@ -1,4 +1,4 @@
-// diagnosis - what every search shares, and the search over a grid of nonlinear parameters.
+// diagnosis - searches a grid of nonlinear parameters, and does what every search needs.
 #include "host_sim/diagnose/diagnosis/search.hpp"
 
 #include <algorithm>

@@ -1,8 +1,9 @@
-// diagnosis - finds a candidate's best nonlinear parameters, the way its record asks for; knows no kind by name.
+// diagnosis - finds the best nonlinear parameters of a candidate, in the way that its record asks for.
 #pragma once
 
 #include <vector>
 
+#include "host_sim/diagnose/diagnosis/candidate.hpp"
 #include "host_sim/diagnose/diagnosis/evidence.hpp"
 #include "host_sim/diagnose/diagnosis/metric.hpp"
 
@@ -21,10 +22,10 @@ struct Found {
   std::vector<double> eta;
   Gain gain;
   double tried = 1;           // members of the grid: many tries find something by chance
-  int searched = 0;           // unknowns that were looked for: parameters, too
-  bool rough = false;         // gain, as the thinned rows have it, of all rows
+  int searched = 0;           // unknowns that were searched; they count as parameters
+  bool rough = false;         // the gain of all rows is estimated from the thinned ones
   Eigen::MatrixXd precision;  // of a curve's coefficients; empty for others
-  double penalty = 0;         // of its freedom: what so many parameters gain by chance, and more
+  double penalty = 0;         // what so many parameters gain by chance, and more
   double score = 0;
 };
 
@@ -33,8 +34,8 @@ double Score(const Found& found, double gain);
 // parameters ln(rows), as the Bayesian information criterion has it.
 double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evidence);
 
-// Roughly, wherever thinned rows can tell. Amplitudes outside the record's bounds gain nothing. simpler: what the
-// record after which this one is tried has found on the same joints; the unknowns that they share start there.
+// Searches on the thinned rows where these are enough. Amplitudes outside of the record's bounds gain nothing. simpler:
+// what a simpler record found on the same joints, if this one is tried after it; unknowns that both have start there.
 Found SearchCandidate(Candidate& candidate, const Ground& ground, const Found* simpler = nullptr);
 // The same on all rows.
 Found Finish(const Found& rough, const Ground& ground);

@@ -1,4 +1,4 @@
-// diagnosis - searches over a signal: harmonics of it, and splines over the part of its range that shows most.
+// diagnosis - searches over a signal: its harmonics, and splines over the part of its range that shows most.
 #include <algorithm>
 #include <cmath>
 #include <complex>

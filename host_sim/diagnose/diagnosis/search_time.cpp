@@ -1,4 +1,4 @@
-// diagnosis - searches over a run's time: one window that a term is on, and short windows that stand alone.
+// diagnosis - searches over the time of a run: one long window, or several short ones.
 #include <algorithm>
 #include <cmath>
 

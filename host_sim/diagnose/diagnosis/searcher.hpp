@@ -1,4 +1,4 @@
-// diagnosis - one candidate's search: what every way of searching shares; used by search*.cpp only.
+// diagnosis - holds the state of one search. Only the files search*.cpp include this.
 #pragma once
 
 #include <functional>
@@ -23,17 +23,17 @@ class Searcher {
   Gain Try(const std::vector<double>& eta) const { return Value(metric().Project(Gather(eta))); }
   // Keeps the point if it is the best so far; its gain.
   double Consider(const std::vector<double>& eta);
-  // Amplitudes held, or out of bounds, are counted. A law that could take the declared one's place may stand beside it,
-  // as two frictions in one joint do, but not against it.
+  // The gain if held amplitudes keep their value; zero if an amplitude is out of bounds. A record that could replace
+  // the declared friction law may stand beside it, but must not push that law's parameters out of their bounds.
   Gain Value(const Projection& projection) const;
   // What the column gains at its record's own amplitude: the parabola about the best one.
   void HoldAmplitude(Gain& g) const;
   bool AmplitudesInBounds(const Gain& gain) const;
 
   Found Scored() const;
-  // The gain that a score of zero takes.
+  // The gain at which the score is zero.
   double Needed(int rank) const;
-  // A refinement may still bring what is missing of that.
+  // A refinement may still reach that gain.
   bool Promising() const { return best_.gain.gain > (best_.rough ? 0.3 : 0.5) * Needed(best_.gain.rank); }
 
   double FromUnit(int k, double u) const;

@@ -111,8 +111,8 @@ bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
       (c->is_event() ? events : causes).push_back(c.get());
   bursts_.clear();
   if (Best(causes, terms, grounds, out)) return true;
-  // Whatever comes and goes with the motion looks like events, too: they are asked for last. A cause that showed once
-  // stands among them.
+  // Whatever comes and goes with the motion looks like an event, so events are tried last. A cause that showed in one
+  // fold only is tried among them.
   events.insert(events.end(), bursts_.begin(), bursts_.end());
   return Best(events, terms, grounds, out);
 }
@@ -120,8 +120,8 @@ bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
 bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chosen*>& terms, Grounds& grounds,
                     Chosen& out) {
   std::vector<Found> ranked = Rank(reach, grounds);
-  // A strong effect passes for noise, and under so much noise others look as good. Once it is known what it leaves,
-  // those that may be meant are searched again.
+  // At first a strong effect counts as noise, and under so much noise other candidates look as good. Once it is fitted
+  // the noise is smaller, and the candidates in question are searched again.
   for (int round = 0; round < kSharpenings && !ranked.empty(); ++round) {
     if (!grounds.Sharpen(GatherColumns(*ranked[0].candidate, w_.evidence, ranked[0].eta))) break;
     reach.clear();
@@ -200,8 +200,8 @@ void Selector::Sort(std::vector<Found>& ranked) const {
   if (cause != ranked.end()) std::rotate(ranked.begin(), cause, cause + 1);
 }
 
-// A chosen term, or one that is known to look like a chosen one on the same joints: the two together would only fit
-// noise, and apart from the training log's states they would fail.
+// A chosen term, or one that looks like a chosen one on the same joints. The two together would only fit noise, and
+// would fail on another log.
 bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const {
   return std::any_of(terms.begin(), terms.end(), [&](const Chosen* t) {
     const auto& like = t->candidate->record().confusable_with;
@@ -210,9 +210,9 @@ bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& t
   });
 }
 
-// Delay, elasticity and backlash look like what a derivation of speed and acceleration leaves: a term that is real
-// gains about as much when these are derived otherwise. One of high frequencies loses more; it must then be worth
-// accepting there, too, and be as large as it was.
+// The derivation of speed and acceleration leaves errors that look like delay, elasticity or backlash. A real term
+// gains about as much when they are derived with a lower bandwidth. A term of high frequencies loses more: it must then
+// be acceptable there, too, and as large as before.
 bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
                                      const std::vector<NoiseModel>& noise) {
   if (!w_.narrow) return true;
@@ -228,7 +228,7 @@ bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Cho
          MotionIsClean(f.candidate->rows());
 }
 
-// Noise that derivation made is in the logs at every bandwidth, and what smooths it looks like elasticity: where it
+// The noise of the derivation is in the logs at every bandwidth, and what smooths it looks like elasticity. If it
 // biases the rows of these joints, a term cannot be told from it.
 bool Selector::MotionIsClean(const std::vector<int>& joints) const {
   VectorXd z(w_.model.columns() + w_.model.nonlinear());

@@ -1,5 +1,4 @@
-// diagnosis - chooses the next term: search, noise fitted anew, cross-validation, bandwidth; and whether a term still
-// earns its place.
+// diagnosis - chooses the next term, and says whether a chosen one still earns its place.
 #pragma once
 
 #include <map>

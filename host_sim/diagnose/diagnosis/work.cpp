@@ -1,4 +1,4 @@
-// diagnosis - fits the base model with the current terms, and rebuilds its rows at the estimate.
+// diagnosis - fits the base model with the current terms, and computes its rows at the estimate.
 #include "host_sim/diagnose/diagnosis/work.hpp"
 
 #include <Eigen/Eigenvalues>

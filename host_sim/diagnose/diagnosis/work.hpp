@@ -1,4 +1,4 @@
-// diagnosis - the state of one diagnosis: logs, current terms, rows of the base model; the room's own.
+// diagnosis - holds the state of one diagnosis: logs, current terms, rows of the base model. For this room only.
 #pragma once
 
 #include <map>
@@ -7,7 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "host_sim/diagnose/diagnosis/candidate.hpp"
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
+#include "host_sim/diagnose/diagnosis/evidence.hpp"
+#include "host_sim/diagnose/diagnosis/metric.hpp"
 #include "host_sim/diagnose/diagnosis/noise.hpp"
 #include "host_sim/diagnose/diagnosis/search.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
@@ -27,10 +30,11 @@ struct Chosen {
   double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
 };
 
-// Those that are, but for `without`.
+// The confirmed terms, except `without`.
 std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Chosen* without = nullptr);
 
-// What a term must stand beside: not the curves over its joints, which may take its place but cannot tell its cause.
+// The terms beside which a term must earn its place. Curves over its joints are not among them: they could take its
+// place, but they name no cause.
 std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chosen& term);
 
 struct Diagnosis::Work {
@@ -45,8 +49,8 @@ struct Diagnosis::Work {
   };
   // Leaves the estimate.
   void Solve(const std::vector<const Chosen*>& terms);
-  // Moves the chosen terms' unknowns to where everything together fits best: a search sees one at a time, over a model
-  // that was fitted without it. Leaves the estimate.
+  // Moves the unknowns of all chosen terms to where they fit best together. A search moves those of one term, over a
+  // model that was fitted without it. Leaves the estimate.
   void Polish();
   // Standard deviations of the terms' amplitudes and unknowns, all free together, at the estimate that Solve has left.
   struct Deviation {
@@ -62,7 +66,7 @@ struct Diagnosis::Work {
   void Prepare(const std::vector<const Chosen*>& terms);
   Eigen::VectorXd SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j);
   std::vector<NoiseModel> WhiteNoise() const;
-  // Reads the logs' motion as much before their torque as the confirmed terms say, from now on.
+  // From now on, shifts the motion of the logs against their torque by the delay that the confirmed terms found.
   void AlignLogs();
   void SetDelay(double by_s);
   void IndexRows();
@@ -85,7 +89,7 @@ struct Diagnosis::Work {
   BaseRows rows;
   Estimate estimate;
   std::vector<Chosen> chosen;
-  std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept where it does not hang on the estimate
+  std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept if it does not depend on the estimate
   std::vector<char> bent;                               // [joint] 1: its declared rows must be filled anew
   Eigen::VectorXd followed;                             // the estimate that the evidence is at ...
   std::set<codegen::InputId> followed_reads;            // ... in these

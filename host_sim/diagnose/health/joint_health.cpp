@@ -1,5 +1,4 @@
-// health - takes means with their noise from the bins of a joint, explains their change, and finds the step in its
-// history.
+// health - computes means from a joint's bins, explains their change, and finds the step in its history.
 #include "host_sim/diagnose/health/joint_health.hpp"
 
 #include <Eigen/Dense>

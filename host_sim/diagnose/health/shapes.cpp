@@ -1,4 +1,4 @@
-// health - weighted least squares on the shapes, one after the other.
+// health - fits shapes by weighted least squares, one after the other.
 #include "host_sim/diagnose/health/shapes.hpp"
 
 #include <algorithm>

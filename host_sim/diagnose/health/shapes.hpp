@@ -1,4 +1,4 @@
-// health - the simple causes of a residual, and which of them explain a set of bins; knows no drive.
+// health - lists the simple causes of a residual, and finds which of them explain a set of bins.
 #pragma once
 
 #include <array>

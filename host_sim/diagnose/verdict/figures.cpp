@@ -1,4 +1,4 @@
-// verdict - the figures as text and JSON.
+// verdict - computes the held-out error, and gives it and the exogeneity test as text and JSON.
 #include "host_sim/diagnose/verdict/figures.hpp"
 
 #include <fmt/core.h>

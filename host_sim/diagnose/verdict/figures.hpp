@@ -1,4 +1,4 @@
-// verdict - figures that several verbs print and write: the error on a held-out log, the exogeneity test.
+// verdict - gives figures that several verbs print and write: the error on a held-out log, the exogeneity test.
 #pragma once
 
 #include <string>

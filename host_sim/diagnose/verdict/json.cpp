@@ -1,4 +1,4 @@
-// verdict - a diagnosis as JSON; terms of a JSON become uses of their records again.
+// verdict - writes one diagnosis as JSON, and reads such files and the effects in them.
 #include "host_sim/diagnose/verdict/json.hpp"
 
 #include <fmt/format.h>

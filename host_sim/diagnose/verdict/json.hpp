@@ -1,4 +1,4 @@
-// verdict - writes one diagnosis as JSON, and reads such files again.
+// verdict - writes one diagnosis as JSON, and reads such files.
 #pragma once
 
 #include <filesystem>
@@ -20,7 +20,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);
 // path: nothing. Throws io::InputError: no verdict, or none of its terms is among them and has such parameters.
 std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::vector<std::string>& effects);
 
-// By name of the log: what it came to, as armcal diagnose --json writes it, or why there is nothing.
+// Verdicts by the name of their log, as armcal diagnose --json writes them, or the reason why there is none.
 using Verdicts = std::map<std::string, nlohmann::ordered_json>;
 
 // {"verdict": "failed", "error": why}, what a log without a verdict leaves behind.

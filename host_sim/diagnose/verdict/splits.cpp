@@ -52,7 +52,7 @@ std::optional<Occurrence> Helps(const std::string& held_out, const ordered_json&
   return best;
 }
 
-// What both allow; none if they cannot be the same.
+// The kinds that both allow; nothing if they cannot be the same term.
 std::optional<Strings> Common(const Agreement& a, const ordered_json& term) {
   if (a.joint != JointText(term["joint"])) return {};
   const Strings kinds = Kinds(term);
@@ -73,8 +73,9 @@ std::optional<double> At(const std::vector<double>& xs, const std::vector<double
   return ys[k - 1] + (ys[k] - ys[k - 1]) * (x - xs[k - 1]) / (xs[k] - xs[k - 1]);
 }
 
-// Over the range that both held-out runs show: as it is, or but for what the declared model takes itself (a constant,
-// and over speed Coulomb and viscous friction). What has memory, or acts on the measurement, has no form over a signal.
+// Compares two terms over the range that both held-out runs show: as they are, or without what the declared model can
+// take itself (a constant, and over speed Coulomb and viscous friction). A term that has memory or acts on the
+// measurement has no form over a signal.
 bool SameForm(const ordered_json& one, const ordered_json& other) {
   if (one["class"] != "static" || other["class"] != "static") return true;
   const ordered_json &a = one["dependence"], &b = other["dependence"];

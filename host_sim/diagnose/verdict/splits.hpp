@@ -1,4 +1,4 @@
-// verdict - which terms hold whatever run of an arm is held out, as text, JSON, page and pictures.
+// verdict - finds the terms that hold whichever run of an arm is held out, and shows them.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,9 @@
 
 namespace armcal::verdict {
 
-// A term as one split has it. Its joint is the one whose error it lowers most; RMS where that joint moves. other_joint:
-// what the split's terms together do worst to another joint; change: after over before, less one; -1: there is none.
+// A term as one split has it. Its joint is the one whose error it lowers most; errors are RMS where that joint moves.
+// other_joint: the other joint whose error the terms of the split change for the worst; change: after over before, less
+// one. -1: there is none.
 struct Occurrence {
   std::string held_out, kind;
   int joint = 0;                              // 0-based

@@ -1,4 +1,4 @@
-// verdict - many verdicts as one: text, JSON and page.
+// verdict - sums up many verdicts as text, JSON and page.
 #pragma once
 
 #include <filesystem>

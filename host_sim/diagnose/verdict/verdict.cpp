@@ -1,4 +1,4 @@
-// verdict - shows one diagnosis: each term over the signal that gave it away, lines for the terminal, and a page.
+// verdict - shows one diagnosis: lines for the terminal, a page, and each term over the signal that gave it away.
 #include "host_sim/diagnose/verdict/verdict.hpp"
 
 #include <fmt/core.h>

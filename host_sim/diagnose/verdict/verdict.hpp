@@ -1,4 +1,4 @@
-// verdict - one diagnosis and everything that it has to show a person: lines for the terminal, and a page.
+// verdict - holds one diagnosis with all that shows it, and shows it in the terminal and on a page.
 #pragma once
 
 #include <string>

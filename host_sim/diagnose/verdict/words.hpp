@@ -1,4 +1,4 @@
-// verdict - what a diagnosis says, in words that its text, its page and its JSON share.
+// verdict - says a diagnosis in words. Its text, its page and its JSON share them.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace armcal::verdict {
 
-// Of a curve that names no cause the joint is the one whose torque it changes; the other is among the signals.
+// A curve that names no cause. Its joint is the one whose torque it changes; another joint may be among its signals.
 inline bool IsUnknown(const diagnosis::Term& t) { return t.record->kind != t.record->name; }
 
 // At least one term held on the held-out log.
@@ -43,7 +43,8 @@ std::string AlsoFits(const diagnosis::Term& t);
 // first.
 codegen::EffectUse Found(const diagnosis::Term& t);
 
-// Of one term of the finding. robot, verdict: as the user named the robot file and the JSON, which may be empty.
+// How to tell one term of the finding from its rivals. robot, verdict: the robot file and the JSON as the user named
+// them; verdict may be empty.
 std::vector<Separation> Separations(const diagnosis::Term& t, const diagnosis::Finding& finding,
                                     const codegen::Model& model, const codegen::Catalogue& records,
                                     const std::string& robot, const std::string& verdict);

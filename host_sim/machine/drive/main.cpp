@@ -1,5 +1,4 @@
-// drive - the simulated drive: plant, lib and player behind Modbus TCP, in one process. The model is chosen when it is
-// compiled.
+// drive - runs the simulated drive: plant, lib and player behind Modbus TCP. It is compiled once for each model.
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -64,7 +63,7 @@ class Drive {
   }
   Drive(const Drive&) = delete;
 
-  // Serves until `quit`. on_listen(port) is called once. Throws io::InputError if the port cannot be had.
+  // Serves until `quit`. on_listen(port) is called once. Throws io::InputError if the port is taken.
   template <class OnListen>
   void Run(const std::atomic<bool>& quit, OnListen on_listen) {
     link::TcpService<port_linux::TcpServer::kSlots> service(controller_.engine());

@@ -1,4 +1,4 @@
-// drive - quintic blend to the first point, then the trajectory's spline at the commanded share of its speed.
+// drive - computes the set-point: a quintic blend to the first point, then the spline at the commanded speed.
 #include "host_sim/machine/drive/player.hpp"
 
 #include <algorithm>

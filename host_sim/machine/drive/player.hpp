@@ -1,4 +1,4 @@
-// drive - moves the set-point: hold, blend to the start, play, stop; knows no torque and no register.
+// drive - moves the set-point: it holds, blends to the start, plays a trajectory, and stops.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,4 @@
-// drive - the player's registers: setup, points in any order, commands; a command is refused unless everything is
-// loaded.
+// drive - serves the player's registers. It refuses a command until setup and all points are loaded.
 #include "host_sim/machine/drive/vendor_block.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// drive - serves the trajectory player as registers of the vendor range; knows no torque.
+// drive - serves the trajectory player as registers of the vendor range.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,4 @@
-// estimate - the host port: lib's own estimator on Linux, fed over Modbus from the drive's trace, or from a recorded
-// log.
+// estimate - runs lib's estimators on a PC, on the trace of a drive or on a recorded log. Compiled once for each model.
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 

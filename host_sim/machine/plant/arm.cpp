@@ -1,4 +1,4 @@
-// plant - one tick of the true arm: commands in, motion, heat, readings out; arm_motion.cpp has the equations.
+// plant - runs one tick of the true arm: command, motion, heat, sensors. The equations are in arm_motion.cpp.
 #include "host_sim/machine/plant/arm.hpp"
 
 #include <algorithm>

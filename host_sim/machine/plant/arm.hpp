@@ -1,4 +1,4 @@
-// plant - the arm as it really is: true bodies, real stiction, motors and sensors; knows no model, filter or drive.
+// plant - simulates the arm as it really is: true bodies, true stiction, motors and sensors.
 //
 // Motion:  C^T tau_motor = M(q) qdd + h(q, qd) + friction + undeclared torque, M with rotors (gyroscopic part
 // neglected). Friction is Coulomb + viscous with true stiction: a resting joint is a constraint until the torque needed

@@ -1,4 +1,4 @@
-// plant - the true arm's equations of motion: friction, sticking, breaking loose, integration within a tick.
+// plant - solves the equations of motion: friction, sticking, breaking loose, integration within a tick.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// plant - KDL chains from DH rows and bodies about their centres.
+// plant - builds KDL chains from DH rows and bodies about their centres.
 #include "host_sim/machine/plant/dynamics.hpp"
 
 namespace armcal::plant {

@@ -1,4 +1,4 @@
-// plant - rigid-body dynamics of the links by KDL; knows no motor, friction or sensor.
+// plant - computes the rigid-body dynamics of the links by KDL.
 #pragma once
 
 #include <optional>

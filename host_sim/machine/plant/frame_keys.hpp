@@ -1,4 +1,4 @@
-// plant - a frame {xyz_m, rpy_deg} in a TOML table; knows nothing else.
+// plant - reads a frame {xyz_m, rpy_deg} from a TOML table.
 #pragma once
 
 #include <numbers>

@@ -1,4 +1,4 @@
-// plant - the physics of each joint effect, one class each; knows no estimator.
+// plant - computes the physics of each joint effect, one class each.
 #include "host_sim/machine/plant/joint_effects.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// plant - what happens inside one joint beyond Coulomb and viscous friction, from physics; knows no estimator.
+// plant - describes what happens in a joint beyond Coulomb and viscous friction.
 //
 // Deliberately not the forms that the estimator's effect records use: a record has to find the physics, not itself.
 // Rotary units; for a prismatic joint read N, m, m/s.

@@ -1,4 +1,4 @@
-// plant - reproducible random numbers, equal on every platform; knows no robot.
+// plant - draws random numbers that are the same on every platform.
 #pragma once
 
 #include <cmath>

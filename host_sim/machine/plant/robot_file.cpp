@@ -1,4 +1,4 @@
-// plant - the robot file reader; knows keys and units, no physics.
+// plant - reads a robot file.
 #include "host_sim/machine/plant/robot_file.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// plant - what a robot file says of mechanics, motors and sensors; knows no regressor, prior or effect list.
+// plant - holds what a robot file says of mechanics, motors and sensors.
 //
 // The plant reads the same files as the generator, but with its own reader and in its own convention (bodies about
 // their centres, KDL frames), so that an error in one of the two shows up as a disagreement. Keys that only the

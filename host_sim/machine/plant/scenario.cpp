@@ -1,4 +1,4 @@
-// plant - the scenario file reader; host_sim/scenarios/README.md is its document.
+// plant - reads a scenario file. host_sim/scenarios/README.md describes its keys.
 #include "host_sim/machine/plant/scenario.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// plant - what a scenario file says: which arm, how its truth is drawn, what nobody declared; computes no motion.
+// plant - holds what a scenario file says: which arm, how its true parameters are drawn, which effects are undeclared.
 #pragma once
 
 #include <cstdint>

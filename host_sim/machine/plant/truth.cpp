@@ -1,4 +1,4 @@
-// plant - the draw of the true parameters; knows what a physical body is.
+// plant - draws the true parameters until every body is physical.
 #include "host_sim/machine/plant/truth.hpp"
 
 #include <Eigen/Dense>

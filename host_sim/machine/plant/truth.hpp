@@ -1,4 +1,4 @@
-// plant - the arm's true parameters, drawn around the robot file; knows no dynamics.
+// plant - draws the true parameters of an arm around those of its robot file.
 #pragma once
 
 #include <cstdint>

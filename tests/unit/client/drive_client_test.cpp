@@ -1,4 +1,4 @@
-// client - our client with libmodbus against our server: every function, and every refusal with its reason.
+// client - tests our client against our server: every function, and every refusal with its reason.
 #include "host_sim/client/drive_client.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// client - raw sockets that break the rules: bad headers, half frames, floods, clients that do not read.
+// client - breaks the rules on raw sockets: bad headers, half frames, floods, clients that do not read.
 #include <gtest/gtest.h>
 
 #include <arpa/inet.h>

@@ -1,4 +1,4 @@
-// client - the table store on the file that plays flash on Linux.
+// client - tests the table store on the file that stands for flash memory on Linux.
 #include <gtest/gtest.h>
 
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// client - residual statistics over the wire: each number is in its place, and all are of one snapshot.
+// client - tests residual statistics over the wire: each number is in its place, and all are of one snapshot.
 #include "host_sim/client/residual_reader.hpp"
 
 #include <gtest/gtest.h>

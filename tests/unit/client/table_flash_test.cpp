@@ -1,4 +1,4 @@
-// client - flashing over the wire: success, every refusal, a lying drive, and a connection cut at any byte.
+// client - tests flashing over the wire: success, every refusal, a drive that lies, a connection cut at any byte.
 #include "host_sim/client/table_flash.hpp"
 
 #include <gtest/gtest.h>

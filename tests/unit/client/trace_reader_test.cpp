@@ -1,4 +1,4 @@
-// client - traces over the wire: complete, with losses, read twice, and started anew by another client.
+// client - tests traces over the wire: complete, with losses, read twice, and started again by another client.
 #include "host_sim/client/trace_reader.hpp"
 
 #include <gtest/gtest.h>

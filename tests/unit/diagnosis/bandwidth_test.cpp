@@ -1,4 +1,4 @@
-// diagnosis tests - the guard of the second bandwidth: what a derivation of the motion leaves behind is no effect.
+// diagnosis tests - check the second bandwidth: what the derivation of the motion leaves is no effect.
 #include <gtest/gtest.h>
 
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"

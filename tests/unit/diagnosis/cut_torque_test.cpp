@@ -1,5 +1,4 @@
-// diagnosis tests - a torque that stops at a limit: the base model must not bend to it, and limit and parameters are
-// found together.
+// diagnosis tests - cut torque off at a limit: the limit and the parameters are found together.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// diagnosis tests - effects written in other forms than the records, on KDL's torque: named, placed, or none found.
+// diagnosis tests - add effects in other forms than the records to KDL's torque: each is named and placed, or none is.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>

@@ -1,5 +1,4 @@
-// diagnosis tests - what a held-out log is asked: run states are followed on it, events of the training log have no
-// part.
+// diagnosis tests - judge on a held-out log: run states are followed, and events of the training log are left out.
 #include <gtest/gtest.h>
 
 #include <numbers>

@@ -1,5 +1,4 @@
-// diagnosis tests - the new model file of every record: accepted by the generator, with what was found, and nothing
-// else.
+// diagnosis tests - write the new model file of every record: the generator accepts it, and it holds what was found.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// diagnosis tests - the noise model on a process whose coefficients are known, and the gain of a column by refitting.
+// diagnosis tests - fit noise of known coefficients, and compare the gain of a column with a refit.
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>

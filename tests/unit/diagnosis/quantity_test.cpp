@@ -1,4 +1,4 @@
-// diagnosis tests - every quantity that an expression can read, as diagnosis evaluates it, against Orocos KDL.
+// diagnosis tests - compare every quantity that an expression can read with Orocos KDL.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -1,4 +1,4 @@
-// diagnosis tests - the tracker of run states: against the conditional mean by dense algebra, and KDL's payload.
+// diagnosis tests - compare the tracker of run states with the conditional mean and with KDL's payload.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>

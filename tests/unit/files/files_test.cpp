@@ -1,4 +1,4 @@
-// io tests - whole files and hashes.
+// files tests - read and write whole files, and compare their hashes.
 #include "host_sim/data/files/files.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// io tests - a folder of one's own that goes away with the test.
+// files tests - give a test a folder of its own, which goes away with it.
 #pragma once
 
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// health - the verdict on joints whose trouble is known.
+// health - tests the verdict on joints whose trouble is known.
 #include "host_sim/diagnose/health/joint_health.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// health - a step in a history that is written down by hand.
+// health - tests the onset on histories that are written down by hand.
 #include "host_sim/diagnose/health/joint_health.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// health - rows of a joint with a known trouble, through the drive's own statistics; knows no verdict.
+// health - makes rows of a joint with a known trouble, and feeds them to the drive's own statistics.
 #pragma once
 
 #include <cmath>

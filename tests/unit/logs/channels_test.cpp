@@ -1,4 +1,4 @@
-// io tests - channel maps: foreign names, units and zero points.
+// logs tests - read channel maps: foreign names, units and zero points.
 #include "host_sim/data/logs/channels.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// io tests - logs: what is read is what was written, and each kind of bad file has its own line.
+// logs tests - read what was written, and get one line for each kind of bad file.
 #include "host_sim/data/logs/log.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// io tests - the shipped channel maps load the public measured logs, where these are at hand.
+// logs tests - load the public measured logs with the shipped channel maps, if these logs are there.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>

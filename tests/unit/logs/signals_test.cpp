@@ -1,4 +1,4 @@
-// io tests - derivatives against analytic motion: no fake elasticity, no phase, and the cut-off by its own rule.
+// logs tests - compare derivatives with analytic motion: no false elasticity, no phase, the right cut-off.
 #include "host_sim/data/logs/signals.hpp"
 
 #include <gtest/gtest.h>

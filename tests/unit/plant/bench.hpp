@@ -1,4 +1,4 @@
-// plant - what the plant's tests share: small robots as text, an energy oracle, a trajectory and a PD loop.
+// plant - gives the plant's tests small robots as text, an energy oracle, a trajectory and a PD loop.
 #pragma once
 
 #include <cmath>

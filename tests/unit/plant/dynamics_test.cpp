@@ -1,4 +1,4 @@
-// plant - tests: the motion obeys mechanics (energy, a second KDL chain); knows no drive.
+// plant - tests that the motion obeys mechanics: energy, and a second KDL chain.
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
 #include "tests/unit/plant/bench.hpp"

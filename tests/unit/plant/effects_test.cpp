@@ -1,4 +1,4 @@
-// plant - tests: each undeclared effect does what its physics says, by formulas written here; knows no estimator.
+// plant - tests that each undeclared effect does what its physics says, by formulas written here.
 #include "tests/unit/plant/bench.hpp"
 
 namespace armcal::plant {

@@ -1,4 +1,4 @@
-// plant - tests: robot and scenario files, and the truth drawn around them; knows no motion.
+// plant - tests the readers of robot and scenario files, and the draw of the true parameters.
 #include "tests/unit/plant/bench.hpp"
 
 namespace armcal::plant {

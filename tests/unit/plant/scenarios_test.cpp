@@ -1,4 +1,4 @@
-// plant - tests: the shipped scenarios on the shipped arm, under the robot file's own gains; knows no drive.
+// plant - tests the shipped scenarios on the shipped arm, with the gains of the robot file.
 #include <filesystem>
 #include <set>
 

@@ -1,4 +1,4 @@
-// plant - tests: encoder, current and temperature readings; knows no drive.
+// plant - tests encoder, current and temperature readings.
 #include "tests/unit/plant/bench.hpp"
 
 namespace armcal::plant {

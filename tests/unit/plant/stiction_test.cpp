@@ -1,4 +1,4 @@
-// plant - tests: resting joints rest, break loose at their level and stop without a residue; knows no drive.
+// plant - tests that resting joints rest, break loose at their level, and stop without a residue.
 #include "tests/unit/plant/bench.hpp"
 
 namespace armcal::plant {

@@ -1,4 +1,4 @@
-// report tests - the page: complete, self-contained, harmless whatever text comes in.
+// report tests - check that a page is complete, needs no other file, and is harmless whatever text comes in.
 #include "host_sim/data/report/page.hpp"
 
 #include <gtest/gtest.h>

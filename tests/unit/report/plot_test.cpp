@@ -1,4 +1,4 @@
-// report tests - pictures: every sample's peak survives, nothing is drawn from what is not a number.
+// report tests - check that pictures keep every peak and draw nothing for what is not a number.
 #include "host_sim/data/report/plot.hpp"
 #include "host_sim/data/report/style.hpp"
 

@@ -1,4 +1,4 @@
-// report tests - the terminal: aligned tables, progress that does not litter a file.
+// report tests - check aligned tables, and progress that leaves no marks in a file.
 #include <gtest/gtest.h>
 
 #include <cstdio>

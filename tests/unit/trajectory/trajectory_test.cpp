@@ -1,4 +1,4 @@
-// excitation tests - the trajectory's spline against closed forms, its file against damage.
+// trajectory tests - compare the spline with closed forms, and damage its file.
 #include "host_sim/data/trajectory/trajectory.hpp"
 
 #include <gtest/gtest.h>

@@ -12,7 +12,7 @@ namespace armcal::tool {
 // What --connect takes: "HOST:PORT", or a serial line "DEVICE[:BAUD[:PARITY[:UNIT]]]" whose device is a path from the
 // root; 115200, E and 1 if left out. Throws io::InputError (form), client::LinkError.
 client::DriveClient ConnectTo(const std::string& address);
-// Its two forms; the second throws io::InputError (form).
+// IsSerialLine tells the two forms apart. HostAndPort splits the first and throws io::InputError (form).
 bool IsSerialLine(const std::string& address);
 std::pair<std::string, int> HostAndPort(const std::string& address);
 inline constexpr char kConnectHelp[] = "drive: HOST:PORT, or a serial line as /dev/ttyUSB0[:115200[:E[:1]]]";

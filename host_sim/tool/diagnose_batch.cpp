@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// What is empty is not there: the verdict then says so.
+// An empty field means that the file is missing. The verdict then says so.
 struct DiagnosisCase {
   std::string name;
   std::vector<std::string> train, test;  // test: one
@@ -92,7 +92,7 @@ bool Strip(const std::string& file, const std::string& role, std::string& name) 
   return false;
 }
 
-// By name, with what of each is there.
+// The cases of a folder by name, with the files that each of them has.
 std::vector<DiagnosisCase> FindCases(const fs::path& folder, const std::string& robot) {
   if (!fs::is_directory(folder)) throw io::InputError(folder.string() + ": expected a folder of logs");
   const fs::path shared = folder / "robot.toml";
@@ -144,7 +144,7 @@ std::vector<DiagnosisCase> Part(const std::vector<DiagnosisCase>& all, const std
   return some;
 }
 
-// verdict::Verdicts of other jobs; a log of the batch that has none gets a line that says so.
+// The verdicts of other jobs. A log of the batch without a verdict gets a line that says so.
 verdict::Verdicts Collect(const BatchOptions& batch, const DiagnoseOptions& one) {
   verdict::Verdicts verdicts = verdict::ReadVerdicts(batch.summary);
   if (!batch.folder.empty())
@@ -170,7 +170,7 @@ std::string RunName(const std::string& path) {
   return file.substr(0, file.find(".csv"));
 }
 
-// Each run with everything outside of its group to train on.
+// Holds out each run once. All runs outside of its group are its training logs.
 std::vector<DiagnosisCase> MakeSplits(const std::vector<std::string>& groups, const std::string& robot) {
   std::vector<std::vector<std::string>> runs;
   std::set<std::string> names;

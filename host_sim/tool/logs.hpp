@@ -30,7 +30,7 @@ class LogReader {
   double cutoff_Hz_;
 };
 
-// Adds --cutoff: what is no frequency is refused in one line.
+// Adds --cutoff. Anything but a frequency is refused in one line.
 void AddCutoff(CLI::App& verb, double& cutoff_Hz);
 
 }  // namespace armcal::tool

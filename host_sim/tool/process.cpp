@@ -13,7 +13,7 @@
 namespace armcal::tool {
 namespace {
 
-// As exec takes them; they point into the words.
+// The words as exec wants them. The pointers are valid as long as the words are.
 std::vector<char*> Arguments(const std::vector<std::string>& words) {
   std::vector<char*> arguments;
   for (const std::string& w : words) arguments.push_back(const_cast<char*>(w.c_str()));

@@ -8,7 +8,7 @@
 
 namespace armcal::tool {
 
-// This program.
+// The path of this program.
 std::string OwnProgram();
 
 // `chosen`, or else the program STEM-ROBOT beside this one. Throws io::InputError if it is not there: "no WHAT has been

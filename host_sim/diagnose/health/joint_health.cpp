@@ -62,7 +62,7 @@ std::optional<Evidence> MeanOf(const client::ResidualBin& b, int direction, cons
   return e;
 }
 
-// Visits the bins that `a` and `b` both have.
+// Visits each bin with its first rows, its latest rows and its direction.
 template <class Visit>
 void ForEachBin(const client::JointResiduals& joint, const Visit& visit) {
   for (int s = 0; s < link::reg::kResidualSignals; ++s)
@@ -140,7 +140,7 @@ constexpr double kExplained = 0.7;     // of the change; terms that leave more t
 constexpr double kCorrelatedRows = 8;  // in a row: a residual that is not white turns slower than samples come
 constexpr double kGrowthSigmas = 4;
 
-// More than chance and more than is worth speaking of.
+// The residual grew by more than chance explains, and by enough to be reported.
 bool Grew(const Overall& then, const Overall& now, double smallest_Nm) {
   const auto variance = [](const Overall& o) { return 2 * kCorrelatedRows * o.mean_square * o.mean_square / o.rows; };
   const double growth = now.mean_square - then.mean_square;

@@ -45,8 +45,9 @@ std::optional<Onset> FindOnset(const std::vector<client::ResidualSlice>& slices,
 
 JointHealth Judge(const client::JointResiduals& joint);
 
-// Joints, from 1, that no longer fit for the load's sake (gain, offset, torque by position, or untold, but no friction)
-// and whose onsets may be one: what another payload or a tilted base does. Empty unless there are two at least.
+// Joints, counted from 1, that may no longer fit for one common reason, such as another payload or a tilted base. Their
+// changes look like gain, offset or torque by position, or cannot be told, and may have begun at the same time. Empty
+// unless there are at least two.
 std::vector<int> ChangedTogether(const std::vector<JointHealth>& joints);
 
 }  // namespace armcal::health

@@ -33,8 +33,8 @@ struct DriveOptions {
 
 // Two threads as on a target: the tick (signal path, feed-forward, trace, push) and the background (link, table,
 // estimators). They meet only in lib's ring and mailboxes and in atomics of the player. Without --real-time virtual
-// time waits for the background to keep up and stands still while nothing moves; that is the simulator's privilege,
-// never lib's.
+// time waits for the background to keep up, and stands still while nothing moves. Only a simulator may do that; lib
+// never waits.
 template <class Model>
 class Drive {
  public:

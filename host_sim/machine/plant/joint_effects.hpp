@@ -1,6 +1,6 @@
 // plant - describes what happens in a joint beyond Coulomb and viscous friction.
 //
-// Deliberately not the forms that the estimator's effect records use: a record has to find the physics, not itself.
+// On purpose these are not the forms that the effect records use: a record has to find the physics, not itself.
 // Rotary units; for a prismatic joint read N, m, m/s.
 #pragma once
 

@@ -21,14 +21,15 @@ std::uint32_t Crc32(const std::string& text) {
 
 std::string At(const std::string& array, int index) { return array + "[" + std::to_string(index) + "]"; }
 
-// What is zero everywhere is not written: its place starts as zero.
+// An entry that is always zero is not written. Its place holds zero from the start.
 void Assign(std::vector<Assignment>& out, const std::string& array, int index, Expr value,
             const std::string& heading = "") {
   if (!value.IsZero()) out.push_back({At(array, index), value, heading});
 }
 
-// Column by column, the joint nearest to the body first: what one column's rows share is then alive for a short while
-// only, and the screws of the joints before are carried outward as late as can be.
+// The rows are written column by column, and within a column from the joint nearest to the body inward. Values that
+// the rows of one column share are then needed for a short time only, and few of them are alive at once. The screw of
+// an inner joint is carried outward as late as possible.
 std::vector<Assignment> RegressorAssignments(const Model& m) {
   std::vector<Assignment> out;
   for (int d = 0; d < m.dense(); ++d)

@@ -22,7 +22,7 @@ inline Eigen::Matrix3d Symmetric(const std::array<double, 6>& i) {
   return Symmetric(i[0], i[1], i[2], i[3], i[4], i[5]);
 }
 
-// As seen from the frame in which the body's own one has this pose.
+// The same body in another frame. The pose is that of the body's present frame, seen from the other one.
 inline Body Moved(const Eigen::Isometry3d& pose, const Body& body) {
   return {body.mass, pose * body.center, pose.linear() * body.inertia * pose.linear().transpose()};
 }

@@ -33,7 +33,7 @@ struct Motor {
   double rotor_inertia_kgm2 = 0;         // motor shaft
 };
 
-// For prismatic joints read m, m/s, N for rad, rad/s, N m.
+// Units are those of a revolute joint: rad, rad/s, N m. For a prismatic joint they are m, m/s, N.
 struct Joint {
   std::string name;
   JointKinematics kinematics;

@@ -22,16 +22,19 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kLowest_Hz = 20;  // an arm's motion lies below; how far below, its position shows
-constexpr double kAboveMotion =
-    1.5;                            // of the motion's band: the filter takes 4 % of what is seen there, and less below
-constexpr double kHighest_Hz = 60;  // above, the current loop no longer follows
-constexpr double kHighestOfRate = 0.4;   // the filter needs room below half the rate
-constexpr double kShareOfJitter = 0.07;  // encoder noise adds 0.25 % to the torque's noise power at this share
-constexpr double kShareOfWidth =
-    0.05;                           // friction is a hundred times the noise, and a slow joint is within the width often
-constexpr double kEdgePeriods = 3;  // of the lowest cut-off that are not settled at an end
-constexpr double kWideGap = 5;      // sample times over which a spline may still bridge
+// An arm's motion lies below this frequency. Its position shows how far below.
+constexpr double kLowest_Hz = 20;
+// Cut-off over the motion's band. The filter then removes 4 % of a signal at the edge of the band, and less below it.
+constexpr double kAboveMotion = 1.5;
+constexpr double kHighest_Hz = 60;      // above, the current loop no longer follows
+constexpr double kHighestOfRate = 0.4;  // the filter needs room below half the rate
+// Torque from encoder noise, as a share of the torque's own jitter. It then adds 0.25 % to the noise power.
+constexpr double kShareOfJitter = 0.07;
+// Noise of the speed, as a share of the speed over which friction changes its sign. Friction is a hundred times the
+// torque's noise, and a slow joint is often within that speed.
+constexpr double kShareOfWidth = 0.05;
+constexpr double kEdgePeriods = 3;       // periods of the lowest cut-off at each end that are not settled
+constexpr double kWideGap = 5;           // sample times over which a spline may still bridge
 constexpr double kIrregular = 1e-4;      // time jitter over sample time below which a grid counts as uniform
 constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
 

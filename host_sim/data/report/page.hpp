@@ -12,7 +12,7 @@
 
 namespace armcal::report {
 
-// A box that is seen first.
+// The colour of a box that a reader sees first.
 enum class Tone { kNeutral, kGood, kWarning };
 
 // The page is written from top to bottom. All text is escaped. Light and dark follow the reader's system; print is

@@ -15,7 +15,7 @@ struct Dataset {
   Eigen::MatrixXd tau;        // [N x n] measured torque minus known external torque
   Eigen::MatrixXi moving;     // [N x n] 1: |qd| > v_min of that joint
   Eigen::MatrixXi used;       // [N x n] 1: row may be fitted (moving, signals settled, drive did not flag it)
-  Eigen::VectorXi scored;     // [N] 1: not within 0.5 s of an end of the log
+  Eigen::VectorXi scored;     // [N] 1: at least 0.5 s away from both ends of the log
   Eigen::VectorXd cutoff_Hz;  // [n]
   Eigen::MatrixXd reference;  // [N x n] commanded position; empty where the log has none
   std::string source;
@@ -33,7 +33,7 @@ Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& 
 // Root mean square of residual[:, j] over scored samples of each joint; moving_only: where that joint moves.
 Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only);
 
-// Commanded positions by the log's name; empty unless every log has them.
+// Commanded positions of each log, by the log's name. Empty if a log has none.
 std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& data);
 
 std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data);

@@ -13,7 +13,7 @@ struct Linearised {
 };
 Linearised Linearise(const Problem& problem, const Eigen::VectorXd& z);
 
-// Largest change of a coordinate, in its standard deviations, of a method that has settled.
+// A method has settled when no coordinate changes by more than this share of its standard deviation.
 inline constexpr double kSettled = 1e-3;
 
 // Coordinates that a method may move: rigid columns, columns whose state is "estimated", eta that has a range.
@@ -24,7 +24,8 @@ std::vector<int> FreeCoordinates(const Problem& problem);
 Eigen::VectorXd SolveRegularised(const Problem& problem, const Eigen::MatrixXd& gram, const Eigen::VectorXd& right,
                                  Eigen::MatrixXd* covariance);
 
-// L with L L' = P over the free coordinates (rows of the others are zero): z = start + L w, w of unit covariance.
+// A matrix L with L L' = P over the free coordinates; rows of the other ones are zero. Then z = start + L w, where w
+// has unit covariance.
 Eigen::MatrixXd PriorFactor(const Problem& problem);
 
 // Cuts eta to [lower, upper], since the prior's Gaussian may reach beyond the range for which eta's functions are made.

@@ -10,7 +10,7 @@
 namespace armcal::plant {
 namespace {
 
-constexpr int kMostJoints = 16;  // only a bound for the message; Arm compares with the robot
+constexpr int kMostJoints = 16;  // an upper bound for any robot; Arm checks the number of this robot
 
 // A factor 1 - spread must stay positive, or friction and torque constants could vanish.
 double ReadSpread(const io::TomlReader& keys, const std::string& key, double fallback) {

@@ -1,8 +1,10 @@
-// estimator - from the prior of the bodies to that of the base parameters b = B phi, and back from base to bodies.
+// estimator - maps the prior of the bodies to the prior of the base parameters b = B phi, and base parameters to
+// bodies.
 //
 // The prior of a body is Gaussian in (m, c, I about the centre, rotor inertia): phi ~ phi0 + J S xi with xi ~ N(0, 1),
 // J = d(m, mc, Io) / d(m, c, Ic) at the mean, and S = diag(sd). In base coordinates, b - b0 = W xi with W = B J S. W is
-// factored as W = U w~ with w~ w~' = D. Then the Kalman read-out of the bodies,
+// factored as W = U w~, where U is unit upper triangular and w~ w~' = D is diagonal. Then the Kalman read-out of the
+// bodies,
 //   phi = phi0 + P0 B' (B P0 B')^-1 (b - b0), is phi0 + J S w~' D^-1 U^-1 (b - b0).
 // T: float on the target, double on a PC. Context: background.
 #pragma once

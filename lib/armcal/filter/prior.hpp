@@ -21,15 +21,15 @@ struct Prior {
   static constexpr int kStates = Layout::kColumns + Layout::kNonlinear;
   float dense_ud[math::UdSize(Layout::kDense)] = {};  // correlation of the dense columns as U D U'
   std::uint32_t active[kStates] = {};                 // all ones: the column has uncertainty; 0: fixed or standby
-  bool considered[kStates] = {};                      // its uncertainty counts, it is not updated (Kalman form)
+  bool considered[kStates] = {};                      // its uncertainty counts, but no row changes it (Kalman form)
   bool any_considered = false;
   float lambda[kStates] = {};  // forgetting per sample, in (0, 1] (forgetting form)
   float noise[kStates] = {};   // variance per sample, prior units (Kalman form)
-  float link_floor = 0.0f;     // D of dense columns never falls below (Kalman form)
-  float gate_sigma = 0.0f;     // innovations beyond are not used; 0: no gate (Kalman form)
+  float link_floor = 0.0f;     // the smallest D that a dense column may have (Kalman form)
+  float gate_sigma = 0.0f;     // a row with a larger innovation is not used; 0: no gate (Kalman form)
 };
 
-// The joint of a front column, or kJoints for any other column. The same instructions for all.
+// The joint of a front column, or kJoints for any other column. It takes the same instructions for every column.
 template <class Layout>
 constexpr int JointOf(int column) {
   int joint = 0;

@@ -9,7 +9,7 @@
 // Three contexts call it. Each public function says which one it belongs to ("Context: ...").
 //   tick              an interrupt, usually every millisecond: FeedForward, then Push. Bounded time, whatever is
 //                     measured. It never waits.
-//   serial interrupt  your driver puts bytes into a ring. It calls nothing of the library.
+//   serial interrupt  your driver moves bytes between the line and its rings. It calls nothing of the library.
 //   background        everything else, in slices of bounded length. The two interrupts may stop a slice anywhere.
 //
 // Use. `storage`, `clock` and `serial` are yours; port/PORTING.md says what they must do. README.md has this as a whole
@@ -34,7 +34,7 @@
 //   filter/*_filter.hpp            the filters, and what each is good for
 //   feedforward/feed_forward.hpp   the torque alone
 //   model/contract.hpp             what a generated model consists of
-//   core/status.hpp                the one type of answer that every call gives
+//   core/status.hpp                the answer of each call that can be refused
 // DESIGN.md says why things are as they are, SPEC.md has every bit on the wire and in storage.
 #pragma once
 

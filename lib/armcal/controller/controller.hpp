@@ -50,8 +50,8 @@ class Controller {
   Controller(const Controller&) = delete;
 
   // Call it once, before the first tick. Without a valid table in storage, the estimators start from the model's
-  // defaults, and feed-forward stays off. Answers as table::TableStore::Load; a register serves that answer, too. A
-  // status of link::RegisterMap::Add means a wrong map. Context: background.
+  // defaults, and feed-forward stays off. Answers as link::TableTransaction::Boot; a register serves that answer, too.
+  // A status of link::RegisterMap::Add means a wrong map. Context: background.
   core::Status Boot() {
     const core::Status served = Serve(std::make_index_sequence<kFilters>());
     if (!core::IsOk(served)) return served;
@@ -64,7 +64,7 @@ class Controller {
     return stored;
   }
 
-  // Which axes are under control, a bit each. While there is one, only a bumpless table is adopted. Context: any.
+  // Which axes are under control, a bit each. While an axis is enabled, only a bumpless table is adopted. Context: any.
   void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
 
   // Lets a client record what Push and FeedForward were given. `ring` must live as long as this object. Call it once,

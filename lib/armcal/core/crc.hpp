@@ -7,7 +7,7 @@
 namespace armcal::core {
 
 namespace crc {
-// Tables of sixteen entries, for half a byte at a time: 64 + 32 bytes of flash instead of 1 KB each.
+// Tables of sixteen entries, for half a byte at a time: 64 + 32 bytes of flash instead of 1024 + 512.
 struct Tables {
   std::uint32_t ieee[16];
   std::uint16_t modbus[16];

@@ -1,4 +1,4 @@
-// core - the answer that every call gives.
+// core - the answer of each call that can be refused.
 // A client can read the numbers (SPEC.md), so a number never changes its meaning.
 #pragma once
 
@@ -6,8 +6,9 @@
 
 namespace armcal::core {
 
-// 0: ok. 1-31: refused because of what the caller gave. 32-63: fault of a device or a partner. 64-95: limited, that is,
-// done, but held back. Unless it is ok or limited, the object that answered is the same as before the call.
+// 0: ok. 1-31: refused because of what the caller gave. 32-63: fault of a device or a partner. 64-95: limited, that
+// is, carried out in part: a value was cut, or an update was not taken. A refused call changes nothing, unless the
+// comment of the function says what it changes.
 enum class [[nodiscard]] Status : std::uint8_t{
     kOk = 0,
     kNotFinite = 1,      // a number is NaN or infinite

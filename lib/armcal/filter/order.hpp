@@ -14,7 +14,7 @@ namespace armcal::filter {
 
 enum class Form : std::uint8_t {
   kDense,  // any column may have process noise or be considered
-  kBlock   // process noise on front columns only, none considered; half the instructions, a quarter less memory
+  kBlock   // process noise on front columns only, none considered; a third fewer instructions, a quarter less memory
 };
 
 // Which columns a filter has beside the layout's [front, dense]. They are numbered from Layout::kColumns on.

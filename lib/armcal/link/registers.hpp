@@ -200,7 +200,7 @@ inline constexpr Register kResidualHistory = In(0x1408, kResidualSliceValues, kF
 inline constexpr Span kResidualHeaderBlock = Between(kResidualJoint, kResidualSigma);
 inline constexpr Span kResidualValuesBlock = Between(kResidualReference, kResidualHistory);
 
-// A page of a trace: a header, then records. In two names "arm" means the recording; programs read them, so they stay.
+// A page of a trace: a header, then records. The names trace0_arm and trace0_arm_number mean the recording. Programs use them, so they stay.
 inline constexpr Register kTraceFirstRecord = Twice(In(0x4000, 1, kU32, "trace0_first_record", "", "number of the page's first record, counted from the start of the recording"), "trace1_first_record", kPageStride);
 inline constexpr Register kTraceFirstTick = Twice(In(0x4002, 1, kU32, "trace0_first_tick", "", "its tick (first tick of its window)"), "trace1_first_tick", kPageStride);
 inline constexpr Register kTraceTickStep = Twice(In(0x4004, 1, kU32, "trace0_tick_step", "", "ticks from record to record inside the page"), "trace1_tick_step", kPageStride);

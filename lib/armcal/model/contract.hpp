@@ -27,7 +27,8 @@
 //   ready
 //
 // Functions. x: ModelInput<T, n>. committed[kColumns]: the committed parameters; only columns that depend on parameters
-// read them. eta[kNonlinear]. The code is straight-line: no branch, no call. Float in, float out. Context: any.
+// read them. eta[kNonlinear]. No branch depends on data. Only math functions are called. Float in, float out. Context:
+// any.
 //
 //   template <class T> static void InitialState(x, committed, eta, T* state);
 //     state[kStates] at the first sample of a stretch, x being that sample. Sensitivities start at zero.
@@ -50,7 +51,7 @@ namespace armcal::model {
 // State of a parameter in the table.
 enum class ParameterState : std::uint8_t {
   kEstimated = 0,
-  kConsidered = 1,  // its uncertainty counts, it is not updated (Kalman forms only)
+  kConsidered = 1,  // its uncertainty counts, it is not updated (dense Kalman form)
   kFixed = 2,       // its torque is subtracted, its column zeroed
   kStandby = 3,     // compiled in, but its amplitude is zero and its column is zeroed
 };

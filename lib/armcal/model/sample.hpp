@@ -21,8 +21,8 @@ struct RawSample {
 };
 
 // Flags of one joint in a Sample.
-inline constexpr std::uint8_t kValid = 1;   // enabled, not saturated, not stale over the whole window
-inline constexpr std::uint8_t kMoving = 2;  // |qd| above v_min and of one sign over the whole window
+inline constexpr std::uint8_t kValid = 1;   // enabled and not saturated in all five windows, no axis stale
+inline constexpr std::uint8_t kMoving = 2;  // |qd| above v_min and of one sign in all five windows
 inline constexpr std::uint8_t kUsed = 4;    // set by the estimator: this row updated the estimate
 
 // One estimator sample. All quantities belong to one instant: the middle of the averaging window whose first tick is

@@ -34,8 +34,8 @@ class MapReadOut {
   using Result = MapResult<Layout, T>;
 
   // x [kColumns]: the filter's mean in prior units, prior included. warm: start at the last solution with the last eps;
-  // only if the prior is the same. kUnphysical: see MapArm::Start. kNotFinite: x is not. On refusal the object is as
-  // before.
+  // only if the prior is the same. kUnphysical: see MapArm::Start. kNotFinite: x is not finite. On refusal the object
+  // is as before.
   core::Status Begin(const MapPrior<Layout>& prior, const float* x, bool warm = false) {
     bool good = true;
     for (int k = 0; k < kColumns; ++k) good &= math::IsFinite(x[k]);

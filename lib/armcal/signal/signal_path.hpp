@@ -33,7 +33,7 @@ struct Settings {
 // the centre window. Sample::tick is the FIRST tick of the centre window; all quantities belong to the instant
 // (kSampleTicks - 1) / 2 ticks later. A window starts where tick % kSampleTicks == 0. Differences are taken in integers
 // before any float. Limit: counts over five windows x kSampleTicks < 2^31.
-// Context of every call: tick. The time is constant, but a tick that completes a window takes longer than the others.
+// Context of every call: tick. The time does not depend on the data. Each tick that completes a window takes longer.
 template <int n, int kSampleTicks>
 class SignalPath {
  public:

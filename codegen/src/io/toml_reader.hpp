@@ -124,8 +124,9 @@ class TomlReader {
   // A misspelt key is an error, not a silence.
   void AllowOnly(std::span<const std::string_view> keys, std::span<const std::string_view> more = {}) const {
     for (const auto& [k, v] : table_) {
-      const auto known = [&](auto list) { return std::find(list.begin(), list.end(), k.str()) != list.end(); };
-      if (!known(keys) && !known(more)) Fail(k.str(), "no such key here");
+      const std::string_view key = k.str();
+      const auto known = [key](auto list) { return std::find(list.begin(), list.end(), key) != list.end(); };
+      if (!known(keys) && !known(more)) Fail(key, "no such key here");
     }
   }
   void AllowOnly(std::initializer_list<std::string_view> keys) const {

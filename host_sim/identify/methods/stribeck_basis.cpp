@@ -126,7 +126,7 @@ Reduced Reduce(const Problem& problem, const std::vector<Law>& laws) {
 class ReadOut {
  public:
   ReadOut(const Problem& problem, const std::vector<Law>& laws, const Reduced& reduced)
-      : problem_(problem), laws_(laws), reduced_(reduced) {
+      : laws_(laws), reduced_(reduced) {
     const auto count = static_cast<Eigen::Index>(3 * laws.size());
     start_.resize(count), information_.setZero(count), lower_.resize(count), upper_.resize(count);
     const std::vector<int> free = FreeCoordinates(problem);
@@ -201,7 +201,6 @@ class ReadOut {
   }
 
  private:
-  const Problem& problem_;
   const std::vector<Law>& laws_;
   const Reduced& reduced_;
   VectorXd start_, information_, lower_, upper_;

@@ -154,7 +154,7 @@ std::vector<std::string> CheckFirstLines(const fs::path& top) {
     const std::string room = first.rfind("// ", 0) == 0 && dash != first.npos ? first.substr(3, dash - 3) : "";
     const std::string expected = fs::path(name).parent_path().filename().string();
     const bool fits = name.rfind("tests/", 0) == 0 ? !room.empty() : room.find(expected) != room.npos;
-    if (!fits) found.push_back(At(name, 0, "the first line must be \"// " + expected + " - what it knows\""));
+    if (!fits) found.push_back(At(name, 0, "the first line must be \"// " + expected + " - what the file is for\""));
   });
   return found;
 }

@@ -143,7 +143,7 @@ TEST(Rooms, FirmwareRooms_UseNoHeaderThatBringsAHeapOrAStream) {
   EXPECT_TRUE(found.empty()) << Lines(found);
 }
 
-TEST(Rooms, FirstLine_SaysTheRoomAndWhatItKnows) {
+TEST(Rooms, FirstLine_SaysTheRoomAndWhatTheFileIsFor) {
   const auto found = CheckFirstLines(Top());
   EXPECT_TRUE(found.empty()) << Lines(found);
 }

@@ -80,11 +80,11 @@ Expr Model::QuantityOf(const InputId& id) {
     case Quantity::kGravityTorque:
       return CommittedTorque(gravity_rows_, id.row);
     case Quantity::kBodyColumn: {  // about the file's frame: slid parameters = S parameters, a sum of slid columns
-      if (!slide_.size()) slide_ = SlideMap(robot_);
+      const Eigen::MatrixXd slide = SlideMap(robot_);
       const int first = kBodyBlock * id.body;
       Expr sum = graph_->Constant(0);
       for (int k = 0; k < kBodyBlock; ++k)
-        sum = sum + slide_(first + k, first + id.parameter) * body_rows_[id.row][first + k];
+        sum = sum + slide(first + k, first + id.parameter) * body_rows_[id.row][first + k];
       return sum;
     }
     case Quantity::kMassMatrix:

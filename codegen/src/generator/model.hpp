@@ -114,7 +114,6 @@ class Model {
   Robot robot_;
   std::unique_ptr<Graph> graph_ = std::make_unique<Graph>();
   BaseParameters base_;
-  Eigen::MatrixXd slide_;  // SlideMap, once something asks for it
   int front_ = 0, rigid_ = 0, dense_ = 0;
   std::vector<int> front_begin_, row_begin_, column_joint_;
   Catalogue record_;  // those in use; effect_ points into it

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
@@ -49,8 +50,9 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   run->model = std::make_unique<codegen::Model>(codegen::ReadRobot(RobotPath(o.robot)), run->catalogue);
   const codegen::Model& model = *run->model;
   const LogReader read(model, o.channels, o.cutoff_Hz);
-  run->train = read.All(o.train);
-  const std::vector<calibration::Dataset> narrow = read.Narrow(o.train);
+  for (const calibration::Dataset& log : read.All(o.train)) run->train.push_back(calibration::ThinToBand(log));
+  std::vector<calibration::Dataset> narrow;
+  for (const calibration::Dataset& log : read.Narrow(o.train)) narrow.push_back(calibration::ThinToBand(log));
   const auto start = std::chrono::steady_clock::now();
   run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, calibration::Pointers(run->train),
                                                           calibration::Pointers(narrow));
@@ -85,7 +87,12 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   nlohmann::ordered_json& json = run->json;
   json = verdict::DiagnosisJson(run->view);
   json["provenance"] = provenance;
-  for (const calibration::Dataset& log : run->train) json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
+  for (const calibration::Dataset& log : run->train) {
+    json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
+    nlohmann::ordered_json& bands = json["band_Hz"].emplace_back(nlohmann::ordered_json::array());
+    for (const double band_Hz : log.band_Hz)
+      bands.push_back(std::isfinite(band_Hz) ? nlohmann::ordered_json(band_Hz) : nlohmann::ordered_json());
+  }
   if (!o.model_out.empty()) {
     // The same schema: a table can switch the terms on. Another one: the model must be generated and the drive built.
     const codegen::Model next(codegen::ReadRobot(o.model_out), run->catalogue);

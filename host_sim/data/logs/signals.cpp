@@ -24,6 +24,7 @@ using Eigen::VectorXd;
 
 // An arm's motion lies below this frequency. Its position shows how far below.
 constexpr double kLowest_Hz = 20;
+constexpr double kSlowest_Hz = 2;  // a lower cut-off would take seconds to settle at either end of a log
 // Cut-off over the motion's band. The filter then removes 4 % of a signal at the edge of the band, and less below it.
 constexpr double kAboveMotion = 1.5;
 constexpr double kHighest_Hz = 60;      // above, the current loop no longer follows
@@ -148,7 +149,7 @@ JointNoise EstimateNoise(const Log& log, int joint) {
   return {noise, NoiseUnderSmooth(tau, 2), MotionBand_Hz(even, noise, rate_Hz)};
 }
 
-double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, double sign_width_radps) {
+double QuietCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, double sign_width_radps) {
   // White noise s in q has the density 2 s^2 / rate; through gain 1 / (1 + (f/c)^8) and k derivatives its variance is
   // s^2 (2 pi)^2k c^(2k + 1) (2 / rate) times the integral of x^2k / (1 + x^8)^2 over x > 0.
   constexpr double kIntegral[] = {0.2657, 0.1594};  // of one derivative, of two
@@ -160,7 +161,12 @@ double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, 
   double cutoff_Hz = highest_Hz;
   if (torque > 0) cutoff_Hz = std::min(cutoff_Hz, std::pow(kShareOfJitter * noise.torque_Nm / torque, 2.0 / 5));
   if (speed > 0) cutoff_Hz = std::min(cutoff_Hz, std::pow(kShareOfWidth * sign_width_radps / speed, 2.0 / 3));
-  return std::min(std::max(cutoff_Hz, std::min(kLowest_Hz, kAboveMotion * noise.band_Hz)), highest_Hz);
+  return std::min(std::max(cutoff_Hz, kSlowest_Hz), highest_Hz);
+}
+
+double MotionCutoff_Hz(const JointNoise& noise, double rate_Hz) {
+  const double motion_Hz = noise.band_Hz > 0 ? kAboveMotion * noise.band_Hz : kLowest_Hz;
+  return std::min({std::max(motion_Hz, kSlowest_Hz), kLowest_Hz, kHighestOfRate * rate_Hz});
 }
 
 // What the user has set.
@@ -178,8 +184,7 @@ static VectorXd SetCutoffs_Hz(const Log& log, const Bandwidth& bandwidth) {
   return VectorXd::Constant(log.joints, cutoff_Hz);
 }
 
-// The most sensitive of the joints' torques decides.
-static VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity) {
+VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity) {
   const double rate_Hz = 1 / log.step_s();
   std::vector<JointNoise> noise;
   for (int j = 0; j < log.joints; ++j) noise.push_back(EstimateNoise(log, j));
@@ -188,8 +193,9 @@ static VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity)
     const double width = sensitivity.sign_width_radps.size() ? sensitivity.sign_width_radps[j] : INFINITY;
     for (int row = 0; row < log.joints; ++row) {
       const JointNoise seen{noise[j].position_rad, noise[row].torque_Nm, noise[j].band_Hz};
-      out[j] = std::min(out[j], ChooseCutoff_Hz(seen, std::abs(sensitivity.inertia(row, j)), rate_Hz, width));
+      out[j] = std::min(out[j], QuietCutoff_Hz(seen, std::abs(sensitivity.inertia(row, j)), rate_Hz, width));
     }
+    out[j] = std::max(out[j], MotionCutoff_Hz(noise[j], rate_Hz));
   }
   return out;
 }
@@ -206,8 +212,9 @@ Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const 
   out.q = log.q;
   out.qd = out.qdd = Eigen::MatrixXd::Zero(log.samples(), log.joints);
   out.settled = Eigen::VectorXi::Zero(log.samples());
-  out.cutoff_Hz = bandwidth.cutoff_Hz > 0 ? SetCutoffs_Hz(log, bandwidth)
-                                          : VectorXd(ChooseCutoffs_Hz(log, sensitivity) * bandwidth.scale);
+  if (bandwidth.each_Hz.size()) out.cutoff_Hz = bandwidth.each_Hz * bandwidth.scale;
+  else if (bandwidth.cutoff_Hz > 0) out.cutoff_Hz = SetCutoffs_Hz(log, bandwidth);
+  else out.cutoff_Hz = ChooseCutoffs_Hz(log, sensitivity) * bandwidth.scale;
   for (const Piece& piece : Pieces(log)) {
     if (piece.count < QuinticSpline::kMinSamples) continue;
     DerivePiece(log.t.segment(piece.first, piece.count), log.q.middleRows(piece.first, piece.count), piece, out);

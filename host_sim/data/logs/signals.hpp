@@ -31,23 +31,32 @@ struct Sensitivity {
 };
 
 // The highest cut-off below 60 Hz and 0.4 of the sample rate at which inertia x (noise of qdd that the encoder causes)
-// stays below 0.07 of the torque's jitter and the noise of qd below 0.05 of the speed over which friction changes sign;
-// but not below 20 Hz or, where that is less, 1.5 times the motion's band. inertia: joint side, kg m^2 (kg).
-double ChooseCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz,
-                       double sign_width_radps = std::numeric_limits<double>::infinity());
+// stays below 0.07 of the torque's jitter and the noise of qd below 0.05 of the speed over which friction changes sign.
+// inertia: joint side, kg m^2 (kg).
+double QuietCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz,
+                      double sign_width_radps = std::numeric_limits<double>::infinity());
+
+// Not below this cut-off is a joint's motion filtered: 20 Hz or, where that is less, 1.5 times the motion's band, but
+// at least 2 Hz. A joint that stands has no band of its own.
+double MotionCutoff_Hz(const JointNoise& noise, double rate_Hz);
 
 // The cut-off of all joints: chosen for each, or the user's own.
 struct Bandwidth {
-  double cutoff_Hz = 0;  // 0: ChooseCutoff_Hz
-  double scale = 1;      // multiplies either: 0.62 shows which findings depend on it
+  double cutoff_Hz = 0;          // 0: ChooseCutoffs_Hz
+  double scale = 1;              // multiplies either: 0.62 shows which findings depend on it
+  Eigen::VectorXd each_Hz = {};  // [n] one a joint, instead of either
 };
 
 // q through a zero-phase Butterworth of order 4 (run forward and backward), then derivatives of a quintic spline.
 // An irregular grid is resampled by a quintic spline first. Positions are never carried across a gap of more than five
 // sample times; a piece too short for the spline keeps its q and has zero derivatives (settled = 0).
-// One joint's acceleration is in every joint's torque: the most sensitive one decides. InputError: wrong number of
+// InputError: wrong number of
 // inertias, fewer than 8 samples, a cut-off from half the sample rate on or so low that no sample is settled.
 Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const Bandwidth& bandwidth = {});
+
+// [n] Of each joint the quiet cut-off, or the motion's where that is higher. One joint's acceleration is in every
+// joint's torque: the most sensitive one decides.
+Eigen::VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity);
 
 // The frequency [Hz] above which evenly sampled q shows less power than white noise of this standard deviation would.
 // Welch's periodogram of the second difference. 0 if q only holds noise;

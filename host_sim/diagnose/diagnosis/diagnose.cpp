@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kMaxTerms = 4;
+constexpr int kMaxTerms = 16;  // far beyond what logs have shown: the search must end
 constexpr double kTried = 10;  // members of a usual grid, for what would just have been seen
 
 // Delays the logs by what the latest term says of them.
@@ -237,7 +237,7 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const Vecto
     if ((why = Worse(*c, after, before))) return &*c;
     const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
     if (others.empty() || c->delay_s != 0) continue;
-    if ((why = Worse(*c, after, calibration::Rms(log, Leaves(w, others, log), true)))) {
+    if ((why = Worse(*c, after, calibration::RmsInBand(log, Leaves(w, others, log))))) {
       why->beside_others = true;
       return &*c;
     }
@@ -269,14 +269,14 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   Work& w = *work_;
   HeldOut out;
   out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
-  const VectorXd before = calibration::Rms(test, out.before, true);
+  const VectorXd before = calibration::RmsInBand(test, out.before);
   std::vector<std::optional<Refutation>> why;
   for (const Term& t : finding_.terms) why.push_back(t.refuted);
   for (;;) {
     out.after = Leaves(w, Confirmed(w.chosen), test, &out.tracking);
     Work::Estimate with_all = w.estimate;
     std::optional<Refutation> reason;
-    Chosen* refuted = Refuted(w, test, before, calibration::Rms(test, out.after, true), reason);
+    Chosen* refuted = Refuted(w, test, before, calibration::RmsInBand(test, out.after), reason);
     w.estimate = std::move(with_all);
     if (!refuted) break;
     const auto at = refuted - w.chosen.data();

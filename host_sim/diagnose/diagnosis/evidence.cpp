@@ -28,14 +28,8 @@ Columns Gather(const Candidate& candidate, const std::vector<Quantities>& logs, 
     candidate.Evaluate(logs[log], eta, value);
     for (std::size_t r = 0; r < out.joints.size(); ++r) {
       const RowIndex& index = rows[out.joints[r]];
-      const auto [first, last] = std::equal_range(index.dataset.begin(), index.dataset.end(), static_cast<int>(log));
-      const auto begin = first - index.dataset.begin(), end = last - index.dataset.begin();
-      for (int c = 0; c < candidate.columns(eta); ++c) {
-        const VectorXd& v = value[c][r];
-        if (v.size() == 0) continue;
-        double* const to = out.block[r].col(c).data();
-        for (auto k = begin; k < end; ++k) to[k] = v[index.sample[static_cast<std::size_t>(k)]];
-      }
+      for (int c = 0; c < candidate.columns(eta); ++c)
+        if (const VectorXd& v = value[c][r]; v.size()) index.Take(static_cast<int>(log), v, out.block[r].col(c));
     }
   }
   return out;
@@ -71,7 +65,9 @@ Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, cons
 }
 
 Thinned::Thinned(const Evidence& evidence, int rows) : all(evidence) {
-  for (const Quantities& log : evidence.logs) every = std::max(every, log.data->samples() / rows);
+  const auto averaged = [](const RowIndex& each) { return each.averaged(); };
+  if (std::none_of(evidence.index.begin(), evidence.index.end(), averaged))  // those rows are few already
+    for (const Quantities& log : evidence.logs) every = std::max(every, log.data->samples() / rows);
   every |= 1;  // odd: a sample in the middle
   reach = std::min(every / 2, static_cast<int>(0.5 * kSmooth_s / evidence.logs[0].dt[0]));
   for (const Quantities& log : evidence.logs) {
@@ -80,6 +76,11 @@ Thinned::Thinned(const Evidence& evidence, int rows) : all(evidence) {
   }
   for (const RowIndex& from : evidence.index) {
     kept.emplace_back(), index.emplace_back();
+    if (every == 1) {
+      index.back() = from;
+      for (int k = 0; k < from.size(); ++k) kept.back().push_back(k);
+      continue;
+    }
     for (int k = 0; k < from.size(); ++k) {
       if (from.sample[k] % every || !IsWhole(from, k, reach)) continue;
       kept.back().push_back(k);
@@ -108,7 +109,7 @@ MatrixXd Thinned::AverageRows(const MatrixXd& m, int j) const {
 
 BaseRows Thinned::Average(const BaseRows& from) const {
   BaseRows out;
-  out.columns = from.columns, out.informative = from.informative, out.L = from.L, out.mean = from.mean;
+  out.columns = from.columns, out.L = from.L, out.mean = from.mean;
   out.precision = from.precision;
   out.index = index;
   for (int j = 0; j < from.joints(); ++j) {
@@ -120,7 +121,8 @@ BaseRows Thinned::Average(const BaseRows& from) const {
 }
 
 namespace {
-constexpr int kFewRows = 200;  // of a joint: too few for terms beside the base
+// Of a joint: too few for terms beside the base. Averages are independent, samples hang together.
+constexpr int kFewRows = 200, kFewAverages = 100;
 constexpr double kSlow = 0.1;  // of the fastest that was seen is low speed, of the joint's limit is high speed
 constexpr int kFewSlowRows = 30;
 constexpr double kAboveStiction = 5;  // times v_min: a log that only creeps has no low speed to compare
@@ -155,7 +157,7 @@ bool IsExcited(const Candidate& candidate, const Evidence& evidence) {
   const int j = candidate.joints().empty() ? candidate.rows().back() : candidate.joints()[0];
   const auto& joint = evidence.model->robot().joint[j];
   const int rows = evidence.index[j].size();
-  if (rows < kFewRows) return false;
+  if (rows < (evidence.index[j].averaged() ? kFewAverages : kFewRows)) return false;
   for (const std::string& need : candidate.record().needs) {
     if (need == "low_speed" || need == "high_speed") {
       const VectorXd v = OwnSignal(candidate, evidence, "qd").cwiseAbs();

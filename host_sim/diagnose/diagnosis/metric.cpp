@@ -105,7 +105,7 @@ void Metric::Solve() {
 }
 
 MatrixXd Metric::PriorPrecision() const {
-  const MatrixXd own = (rows_.informative ? 1 : 1e-9) * MatrixXd::Identity(rows_.coordinates(), rows_.coordinates());
+  const MatrixXd own = MatrixXd::Identity(rows_.coordinates(), rows_.coordinates());
   return rows_.precision.size() == 0 ? own : MatrixXd(own + rows_.L.transpose() * rows_.precision * rows_.L);
 }
 

@@ -41,8 +41,7 @@ struct BaseRows {
   std::vector<Eigen::MatrixXd> gram;      // [n] design' design
   std::vector<Eigen::VectorXd> right;     // [n] design' target
   std::vector<Bounded> bounded;
-  bool informative = true;  // z has unit prior
-  Eigen::MatrixXd L;        // x - mean = L z
+  Eigen::MatrixXd L;  // x - mean = L z; z has unit prior
   Eigen::VectorXd mean;
   Eigen::MatrixXd precision;  // what is known of x beside the prior of z: of curves, how smooth and large; may be empty
   int joints() const { return static_cast<int>(index.size()); }

@@ -39,6 +39,24 @@ void WhitenStretch(const NoiseModel& noise, const double* v, int count, double* 
 
 }  // namespace
 
+bool RowIndex::averaged() const {
+  return std::any_of(average.begin(), average.end(), [](const Average* a) { return a != nullptr; });
+}
+
+std::pair<int, int> RowIndex::RowsOf(int log) const {
+  const auto [first, last] = std::equal_range(dataset.begin(), dataset.end(), log);
+  return {static_cast<int>(first - dataset.begin()), static_cast<int>(last - dataset.begin())};
+}
+
+void RowIndex::Take(int log, const Eigen::Ref<const VectorXd>& column, Eigen::Ref<VectorXd> rows) const {
+  const auto [first, last] = RowsOf(log);
+  const Average* const own =
+      static_cast<std::size_t>(log) < average.size() ? average[static_cast<std::size_t>(log)] : nullptr;
+  if (own) rows.segment(first, last - first) = *own * column;
+  else
+    for (int k = first; k < last; ++k) rows[k] = column[sample[static_cast<std::size_t>(k)]];
+}
+
 bool IsWhite(const NoiseModel& noise) { return noise.a.squaredNorm() == 0; }
 
 NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {

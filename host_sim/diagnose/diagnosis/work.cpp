@@ -33,6 +33,14 @@ namespace {
 bool Any(const std::set<codegen::InputId>& reads, codegen::Quantity quantity) {
   return std::any_of(reads.begin(), reads.end(), [&](const auto& input) { return input.quantity == quantity; });
 }
+// The sample with the largest weight in one row of averages.
+int MiddleSample(const RowIndex::Average& average, int row) {
+  int middle = 0;
+  double most = 0;
+  for (RowIndex::Average::InnerIterator entry(average, row); entry; ++entry)
+    if (entry.value() > most) most = entry.value(), middle = static_cast<int>(entry.col());
+  return middle;
+}
 }  // namespace
 
 Quantities MakeQuantities(const codegen::Model& model, const calibration::Dataset& data,
@@ -88,17 +96,30 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
 
 void Diagnosis::Work::IndexRows() {
   evidence.index.assign(model.joints(), {});
-  for (int j = 0; j < model.joints(); ++j)
+  for (int j = 0; j < model.joints(); ++j) {
+    RowIndex& index = evidence.index[j];
     for (std::size_t log = 0; log < train.size(); ++log) {
+      const calibration::Dataset& data = *train[log];
+      index.average.push_back(data.averaged(j) ? &data.average[static_cast<std::size_t>(j)] : nullptr);
+      double apart_s = 0.5 / data.band_Hz[j];
       int previous = -2;
-      for (int k = 0; k < train[log]->samples(); ++k) {
-        if (!train[log]->used(k, j)) continue;
-        evidence.index[j].dataset.push_back(static_cast<int>(log));
-        evidence.index[j].sample.push_back(k);
-        evidence.index[j].segment_begin.push_back(k != previous + 1);
-        previous = k;
+      const auto add = [&](int sample, bool follows) {
+        index.dataset.push_back(static_cast<int>(log));
+        index.sample.push_back(sample);
+        index.segment_begin.push_back(!follows);
+        previous = sample;
+      };
+      if (const RowIndex::Average* average = index.average.back()) {
+        for (int row = 0; row < average->rows(); ++row) {
+          const int middle = MiddleSample(*average, row);
+          add(middle, previous >= 0 && data.s.t[middle] - data.s.t[previous] < 1.5 * apart_s);
+        }
+      } else {
+        for (int k = 0; k < data.samples(); ++k)
+          if (data.used(k, j)) add(k, k == previous + 1);
       }
     }
+  }
 }
 
 void Diagnosis::Work::AlignLogs() {
@@ -185,7 +206,6 @@ void Diagnosis::Work::StartRows() {
   const int n = model.joints(), columns = model.columns(), active = static_cast<int>(declared.active.size());
   rows = BaseRows{};
   rows.index = evidence.index;
-  rows.informative = prior.informative;
   rows.columns.resize(n), rows.design.resize(n), rows.target.resize(n);
   bent.assign(n, 1);
   const VectorXd x = estimate.x.head(columns);
@@ -208,16 +228,23 @@ void Diagnosis::Work::FillDeclared(int j) {
   const int columns = model.columns();
   const RowIndex& index = rows.index[j];
   const VectorXd mean = prior.mean.head(columns);
-  std::vector<VectorXd> at_mean;
-  for (const auto& row : regressor) at_mean.push_back(row[j] * mean);
   rows.design[j].resize(index.size(), static_cast<Eigen::Index>(rows.columns[j].size()));
-  for (std::size_t i = 0; i < rows.columns[j].size(); ++i)
-    if (const int c = declared.active[rows.columns[j][i]]; c < columns)
-      for (int k = 0; k < index.size(); ++k)
-        rows.design[j](k, static_cast<Eigen::Index>(i)) = regressor[index.dataset[k]][j](index.sample[k], c);
   rows.target[j].resize(index.size());
-  for (int k = 0; k < index.size(); ++k)
-    rows.target[j][k] = train[index.dataset[k]]->tau(index.sample[k], j) - at_mean[index.dataset[k]][index.sample[k]];
+  for (std::size_t log = 0; log < train.size(); ++log) {
+    const MatrixXd& row = regressor[log][j];
+    for (std::size_t i = 0; i < rows.columns[j].size(); ++i)
+      if (const int c = declared.active[rows.columns[j][i]]; c < columns)
+        index.Take(static_cast<int>(log), row.col(c), rows.design[j].col(static_cast<Eigen::Index>(i)));
+    index.Take(static_cast<int>(log), train[log]->tau.col(j) - row * mean, rows.target[j]);
+  }
+}
+
+// The measured torque in the rows of joint j.
+VectorXd Diagnosis::Work::Measured(int j) const {
+  VectorXd out(rows.index[j].size());
+  for (std::size_t log = 0; log < train.size(); ++log)
+    rows.index[j].Take(static_cast<int>(log), train[log]->tau.col(j), out);
+  return out;
 }
 
 // The column of the joint's torque gain, its last one: the model's torque at the estimate. False if there is none.
@@ -230,9 +257,7 @@ bool Diagnosis::Work::FillGain(int j) {
     const int c = declared.active[own[static_cast<std::size_t>(i)]];
     off[i] = estimate.x[c] - prior.mean[c];
   }
-  VectorXd torque = rows.design[j].leftCols(last) * off - rows.target[j];
-  for (int k = 0; k < torque.size(); ++k) torque[k] += train[rows.index[j].dataset[k]]->tau(rows.index[j].sample[k], j);
-  rows.design[j].col(last) = torque;
+  rows.design[j].col(last) = rows.design[j].leftCols(last) * off - rows.target[j] + Measured(j);
   return true;
 }
 
@@ -308,47 +333,31 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
 
 // A term that reads the model's torque changes with the parameters, too: where it cuts torque off they change nothing.
 void Diagnosis::Work::Bend(int j, const VectorXd& slope) {
-  for (int k = 0; k < slope.size(); ++k) {
-    const int log = rows.index[j].dataset[k], sample = rows.index[j].sample[k];
-    const double at_mean = train[log]->tau(sample, j) - rows.target[j][k];
-    rows.target[j][k] += slope[k] * (evidence.logs[log].tau_model(sample, j) - at_mean);
-  }
+  const VectorXd at_mean = Measured(j) - rows.target[j];
+  VectorXd torque(slope.size());
+  for (std::size_t log = 0; log < train.size(); ++log)
+    rows.index[j].Take(static_cast<int>(log), evidence.logs[log].tau_model.col(j), torque);
+  rows.target[j] += slope.cwiseProduct(torque - at_mean);
   rows.design[j].array().colwise() *= 1 + slope.array();
   bent[j] = 1;
 }
 
-// Coordinates z in which the prior is unit and directions that nobody sees are left out.
+// Coordinates z in which the prior is unit.
 void Diagnosis::Work::MakeCoordinates(int size) {
   const int active = static_cast<int>(declared.active.size());
-  MatrixXd H = MatrixXd::Zero(size, size);
-  for (int j = 0; j < model.joints(); ++j) {
-    const auto& columns = rows.columns[j];
-    const double weight = 1 / (estimate.sigma[j] * estimate.sigma[j]);
-    H(columns, columns) += weight * rows.gram[j];
-  }
-  VectorXd scale(size);
-  for (int i = 0; i < size; ++i) scale[i] = H(i, i) > 0 ? 1 / std::sqrt(H(i, i)) : 0;
-  if (prior.informative) {
-    MatrixXd P0(active, active);
-    for (int i = 0; i < active; ++i)
-      for (int k = 0; k < active; ++k) P0(i, k) = prior.covariance(declared.active[i], declared.active[k]);
-    const VectorXd sd = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
-        MatrixXd(sd.cwiseInverse().asDiagonal() * P0 * sd.cwiseInverse().asDiagonal()));
-    rows.L = MatrixXd::Zero(size, size);
-    rows.L.topLeftCorner(active, active) =
-        sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-    // a term has no prior worth the name: a thousand times what one whitened unit in every row of it would need
-    for (int i = active; i < size; ++i)
-      rows.L(i, i) = 1e3 * scale[i] * std::sqrt(static_cast<double>(evidence.index[0].size()));
-    return;
-  }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(scale.asDiagonal() * H * scale.asDiagonal()));
-  const double floor = 1e-10 * eigen.eigenvalues()[size - 1];
-  int keep = 0;
-  for (int i = 0; i < size; ++i) keep += eigen.eigenvalues()[i] > floor;
-  rows.L = scale.asDiagonal() * eigen.eigenvectors().rightCols(keep) *
-           eigen.eigenvalues().tail(keep).cwiseSqrt().cwiseInverse().asDiagonal();
+  const MatrixXd P0 = prior.covariance(declared.active, declared.active);
+  const VectorXd sd = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
+      MatrixXd(sd.cwiseInverse().asDiagonal() * P0 * sd.cwiseInverse().asDiagonal()));
+  rows.L = MatrixXd::Zero(size, size);
+  rows.L.topLeftCorner(active, active) =
+      sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  // A term has no prior worth the name: a thousand times what one whitened unit in every row of it would need.
+  VectorXd seen = VectorXd::Zero(size);
+  for (int j = 0; j < model.joints(); ++j)
+    seen(rows.columns[j]) += rows.gram[j].diagonal() / (estimate.sigma[j] * estimate.sigma[j]);
+  for (int i = active; i < size; ++i)
+    if (seen[i] > 0) rows.L(i, i) = 1e3 * std::sqrt(static_cast<double>(evidence.index[0].size()) / seen[i]);
 }
 
 }  // namespace armcal::diagnosis

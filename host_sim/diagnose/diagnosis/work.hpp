@@ -73,6 +73,7 @@ struct Diagnosis::Work {
   void StartRows();
   void FillDeclared(int j);
   bool FillGain(int j);
+  Eigen::VectorXd Measured(int j) const;
   void Bend(int j, const Eigen::VectorXd& slope);
   void MakeCoordinates(int size);
 

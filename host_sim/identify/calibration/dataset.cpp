@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/calibration/band.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::calibration {
@@ -14,22 +15,22 @@ constexpr int kFlagSaturated = 2, kFlagStale = 4;
 // A joint that has just stopped or is about to turn may stick although its smoothed speed is above v_min. So rows this
 // close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
 constexpr int kTurn = 2;
-constexpr int kPoses = 8;  // at a single one an entry of the mass matrix may vanish
+constexpr double kWholeBand = 0.2;  // of the sample rate: averages down to it would hold two samples each
+constexpr double kOfAPeriod = 10;   // samples of a period of the band that a thinned log keeps
+constexpr double kAboveBand = 1.5;  // cut-off over band: the filter then takes 4 % of what is at the band's edge
+constexpr int kPoses = 8;           // at a single one an entry of the mass matrix may vanish
 // Signals and masks for given inertias.
-Dataset Derive(const codegen::Model& model, const logs::Log& log, const Eigen::MatrixXd& inertia,
+Dataset Derive(const codegen::Model& model, const logs::Log& log, const logs::Sensitivity& sensitivity,
                const logs::Bandwidth& bandwidth) {
   const int n = model.joints(), samples = static_cast<int>(log.samples());
-  Eigen::VectorXd sign_width(n);
-  for (int j = 0; j < n; ++j)
-    sign_width[j] =
-        model.robot().sign_law == "tanh" ? model.robot().sign_width_radps : model.robot().joint[j].v_min_radps;
-  const logs::Derivatives derived = logs::DeriveSignals(log, {inertia, sign_width}, bandwidth);
+  const logs::Derivatives derived = logs::DeriveSignals(log, sensitivity, bandwidth);
   Dataset d;
   d.source = log.source;
   d.s.t = log.t;
   d.s.q = derived.q, d.s.qd = derived.qd, d.s.qdd = derived.qdd;
   d.s.temp = log.temp;
   d.cutoff_Hz = derived.cutoff_Hz;
+  d.band_Hz.setConstant(n, INFINITY);
   d.reference = log.qref;
   d.tau = log.tau;
   if (log.ext.cols() == n) d.tau += log.ext;  // an external force along +q does part of the motor's work
@@ -54,6 +55,40 @@ Dataset Derive(const codegen::Model& model, const logs::Log& log, const Eigen::M
     }
   }
   return d;
+}
+
+logs::Sensitivity SensitivityOf(const codegen::Model& model, const Eigen::MatrixXd& inertia) {
+  const codegen::Robot& robot = model.robot();
+  logs::Sensitivity out{inertia, Eigen::VectorXd(model.joints())};
+  for (int j = 0; j < model.joints(); ++j)
+    out.sign_width_radps[j] = robot.sign_law == "tanh" ? robot.sign_width_radps : robot.joint[j].v_min_radps;
+  return out;
+}
+
+void LimitBands(Dataset& d, const Eigen::VectorXd& band_Hz) {
+  d.band_Hz = band_Hz;
+  d.average.assign(static_cast<std::size_t>(d.joints()), {});
+  for (int j = 0; j < d.joints(); ++j)
+    if (std::isfinite(band_Hz[j])) d.average[static_cast<std::size_t>(j)] = AverageRows(d, j);
+}
+
+// [n] The log itself shows up to which frequency torque follows the prediction. Noise of one joint's acceleration is in
+// every row: no joint's band goes beyond the median of those that end.
+Eigen::VectorXd SeenBands_Hz(const codegen::Model& model, const Dataset& d) {
+  const Fit fit = WeightedFit(model, {&d});
+  const Eigen::MatrixXd predicted = Predict(model, d, fit.x, fit.eta);
+  Eigen::VectorXd out(d.joints());
+  for (int j = 0; j < d.joints(); ++j) out[j] = AgreedBand_Hz(Transfer(d, j, predicted.col(j)));
+  std::vector<double> seen;
+  for (const double band_Hz : out)
+    if (std::isfinite(band_Hz)) seen.push_back(band_Hz);
+  if (seen.empty()) return out;
+  std::sort(seen.begin(), seen.end());
+  out = out.cwiseMin(seen[(seen.size() - 1) / 2]);
+  const double rate_Hz = static_cast<double>(d.samples() - 1) / (d.s.t[d.samples() - 1] - d.s.t[0]);
+  for (double& band_Hz : out)
+    if (band_Hz > kWholeBand * rate_Hz) band_Hz = INFINITY;
+  return out;
 }
 
 }  // namespace
@@ -99,13 +134,44 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
     // for a first fit.
     for (int j = 0; j < n; ++j)
       inertia(j, j) = model.robot().joint[j].torque_limit_Nm / model.robot().joint[j].acceleration_limit_radps2;
-    const Dataset rough = Derive(model, log, inertia, {});
+    const Dataset rough = Derive(model, log, SensitivityOf(model, inertia), {});
     const Fit fit = WeightedFit(model, {&rough});
     const Eigen::VectorXd guess = inertia.diagonal();
     inertia = TypicalMass(model, fit.x.segment(model.front(), model.rigid()));
     for (int j = 0; j < n; ++j) inertia(j, j) = std::min(inertia(j, j), guess[j]);
   }
-  return Derive(model, log, inertia, bandwidth);
+  const logs::Sensitivity sensitivity = SensitivityOf(model, inertia);
+  if (bandwidth.cutoff_Hz > 0) return Derive(model, log, sensitivity, bandwidth);
+  const Eigen::VectorXd chosen_Hz = logs::ChooseCutoffs_Hz(log, sensitivity);
+  const Eigen::VectorXd band_Hz = SeenBands_Hz(model, Derive(model, log, sensitivity, {0, 1, chosen_Hz}));
+  const Eigen::VectorXd each_Hz = chosen_Hz.cwiseMin(kAboveBand * band_Hz);
+  Dataset out = Derive(model, log, sensitivity, {0, bandwidth.scale, each_Hz});
+  LimitBands(out, band_Hz);
+  return out;
+}
+
+Dataset ThinToBand(const Dataset& d) {
+  const double rate_Hz = static_cast<double>(d.samples() - 1) / (d.s.t[d.samples() - 1] - d.s.t[0]);
+  const int every =
+      std::isfinite(d.band_Hz.maxCoeff()) ? static_cast<int>(rate_Hz / (kOfAPeriod * d.band_Hz.maxCoeff())) : 1;
+  if (every < 2) return d;
+  const int reach = (every - 1) / 2, samples = (d.samples() - 1 - 2 * reach) / every + 1;
+  const auto kept = Eigen::seqN(reach, samples, every);
+  Dataset out = d;
+  out.s.t = d.s.t(kept);
+  for (const auto& [from, to] :
+       {std::pair{&d.s.q, &out.s.q}, std::pair{&d.s.qd, &out.s.qd}, std::pair{&d.s.qdd, &out.s.qdd},
+        std::pair{&d.s.temp, &out.s.temp}, std::pair{&d.reference, &out.reference}})
+    if (from->rows() > 0) *to = (*from)(kept, Eigen::all);
+  out.moving = d.moving(kept, Eigen::all), out.used = d.used(kept, Eigen::all), out.scored = d.scored(kept);
+  out.tau.resize(samples, d.joints());
+  for (int k = 0; k < samples; ++k) {
+    const auto about = Eigen::seqN(k * every, 2 * reach + 1);
+    out.tau.row(k) = d.tau(about, Eigen::all).colwise().mean();
+    out.used.row(k) = d.used(about, Eigen::all).colwise().minCoeff();
+  }
+  LimitBands(out, d.band_Hz);
+  return out;
 }
 
 Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only) {
@@ -119,6 +185,16 @@ Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool movi
       ++count;
     }
     rms[j] = count ? std::sqrt(sum / count) : 0;
+  }
+  return rms;
+}
+
+Eigen::VectorXd RmsInBand(const Dataset& d, const Eigen::MatrixXd& residual) {
+  Eigen::VectorXd rms = Rms(d, residual, true);
+  for (int j = 0; j < d.joints(); ++j) {
+    if (!d.averaged(j)) continue;
+    const Eigen::VectorXd rows = d.average[static_cast<std::size_t>(j)] * residual.col(j);
+    rms[j] = rows.size() ? std::sqrt(rows.squaredNorm() / static_cast<double>(rows.size())) : 0;
   }
   return rms;
 }
@@ -162,6 +238,7 @@ Dataset Delayed(const Dataset& data, double delay_s) {
       for (int a = 0; a < 4; ++a) to->row(i) += weight[a] * from->row(first + a);
     }
   }
+  LimitBands(out, data.band_Hz);
   return out;
 }
 

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <limits>
+#include <vector>
 
 #include "codegen/src/generator/model.hpp"
 #include "host_sim/data/logs/log.hpp"
@@ -17,21 +20,33 @@ struct Dataset {
   Eigen::MatrixXi used;       // [N x n] 1: row may be fitted (moving, signals settled, drive did not flag it)
   Eigen::VectorXi scored;     // [N] 1: at least 0.5 s away from both ends of the log
   Eigen::VectorXd cutoff_Hz;  // [n]
+  Eigen::VectorXd band_Hz;    // [n] up to which torque and model are compared; infinity: as far as the log goes
+  // [n] where the band is limited: the averages of samples that are fitted. Elsewhere empty: each used sample is a row.
+  std::vector<Eigen::SparseMatrix<double, Eigen::RowMajor>> average;
   Eigen::MatrixXd reference;  // [N x n] commanded position; empty where the log has none
   std::string source;
 
   int samples() const { return s.samples(); }
   int joints() const { return static_cast<int>(tau.cols()); }
+  bool averaged(int j) const { return static_cast<std::size_t>(j) < average.size() && average[j].cols() > 0; }
 };
 
-// The cut-off depends on the arm's inertia. That comes from the prior or, without one, from a first fit of this log.
+// The cut-off and the band depend on the arm's inertia. That comes from the prior or, without one, from a first fit of
+// this log.
 Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::Bandwidth& bandwidth = {});
+
+// The log with so few samples that its averages still hold ten a period of the widest band; torque is the mean about
+// each kept sample. The same log where a joint's band is not limited.
+Dataset ThinToBand(const Dataset& data);
 
 // RMS over some poses of each entry of the mass matrix [n x n], for given base parameters.
 Eigen::MatrixXd TypicalMass(const codegen::Model& model, const Eigen::VectorXd& base);
 
 // Root mean square of residual[:, j] over scored samples of each joint; moving_only: where that joint moves.
 Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool moving_only);
+
+// The same of each joint's rows: averages where its band is limited, else the scored samples where it moves.
+Eigen::VectorXd RmsInBand(const Dataset& d, const Eigen::MatrixXd& residual);
 
 // Commanded positions of each log, by the log's name. Empty if a log has none.
 std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& data);

@@ -74,6 +74,27 @@ class JointSum {
   int filled_ = 0;  // samples in the panel
 };
 
+// The joints whose rows are averages of samples.
+void SumAverages(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& p,
+                 std::span<const double> eta, Information& info) {
+  const int columns = model.columns();
+  std::vector<Eigen::MatrixXd> regressor;
+  model.Regressor(data.s, {p.data(), static_cast<std::size_t>(columns)}, eta, regressor);
+  for (int j = 0; j < model.joints(); ++j) {
+    if (!data.averaged(j)) continue;
+    const auto& average = data.average[static_cast<std::size_t>(j)];
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(average.rows(), columns + model.joints());
+    for (int c = 0; c < columns; ++c)
+      if (!model.rows()[j][c].IsZero()) A.col(c) = average * regressor[static_cast<std::size_t>(j)].col(c);
+    A.col(columns + j) = A.leftCols(columns) * p;
+    const Eigen::VectorXd tau = average * data.tau.col(j);
+    info.gram[j] = A.transpose() * A;
+    info.right[j] = A.transpose() * tau;
+    info.square[j] = tau.squaredNorm();
+    info.rows[j] = static_cast<int>(average.rows());
+  }
+}
+
 }  // namespace
 
 Information::Information(int joints, int coordinates)
@@ -106,6 +127,8 @@ Information Accumulate(const codegen::Model& model, const Dataset& data, const E
   };
   model.ForEachBlock(data.s, {p.data(), static_cast<std::size_t>(columns)}, eta, add);
   for (int j = 0; j < n; ++j) sums[j].Finish(columns + j, info.gram[j], info.right[j], info.square[j]);
+  if (std::any_of(data.average.begin(), data.average.end(), [](const auto& a) { return a.cols() > 0; }))
+    SumAverages(model, data, p, eta, info);
   return info;
 }
 

@@ -64,7 +64,6 @@ class LoadFit {
 
   // Makes the prior of the arm so wide that it says nothing. `gains`: the same for the gains; only their sign is known.
   void ForgetArm(bool gains) {
-    prior_.informative = true;
     for (const int c : prior_.active)
       if (c < columns_) prior_.covariance.row(c).setZero(), prior_.covariance.col(c).setZero(), Widen(c, c);
     if (!gains) return;

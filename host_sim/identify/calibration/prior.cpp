@@ -62,6 +62,46 @@ MatrixXd BodyCovariance(const codegen::Model& model) {
   return P;
 }
 
+namespace {
+
+constexpr int kStates = 256;
+
+// [columns] The deviation at which a column's torque, over states within the arm's limits, is as large as the limit of
+// one of its joints.
+VectorXd WideDeviations(const codegen::Model& model) {
+  const int n = model.joints();
+  codegen::Signals s;
+  s.t = VectorXd::LinSpaced(kStates, 0, kStates - 1);
+  s.q.resize(kStates, n), s.qd = s.q, s.qdd = s.q;
+  // Multiples of irrational numbers fill each range evenly.
+  const auto share = [](int k, int dimension) {
+    const double turns = k * std::sqrt(2 + dimension * (dimension + 3));
+    return turns - std::floor(turns);
+  };
+  for (int j = 0; j < n; ++j) {
+    const codegen::Joint& joint = model.robot().joint[j];
+    const auto [lower, upper] = joint.position_limit_rad;
+    for (int k = 0; k < kStates; ++k) {
+      s.q(k, j) = lower + share(k, 3 * j) * (upper - lower);
+      s.qd(k, j) = (2 * share(k, 3 * j + 1) - 1) * joint.speed_limit_radps;
+      s.qdd(k, j) = (2 * share(k, 3 * j + 2) - 1) * joint.acceleration_limit_radps2;
+    }
+  }
+  std::vector<double> eta;
+  for (int k = 0; k < model.nonlinear(); ++k)
+    eta.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
+  const VectorXd none = VectorXd::Zero(model.columns());
+  std::vector<MatrixXd> row;
+  model.Regressor(s, {none.data(), static_cast<std::size_t>(none.size())}, eta, row);
+  VectorXd largest = VectorXd::Zero(model.columns());
+  for (int j = 0; j < n; ++j)
+    largest = largest.cwiseMax(row[static_cast<std::size_t>(j)].colwise().norm().transpose() / std::sqrt(kStates) /
+                               model.robot().joint[j].torque_limit_Nm);
+  return largest.cwiseInverse();
+}
+
+}  // namespace
+
 Prior MakePrior(const codegen::Model& model) {
   const int columns = model.columns(), n = model.joints();
   Prior prior;
@@ -84,6 +124,11 @@ Prior MakePrior(const codegen::Model& model) {
     prior.mean[c] = p.mean;
     prior.covariance(c, c) = p.sd * p.sd;
     if (p.state == "estimated") prior.active.push_back(c);
+  }
+  if (!prior.informative) {
+    const VectorXd wide = WideDeviations(model);
+    for (const int c : prior.active)
+      if (std::isfinite(wide[c])) prior.covariance(c, c) = wide[c] * wide[c];
   }
   for (int j = 0; j < n; ++j) {
     const double tolerance = model.robot().joint[j].motor.torque_constant_tolerance;

@@ -12,9 +12,11 @@ namespace armcal::calibration {
 // parameter.
 struct Prior {
   Eigen::VectorXd mean;        // [columns + n]
-  Eigen::MatrixXd covariance;  // the bodies' part is B J diag(sd^2) J' B', full
+  Eigen::MatrixXd covariance;  // the bodies' part is B J diag(sd^2) J' B', full; empty: nothing at all is known
   std::vector<int> active;     // coordinates that a fit may move
-  bool informative = true;     // false: prior = "none", covariance is not used
+  // false: prior = "none". The covariance is then a diagonal one: each column alone, over motions within the arm's
+  // limits, makes the torque that its joints can give. It holds what the logs do not determine near the mean.
+  bool informative = true;
   int columns = 0;
 };
 

@@ -14,8 +14,10 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kDetermined =
-    1e-10;  // share of the largest scaled eigenvalue below which a direction counts as unseen
+// Share of the largest scaled eigenvalue below which a direction counts as unseen, where there is no prior at all.
+constexpr double kDetermined = 1e-10;
+// Share of a joint's rows that its columns leave free, below which the residual says nothing of its noise.
+constexpr double kFree = 0.2;
 
 MatrixXd Pick(const MatrixXd& m, const std::vector<int>& index) {
   MatrixXd out(index.size(), index.size());
@@ -44,14 +46,13 @@ VectorXd SolveWithPrior(const Information& info, const VectorXd& weight, const P
   const MatrixXd Ha = Pick(H, active);
   const VectorXd ga = Pick(g, active);
   const int a = static_cast<int>(active.size());
-  VectorXd scale(a);
   VectorXd step(a);
   MatrixXd P(a, a);
-  if (prior.informative) {
+  if (prior.covariance.size() > 0) {
     // x = S z with P0 = S C S: (S H S + C^-1) z = S g. It is solved with C^(1/2), so that a singular prior does no
     // harm.
     const MatrixXd P0 = Pick(prior.covariance, active);
-    scale = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
+    const VectorXd scale = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
     const MatrixXd C = scale.cwiseInverse().asDiagonal() * P0 * scale.cwiseInverse().asDiagonal();
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C);
     const MatrixXd L =
@@ -61,7 +62,7 @@ VectorXd SolveWithPrior(const Information& info, const VectorXd& weight, const P
     step = L * factor.solve(L.transpose() * ga);
     if (covariance) P = L * factor.solve(L.transpose());
   } else {
-    scale = Ha.diagonal().cwiseSqrt();
+    VectorXd scale = Ha.diagonal().cwiseSqrt();
     for (int i = 0; i < a; ++i) scale[i] = scale[i] > 0 ? 1 / scale[i] : 0;
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(scale.asDiagonal() * Ha * scale.asDiagonal()));
     const double floor = kDetermined * eigen.eigenvalues()[a - 1];
@@ -115,15 +116,21 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
     // right-hand side for kappa is linear about the current estimate: measured = Y p + kappa (Y p_now)
     const VectorXd weight = fit.sigma.cwiseAbs2().cwiseInverse();
     fit.x = SolveWithPrior(fit.information, weight, prior, fit.active, &fit.covariance);
-    for (int j = 0; j < n; ++j)
-      if (fit.information.rows[j] > 0)
-        fit.sigma[j] = std::max(1e-12, std::sqrt(fit.information.Residual(j, fit.x) / fit.information.rows[j]));
+    for (int j = 0; j < n; ++j) {
+      const auto own = (fit.information.gram[j].diagonal().array() > 0).count();
+      const double rows = fit.information.rows[j], free = rows - static_cast<double>(own);
+      if (free > kFree * rows) fit.sigma[j] = std::max(1e-12, std::sqrt(fit.information.Residual(j, fit.x) / free));
+    }
   }
   fit.inflation.setZero();
   for (const Dataset* d : data) {
     const MatrixXd left = d->tau - Predict(model, *d, fit.x, fit.eta);
-    for (int j = 0; j < n; ++j)
-      fit.inflation[j] += VarianceInflation(left.col(j), d->used.col(j)) / static_cast<double>(data.size());
+    for (int j = 0; j < n; ++j) {
+      VectorXd own = left.col(j);
+      Eigen::VectorXi used = d->used.col(j);
+      if (d->averaged(j)) own = d->average[static_cast<std::size_t>(j)] * left.col(j), used.setOnes(own.size());
+      fit.inflation[j] += VarianceInflation(own, used) / static_cast<double>(data.size());
+    }
   }
   const VectorXd weight = (fit.sigma.cwiseAbs2().cwiseProduct(fit.inflation)).cwiseInverse();
   SolveWithPrior(fit.information, weight, prior, fit.active,

@@ -50,7 +50,6 @@ VectorXd SolveRegularised(const Problem& problem, const MatrixXd& gram, const Ve
   prior.mean = problem.start;
   prior.covariance = problem.covariance;
   prior.active = FreeCoordinates(problem);
-  prior.informative = problem.covariance.size() > 0;
   prior.columns = problem.model->columns();
   Information sums;
   sums.gram = {gram};

@@ -49,6 +49,33 @@ TEST(WeightedFit, ATorqueThatTheModelLacks_IsNotWithinTheDeviations) {
   EXPECT_GT(Honesty(WeightedFit(arm.model(), {&d}), arm.truth()).worst, 4);
 }
 
+TEST(WeightedFit, WithoutPrior_TooFewRowsPredictNoTorqueThatTheArmCannotGive) {
+  codegen::Robot robot = Er20();
+  robot.has_prior = false;
+  SyntheticArm arm(Er20(), 1);
+  const codegen::Model model(robot, tests::Records());
+  Dataset few = arm.Run(20, 101);
+  const Dataset other = arm.Run(20, 102);
+  // Joints 4 to 6 say nothing, the others have fewer rows than columns.
+  few.used.rightCols(3).setZero();
+  few.used.bottomRows(few.samples() - few.samples() / 100).setZero();
+  const Fit fit = WeightedFit(model, {&few});
+  const MatrixXd torque = Predict(model, other, fit.x, fit.eta);
+  for (int j = 0; j < model.joints(); ++j)
+    EXPECT_LT(torque.col(j).cwiseAbs().maxCoeff(), 3 * robot.joint[j].torque_limit_Nm) << "joint " << j + 1;
+}
+
+TEST(WeightedFit, WithoutPrior_ALongLogGivesTheTruthAllTheSame) {
+  codegen::Robot robot = Er20();
+  robot.has_prior = false;
+  SyntheticArm arm(Er20(), 2);
+  const codegen::Model model(robot, tests::Records());
+  const Dataset d = arm.Run(20, 103), other = arm.Run(20, 104);
+  const Fit fit = WeightedFit(model, {&d});
+  const VectorXd error = Rms(other, other.tau - Predict(model, other, fit.x, fit.eta), true);
+  for (int j = 0; j < model.joints(); ++j) EXPECT_LT(error[j], 1.1 * arm.noise_Nm(j)) << "joint " << j + 1;
+}
+
 TEST(WeightedFit, TwoLogs_AreWorthMoreThanOne) {
   SyntheticArm arm(Er20(), 3);
   const Dataset a = arm.Run(10, 1), b = arm.Run(10, 2);

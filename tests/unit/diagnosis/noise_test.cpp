@@ -149,9 +149,8 @@ TEST(Metric, GainOfColumns_IsTheDropOfChiSquareInARefit) {
 TEST(Metric, AColumnOfTheBase_HasNoDirectionOfItsOwn) {
   std::srand(6);
   BaseRows rows;
-  rows.L = MatrixXd::Identity(3, 3);
+  rows.L = 1e5 * MatrixXd::Identity(3, 3);  // a prior that holds nothing
   rows.mean = VectorXd::Zero(3);
-  rows.informative = false;
   rows.index = {Rows(400, 400)};
   rows.columns = {{0, 1, 2}};
   rows.design = {MatrixXd::Random(400, 3)};

@@ -133,13 +133,17 @@ TEST(Signals, WideGap_IsNotBridged) {
   }
 }
 
+double ChosenCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, double width_radps = INFINITY) {
+  return std::max(QuietCutoff_Hz(noise, inertia, rate_Hz, width_radps), MotionCutoff_Hz(noise, rate_Hz));
+}
+
 TEST(Signals, CutOff_IsTheHighestThatKeepsEncoderNoiseBelowItsShare) {
   const double rate_Hz = 250, inertia = 40;
   std::mt19937_64 random(11);
   std::normal_distribution<double> white(0, 1);
   for (const double position_rad : {2e-7, 5e-7, 1e-6}) {
     const JointNoise noise{position_rad, 3.0};
-    const double cutoff_Hz = ChooseCutoff_Hz(noise, inertia, rate_Hz);
+    const double cutoff_Hz = ChosenCutoff_Hz(noise, inertia, rate_Hz);
     ASSERT_GT(cutoff_Hz, 20);
     ASSERT_LT(cutoff_Hz, 60);
     Log log;
@@ -153,9 +157,9 @@ TEST(Signals, CutOff_IsTheHighestThatKeepsEncoderNoiseBelowItsShare) {
     // 7 %: the analytic integral runs to infinity and the filter is warped near half the rate; statistics add 1 %.
     EXPECT_NEAR(torque / (0.07 * noise.torque_Nm), 1.0, 0.07) << cutoff_Hz << " Hz";
   }
-  EXPECT_EQ(ChooseCutoff_Hz({0, 3.0}, inertia, rate_Hz), 60);
-  EXPECT_EQ(ChooseCutoff_Hz({1, 3.0}, inertia, rate_Hz), 20);
-  EXPECT_EQ(ChooseCutoff_Hz({0, 3.0}, inertia, 100), 40);
+  EXPECT_EQ(ChosenCutoff_Hz({0, 3.0}, inertia, rate_Hz), 60);
+  EXPECT_EQ(ChosenCutoff_Hz({1, 3.0}, inertia, rate_Hz), 20);
+  EXPECT_EQ(ChosenCutoff_Hz({0, 3.0}, inertia, 100), 40);
 }
 
 TEST(Signals, NoiseOfEncoderAndTorque_AreFoundUnderMotion) {
@@ -186,11 +190,14 @@ TEST(Signals, MotionBand_EndsWhereTheHighestToneDoes) {
 
 TEST(Signals, CoarseEncoderUnderSlowMotion_IsSmoothedFurther_ButNeverIntoTheMotion) {
   const JointNoise slow{1, 3.0, 3.0}, fast{1, 3.0, 50};  // noise that calls for the lowest cut-off
-  EXPECT_DOUBLE_EQ(ChooseCutoff_Hz(slow, 40, 250), 4.5);
-  EXPECT_EQ(ChooseCutoff_Hz(fast, 40, 250), 20);
+  EXPECT_DOUBLE_EQ(ChosenCutoff_Hz(slow, 40, 250), 4.5);
+  EXPECT_EQ(ChosenCutoff_Hz(fast, 40, 250), 20);
+  // A joint that stands has no motion of its own: its cut-off must not make a log's ends unusable for all joints.
+  EXPECT_EQ(ChosenCutoff_Hz({1, 3.0, 0}, 40, 250), 20);
+  EXPECT_EQ(ChosenCutoff_Hz({1, 3.0, 0.01}, 40, 250), 2);
   // friction's sign: noise of speed stays below a twentieth of the width
   const JointNoise fine{1e-5, 3.0};
-  const double cutoff_Hz = ChooseCutoff_Hz(fine, 0, 250, 0.01);
+  const double cutoff_Hz = ChosenCutoff_Hz(fine, 0, 250, 0.01);
   const double s = 1e-5 * kTau * std::sqrt(2.0 / 250 * 0.2657) * std::pow(cutoff_Hz, 1.5);
   EXPECT_NEAR(s, 0.05 * 0.01, 1e-9);
 }

@@ -1,0 +1,144 @@
+// calibration - compares the spectra of torque and prediction, and builds the averages of a limited band.
+#include "host_sim/identify/calibration/band.hpp"
+
+#include <unsupported/Eigen/FFT>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+namespace armcal::calibration {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kSegment_s = 4;  // of Welch's method: bins of a quarter hertz
+constexpr double kLowest_Hz = 1;  // below, the motion itself is; noise of a derivative is small there
+constexpr double kThird = 1.26;   // a third of an octave
+constexpr int kFewSegments = 5;   // fewer tell nothing
+// Of the gain: where it is below the first in two bands, the prediction has half as much noise as torque; the band ends
+// where it has a tenth.
+constexpr double kMuchNoise = 0.8, kSomeNoise = 0.9;
+constexpr double kNoLag = 0.9;  // of the inverse gain: noise in the prediction does not lower it
+constexpr double kSure = 2;     // standard deviations
+constexpr double kReach = 3;    // of a Gaussian's standard deviation, over which an average goes
+constexpr double kSeen = 0.6;   // of an average's weight: the used samples have so much of it at least
+
+// y with the samples in between drawn over as a straight line where the row is not used.
+VectorXd Bridged(VectorXd y, const Eigen::VectorXi& used) {
+  Index last = -1;
+  for (Index k = 0; k < y.size(); ++k) {
+    if (!used[k]) continue;
+    for (Index i = last + 1; i < k; ++i)
+      y[i] =
+          last < 0 ? y[k] : y[last] + (y[k] - y[last]) * static_cast<double>(i - last) / static_cast<double>(k - last);
+    last = k;
+  }
+  for (Index i = last + 1; i < y.size(); ++i) y[i] = last < 0 ? 0 : y[last];
+  return y;
+}
+
+}  // namespace
+
+std::vector<TransferBand> Transfer(const Dataset& data, int joint, const VectorXd& predicted) {
+  const VectorXd& t = data.s.t;
+  const double rate_Hz = static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]);
+  const Index size = static_cast<Index>(kSegment_s * rate_Hz) / 2 * 2;
+  std::vector<TransferBand> out;
+  if (size < 16 || t.size() < size) return out;
+  const VectorXd y = Bridged(data.tau.col(joint), data.used.col(joint)), x = Bridged(predicted, data.used.col(joint));
+  VectorXd window(size);
+  for (Index k = 0; k < size; ++k)
+    window[k] = 0.5 - 0.5 * std::cos(2 * std::numbers::pi * (static_cast<double>(k) + 0.5) / static_cast<double>(size));
+  Eigen::FFT<double> fft;
+  const Index bins = size / 2;
+  VectorXd xx = VectorXd::Zero(bins), yy = xx;
+  Eigen::VectorXcd xy = Eigen::VectorXcd::Zero(bins);
+  int segments = 0;
+  std::vector<std::complex<double>> fx, fy;
+  const auto transform = [&](const VectorXd& v, Index first, std::vector<std::complex<double>>& to) {
+    const VectorXd part = v.segment(first, size);
+    const VectorXd tapered = (part.array() - part.mean()) * window.array();
+    std::vector<double> in(tapered.begin(), tapered.end());
+    fft.fwd(to, in);
+  };
+  for (Index first = 0; first + size <= t.size(); first += size / 2) {
+    if (data.used.col(joint).segment(first, size).sum() < kSeen * static_cast<double>(size)) continue;
+    transform(x, first, fx), transform(y, first, fy);
+    for (Index k = 0; k < bins; ++k) {
+      const auto a = fx[static_cast<std::size_t>(k)], b = fy[static_cast<std::size_t>(k)];
+      xx[k] += std::norm(a), yy[k] += std::norm(b), xy[k] += std::conj(a) * b;
+    }
+    ++segments;
+  }
+  if (segments < kFewSegments) return out;
+  const double step_Hz = rate_Hz / static_cast<double>(size);
+  for (double lower = kLowest_Hz; lower * kThird < 0.5 * rate_Hz; lower *= kThird) {
+    const Index first = std::max<Index>(1, static_cast<Index>(std::ceil(lower / step_Hz))),
+                last = std::min(bins - 1, static_cast<Index>(std::ceil(lower * kThird / step_Hz)));
+    if (last <= first) continue;
+    // A Hann window ties a bin to its neighbours and, over half its length, a segment to the next one.
+    const double looks = 0.5 * static_cast<double>((last - first) * segments);
+    double sxx = 0, syy = 0;
+    std::complex<double> sum = 0;  // over so narrow a band a delay of some samples turns all bins alike
+    for (Index k = first; k < last; ++k) sxx += xx[k], syy += yy[k], sum += xy[k];
+    TransferBand band{lower, lower * kThird, 0, 0, 0, 0};
+    if (sxx > 0 && syy > 0) {
+      const double chance = 1 / looks, raw = std::min(1.0, std::norm(sum) / (sxx * syy));
+      band.coherence = std::max(0.0, (raw - chance) / (1 - chance));
+      band.gain = std::sqrt(band.coherence * syy / sxx);
+      band.gain_sd = std::sqrt((1 - band.coherence) / (2 * looks) * syy / sxx);
+      band.inverse_gain = std::sqrt(syy / sxx / std::max(band.coherence, 1e-6));
+    }
+    out.push_back(band);
+  }
+  return out;
+}
+
+double AgreedBand_Hz(const std::vector<TransferBand>& transfer) {
+  const auto below = [](const TransferBand& b, double gain) {
+    return b.gain + kSure * b.gain_sd < gain && b.inverse_gain > kNoLag;
+  };
+  for (std::size_t k = 0; k + 1 < transfer.size(); ++k) {
+    if (!below(transfer[k], kMuchNoise) || !below(transfer[k + 1], kMuchNoise)) continue;
+    while (k > 0 && below(transfer[k - 1], kSomeNoise)) --k;
+    return transfer[k].lower_Hz;
+  }
+  return INFINITY;
+}
+
+Eigen::SparseMatrix<double, Eigen::RowMajor> AverageRows(const Dataset& data, int joint) {
+  const VectorXd& t = data.s.t;
+  const Index samples = t.size();
+  const double band_Hz = data.band_Hz[joint], step_s = (t[samples - 1] - t[0]) / static_cast<double>(samples - 1);
+  const double width_s = std::sqrt(std::log(2.0)) / (2 * std::numbers::pi * band_Hz), apart_s = 0.5 / band_Hz;
+  const double whole = width_s * std::sqrt(2 * std::numbers::pi) / step_s;  // weight of a window without gaps
+  std::vector<Eigen::Triplet<double>> entries;
+  Index row = 0, first = 0;
+  for (double centre = t[0] + 0.5 * apart_s; centre < t[samples - 1]; centre += apart_s) {
+    while (first < samples && t[first] < centre - kReach * width_s) ++first;
+    const std::size_t begin = entries.size();
+    double sum = 0;
+    for (Index k = first; k < samples && t[k] <= centre + kReach * width_s; ++k) {
+      if (!data.used(k, joint)) continue;
+      const double off = (t[k] - centre) / width_s, weight = std::exp(-0.5 * off * off);
+      entries.emplace_back(row, k, weight);
+      sum += weight;
+    }
+    if (sum < kSeen * whole) {
+      entries.resize(begin);
+      continue;
+    }
+    for (std::size_t e = begin; e < entries.size(); ++e)
+      entries[e] = {static_cast<int>(row), entries[e].col(), entries[e].value() / sum};
+    ++row;
+  }
+  Eigen::SparseMatrix<double, Eigen::RowMajor> out(row, samples);
+  out.setFromTriplets(entries.begin(), entries.end());
+  return out;
+}
+
+}  // namespace armcal::calibration

@@ -1,0 +1,29 @@
+// calibration - finds the band in which a log's torque and its model can agree, and averages rows down to that band.
+#pragma once
+
+#include <Eigen/SparseCore>
+
+#include "host_sim/identify/calibration/dataset.hpp"
+
+namespace armcal::calibration {
+
+// How the measured torque y of one joint follows the prediction x over frequency, in bands of a third of an octave.
+// Noise in the derived speed and acceleration is in x alone: it lowers `gain`, while `inverse_gain` stays at 1 or
+// above. A late or filtered torque channel lowers both, and the coherence stays high.
+struct TransferBand {
+  double lower_Hz = 0, upper_Hz = 0;
+  double gain = 0, gain_sd = 0;  // |S_xy| / S_xx
+  double inverse_gain = 0;       // S_yy / |S_xy|
+  double coherence = 0;          // 0 to 1
+};
+std::vector<TransferBand> Transfer(const Dataset& data, int joint, const Eigen::VectorXd& predicted);
+
+// The frequency above which the prediction of this joint is mostly noise of the derived signals; infinity: nowhere
+// below half the sample rate.
+double AgreedBand_Hz(const std::vector<TransferBand>& transfer);
+
+// One row a half period of band_Hz: the Gaussian average, 3 dB down at band_Hz, of the used samples about it. Columns
+// and torque pass the same average, so a model that holds at every sample holds for the rows. [rows x samples]
+Eigen::SparseMatrix<double, Eigen::RowMajor> AverageRows(const Dataset& data, int joint);
+
+}  // namespace armcal::calibration

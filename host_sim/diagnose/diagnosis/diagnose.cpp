@@ -71,7 +71,7 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
     t.eta_sd = VectorXd::Zero(static_cast<Eigen::Index>(c.eta.size()));
     if (c.confirmed) {
       t.amplitude = w.estimate.amplitude[k];
-      t.sd = deviation[k].amplitude, t.eta_sd = deviation[k].eta, ++k;
+      t.sd = deviation[k].amplitude, t.eta_sd = deviation[k].eta, t.covariance = deviation[k].covariance, ++k;
     }
     finding.terms.push_back(std::move(t));
   }

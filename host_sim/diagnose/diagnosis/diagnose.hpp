@@ -37,6 +37,7 @@ struct Term {
   Eigen::VectorXd amplitude, sd;  // of the columns
   std::vector<double> eta;
   Eigen::VectorXd eta_sd;
+  Eigen::MatrixXd covariance;  // of eta, then amplitude
   double score = 0;
   Eigen::VectorXd folds;               // improvement of chi^2 out of fold
   std::vector<std::string> also_fits;  // kinds that this log cannot tell from it

@@ -55,6 +55,7 @@ struct Diagnosis::Work {
   // Standard deviations of the terms' amplitudes and unknowns, all free together, at the estimate that Solve has left.
   struct Deviation {
     Eigen::VectorXd amplitude, eta;
+    Eigen::MatrixXd covariance;  // of eta, then amplitude; zero where eta is not free
   };
   std::vector<Deviation> Deviations(const std::vector<const Chosen*>& terms);
 

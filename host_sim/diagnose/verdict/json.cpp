@@ -31,6 +31,13 @@ std::vector<std::string> Signals(const Term& t) {
   return out;
 }
 
+// Rows of a matrix.
+nlohmann::ordered_json ToJson(const Eigen::MatrixXd& m) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (Eigen::Index r = 0; r < m.rows(); ++r) out.push_back(ToList(m.row(r)));
+  return out;
+}
+
 nlohmann::ordered_json RefutedJson(const diagnosis::Refutation& why) {
   nlohmann::ordered_json out;
   if (why.joint < 0) out["joint"] = "all";
@@ -70,6 +77,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
       parameters[t.columns[c].name] = t.amplitude[c], deviations[t.columns[c].name] = t.sd[c];
     term["parameters"] = parameters;
     term["parameter_sd"] = deviations;
+    term["eta"] = t.eta, term["amplitude"] = ToList(t.amplitude), term["covariance"] = ToJson(t.covariance);
     term["also_fits"] = t.also_fits;
     term["confirmed"] = t.confirmed;
     if (t.refuted) term["refuted"] = RefutedJson(*t.refuted);
@@ -144,6 +152,31 @@ std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::ve
   if (out.empty())
     throw io::InputError(
         fmt::format("{}: expected a term with nonlinear parameters among {}", path, fmt::join(effects, ", ")));
+  return out;
+}
+
+diagnosis::KnownTerm ReadKnownTerm(const ordered_json& term, const codegen::Catalogue& catalogue,
+                                   Eigen::MatrixXd& covariance) {
+  diagnosis::KnownTerm out;
+  const auto number = [](const ordered_json& j) { return j.is_number() ? j.get<double>() : 0; };  // null: not finite
+  try {
+    const auto record = catalogue.find(term.at("record").get<std::string>());
+    if (record == catalogue.end()) throw io::InputError(term["record"].dump() + ": expected a record of the catalogue");
+    out.record = &record->second;
+    for (const int joint : term.at("joints")) out.joints.push_back(joint - 1);
+    out.eta = term.at("eta").get<std::vector<double>>();
+    const ordered_json &amplitude = term.at("amplitude"), &rows = term.at("covariance");
+    out.amplitude.resize(static_cast<Eigen::Index>(amplitude.size()));
+    for (std::size_t c = 0; c < amplitude.size(); ++c)
+      out.amplitude[static_cast<Eigen::Index>(c)] = number(amplitude[c]);
+    const auto size = static_cast<Eigen::Index>(out.eta.size() + amplitude.size());
+    covariance.setZero(size, size);
+    for (Eigen::Index r = 0; r < size; ++r)
+      for (Eigen::Index c = 0; c < size; ++c)
+        covariance(r, c) = number(rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)));
+  } catch (const nlohmann::json::exception&) {
+    throw io::InputError("expected a verdict with eta, amplitude and covariance of each term: diagnose anew");
+  }
   return out;
 }
 

@@ -11,7 +11,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-constexpr double kStep = 1e-3;  // of a parameter's range or size, for the difference
+constexpr double kDifference = 1e-3;  // of a parameter's range or size, for the difference
 }  // namespace
 
 TermTorques TorquesOf(const KnownTerm& term, const codegen::Model& model, const calibration::Fit& declared,
@@ -28,7 +28,7 @@ TermTorques TorquesOf(const KnownTerm& term, const codegen::Model& model, const 
   for (std::size_t k = 0; k < term.eta.size(); ++k) {
     const codegen::EffectUnknown& unknown = candidate.unknowns()[k % candidate.unknowns().size()];
     const double range = unknown.upper - unknown.lower;
-    const double step = kStep * (unknown.logarithmic ? std::min(range, std::abs(term.eta[k])) : range);
+    const double step = kDifference * (unknown.logarithmic ? std::min(range, std::abs(term.eta[k])) : range);
     std::vector<double> above = term.eta, below = term.eta;
     above[k] += step, below[k] -= step;
     out.slope.push_back((CandidateTorque(candidate, quantities, above, amplitude) -

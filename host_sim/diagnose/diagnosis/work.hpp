@@ -27,7 +27,8 @@ struct Chosen {
   std::vector<Rival> rivals;
   bool earns = true;  // its place beside the others, as last seen
   bool confirmed = true;
-  double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
+  std::string unconfirmed;  // why it is not, where no held-out log refuted it
+  double delay_s = 0;       // of a term that delays the measurement: as it has been applied to the logs
 };
 
 // The confirmed terms, except `without`.

@@ -106,7 +106,7 @@ Traces TracesOf(const Verdicts& splits, const CommonRows& rows, const codegen::C
   return out;
 }
 
-Apart Compare(const Trace& a, const Trace& b) {
+Distance Compare(const Trace& a, const Trace& b) {
   const double longer = std::max({a.left.norm(), b.left.norm(), 1e-300});
   return {(a.left - b.left).norm() / longer, std::hypot(a.uncertainty, b.uncertainty) / longer};
 }

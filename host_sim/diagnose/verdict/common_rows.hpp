@@ -46,9 +46,9 @@ Traces TracesOf(const Verdicts& splits, const CommonRows& rows, const codegen::C
 
 // How far two traces lie apart, over the length of the longer one; and the uncertainty of that, which takes the two as
 // independent. Fits to overlapping logs are not: the true uncertainty is then smaller.
-struct Apart {
+struct Distance {
   double share = 0, uncertainty = 0;
 };
-Apart Compare(const Trace& a, const Trace& b);
+Distance Compare(const Trace& a, const Trace& b);
 
 }  // namespace armcal::verdict

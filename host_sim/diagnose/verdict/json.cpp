@@ -8,6 +8,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
+#include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
 
@@ -28,6 +29,21 @@ std::vector<std::string> Signals(const Term& t) {
     else if (s.back() == ')') out.push_back(s.insert(s.size() - 1, joint));
     else out.push_back(s == "tau_rigid" ? "load" + joint : s + joint);
   }
+  return out;
+}
+
+// {"r": "not determined", "gap": "on its bound"}: parameters that nobody should use alone.
+nlohmann::ordered_json MarksJson(const Term& t) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::object();
+  if (!t.in_fit) return out;
+  const diagnosis::Marks marks = diagnosis::MarkParameters(t);
+  const auto add = [&](const std::string& name, diagnosis::Mark mark) {
+    if (mark != diagnosis::Mark::kNone)
+      out[name] = mark == diagnosis::Mark::kOnBound ? "on its bound" : "not determined";
+  };
+  for (std::size_t k = 0; k < t.eta.size(); ++k) add(t.unknowns[k].name, marks.eta[k]);
+  for (std::size_t c = 0; c < t.columns.size() && t.record->generic_penalty == 0; ++c)
+    add(t.columns[c].name, marks.amplitude[c]);
   return out;
 }
 
@@ -81,7 +97,10 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["also_fits"] = t.also_fits;
     term["confirmed"] = t.confirmed;
     if (t.refuted) term["refuted"] = RefutedJson(*t.refuted);
-    if (t.confirmed && !t.training_only) {
+    if (!t.unconfirmed.empty()) term["unconfirmed"] = t.unconfirmed;
+    term["marks"] = MarksJson(t);
+    term["sentence"] = Sentence(v, n);
+    if (t.in_fit && !t.training_only) {
       const Dependence d = DependenceOf(v, n);
       term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true));
       term["dependence"] = {
@@ -90,6 +109,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["score"] = t.score;
     term["folds"] = ToList(t.folds);
     term["runner_up"] = t.rivals.empty() ? "" : RivalName(t.rivals[0]);
+    if (!t.rivals.empty()) term["runner_up_refused"] = t.rivals[0].refused;
     term["runner_up_score"] = t.rivals.empty() ? 0 : t.rivals[0].score;
     term["separate"] = nlohmann::ordered_json::array();
     for (const Separation& apart : v.separation[n])
@@ -112,6 +132,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["noise_innovation"] = ToList(f.innovation);
   j["smallest_detectable"] = ToList(f.smallest);
   if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
+  j["held_out_motion"] = ToJson(v.motion);
+  j["not_looked_at"] = NotLookedAt(v);
   j["exogeneity"] = ToJson(v.exogeneity);
   j["seconds"] = v.seconds;
   return j;

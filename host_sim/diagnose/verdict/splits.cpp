@@ -76,15 +76,16 @@ std::optional<Strings> Common(const Agreement& a, const ordered_json& term) {
 
 // Whether two occurrences are the same torque on the same samples. A state of a run has no trace: its shape is that
 // run's own. other: what to say of the worst pair that is not.
-bool SameForm(const Occurrence& a, const Occurrence& b, const Traces& traces, Apart& worst) {
+bool SameForm(const Occurrence& a, const Occurrence& b, const Traces& traces, Distance& worst) {
   if (a.term["class"] == "run_state" && b.term["class"] == "run_state") return true;
   const auto one = traces.find({a.held_out, a.place}), other = traces.find({b.held_out, b.place});
-  const Apart apart = one == traces.end() || other == traces.end() ? Apart{1, 0} : Compare(one->second, other->second);
+  const Distance apart =
+      one == traces.end() || other == traces.end() ? Distance{1, 0} : Compare(one->second, other->second);
   if (apart.share > worst.share) worst = apart;
   return apart.share < kSameForm;
 }
 
-std::string OtherForm(const Apart& apart) {
+std::string OtherForm(const Distance& apart) {
   return fmt::format("{} (on the same samples {:.0f} % of the larger apart, uncertainty {:.0f} %)",
                      apart.share < kUncertain * apart.uncertainty ? "too uncertain to compare" : "of another form",
                      100 * apart.share, 100 * apart.uncertainty);
@@ -93,15 +94,15 @@ std::string OtherForm(const Apart& apart) {
 // Adds that term of the verdict which lies closest to those of the agreement. False: there is none. other: how far the
 // closest of a fitting name lies apart.
 bool Extend(Agreement& a, const std::string& held_out, const ordered_json& verdict, const Traces& traces,
-            std::optional<Apart>& other) {
+            std::optional<Distance>& other) {
   std::optional<Occurrence> best;
   Strings best_kinds;
-  Apart best_apart;
+  Distance best_apart;
   for (std::size_t k = 0; k < verdict.value("terms", ordered_json::array()).size(); ++k) {
     const auto kinds = Common(a, verdict["terms"][k]);
     const auto occurrence = Helps(held_out, verdict, k);
     if (!kinds || !occurrence) continue;
-    Apart worst;
+    Distance worst;
     bool same = true;
     for (const Occurrence& o : a.split) same = SameForm(o, *occurrence, traces, worst) && same;
     if (!same && (!other || worst.share < other->share)) other = worst;
@@ -187,7 +188,7 @@ Agreed Agree(const Verdicts& splits, const Comparison& comparison) {
       Agreement a{Kinds(term), joint, term["signals"].get<Strings>(), {*here}, 0, {}, {}};
       Strings missing;
       for (const auto& [name, other] : splits) {
-        std::optional<Apart> apart;
+        std::optional<Distance> apart;
         if (name == held_out || Extend(a, name, other, comparison.traces, apart)) continue;
         missing.push_back(fmt::format("{} with {} held out", apart ? OtherForm(*apart) : "not found", name));
       }

@@ -30,7 +30,7 @@ struct Agreement {
   std::string joint;
   std::vector<std::string> signals;
   std::vector<Occurrence> split;                           // one a held-out run
-  double apart = 0;                                        // of the two that differ most: as Apart::share
+  double apart = 0;                                        // of the two that differ most: as Distance::share
   std::vector<std::pair<std::string, Spread>> parameters;  // by name; empty where the splits have different ones
   std::pair<std::string, Spread> size;  // RMS of the traces on the joint of the first split; no name: unknown
 };

@@ -40,14 +40,11 @@ report::Table HoldsTable(const Agreement& a) {
 }
 
 const char* const kSpreadCaption =
-    "Over the splits. The interval holds the spread between runs: splits share training runs, so it is a jackknife's "
-    "over "
-    "the groups of runs that are held out together, with Student's t. Between runs: what the fits' own deviations do "
-    "not "
-    "explain.";
+    "sd and interval hold the spread between runs. Splits share training runs, so they are a jackknife's over the "
+    "groups of runs that are held out together.";
 
 report::Table SpreadTable(const Agreement& a) {
-  report::Table t{{"parameter", "mean", "sd", "between runs", "95 % from", "to"}, {}, kSpreadCaption};
+  report::Table t{{"parameter", "mean", "sd", "between runs", "95 % from", "to"}, {}};
   const auto add = [&](const std::string& name, const Spread& s) {
     t.rows.push_back({name, fmt::format("{:.4g}", s.mean), fmt::format("{:.2g}", s.sd),
                       fmt::format("{:.2g}", s.between), fmt::format("{:.4g}", s.lower),
@@ -136,6 +133,7 @@ std::string SplitsText(const Verdicts& splits, const Agreed& agreed) {
   std::string text = report::Text(ErrorTable(splits)) + "\n" + Headline(agreed) + "\n";
   for (const Agreement& a : agreed.holds)
     text += "\n" + Title(a) + "\n" + report::Text(HoldsTable(a)) + "\n" + report::Text(SpreadTable(a));
+  if (!agreed.holds.empty()) text += std::string("\n") + kSpreadCaption + "\n";
   if (!agreed.does_not.empty()) text += "\nnot claimed\n" + report::Text(DoesNotTable(agreed));
   return text;
 }
@@ -178,7 +176,9 @@ void WriteSplitsPage(const fs::path& path, const std::string& robot, const Verdi
   for (const Agreement& a : agreed.holds) {
     page.Section(Title(a));
     page.Add(HoldsTable(a));
-    page.Add(SpreadTable(a));
+    report::Table spread = SpreadTable(a);
+    spread.caption = kSpreadCaption;
+    page.Add(spread);
     page.Add(TermPlot(splits, a), kTermCaption);
   }
   if (!agreed.does_not.empty()) {

@@ -34,10 +34,16 @@ bool IsAtEdge(const codegen::EffectUnknown& u, double value) {
   return value < u.lower + room || value > u.upper - room;
 }
 
-// a' C^-1 a over the directions of C that are not rounding.
+// Its coefficients mean nothing one by one: neighbours stand for each other.
+bool IsForm(const Term& t) {
+  constexpr std::size_t kMany = 4;
+  return t.record->generic_penalty > 0 || t.record->search.how == codegen::SearchWay::kSpline ||
+         t.columns.size() > kMany;
+}
+
+// a' C^-1 a over the directions of C that are not rounding. Every sd is above zero.
 double Significance(const VectorXd& a, const MatrixXd& C) {
-  const VectorXd sd = C.diagonal().cwiseMax(0).cwiseSqrt();
-  if (sd.minCoeff() <= 0) return 0;
+  const VectorXd sd = C.diagonal().cwiseSqrt();
   const VectorXd scaled = a.cwiseQuotient(sd);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
       MatrixXd(sd.cwiseInverse().asDiagonal() * C * sd.cwiseInverse().asDiagonal()));
@@ -64,7 +70,8 @@ Marks MarkParameters(const Term& t) {
     else if (!(sd > 0) || !(std::abs(t.eta[k]) > sd)) out.eta[k] = Mark::kUndetermined;
     ++parameters, marked += out.eta[k] != Mark::kNone;
   }
-  std::vector<Index> free;
+  std::vector<Index> seen;  // amplitudes of columns that the logs see at all
+  bool any_free = false;
   for (std::size_t c = 0; c < t.columns.size(); ++c) {
     const codegen::EffectColumn& column = t.columns[c];
     if (column.fixed_amplitude) continue;
@@ -74,15 +81,18 @@ Marks MarkParameters(const Term& t) {
     if (!(sd > 0) || !(std::abs(value) > sd)) out.amplitude[c] = Mark::kUndetermined;
     else if (beyond) out.amplitude[c] = Mark::kOnBound;
     ++parameters, marked += out.amplitude[c] != Mark::kNone;
-    free.push_back(static_cast<Index>(c));
+    any_free = true;
+    if (sd > 0) seen.push_back(static_cast<Index>(c));
+    if (IsForm(t)) out.amplitude[c] = Mark::kNone;
   }
   // By chance alone the sum is about as large as there are amplitudes.
-  if (!free.empty() && t.covariance.size() > 0) {
-    std::vector<Index> place = free;
+  if (any_free) {
+    std::vector<Index> place = seen;
     for (Index& p : place) p += static_cast<Index>(t.eta.size());
-    out.usable = Significance(t.amplitude(free), t.covariance(place, place)) > static_cast<double>(free.size());
+    out.usable =
+        !seen.empty() && Significance(t.amplitude(seen), t.covariance(place, place)) > static_cast<double>(seen.size());
   }
-  out.usable = out.usable && marked < parameters;
+  out.usable = out.usable && (IsForm(t) || marked < parameters);
   return out;
 }
 
@@ -93,7 +103,6 @@ std::string MarkText(const Term& t) {
   for (std::size_t k = 0; k < t.eta.size(); ++k)
     if (marks.eta[k] != Mark::kNone)
       add(MarkedValue(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Index>(k)], t.unknowns[k].unit, marks.eta[k]));
-  if (t.record->generic_penalty > 0) return out;  // a curve's coefficients say nothing one by one
   for (std::size_t c = 0; c < t.columns.size(); ++c)
     if (marks.amplitude[c] != Mark::kNone)
       add(MarkedValue(t.columns[c].name, t.amplitude[static_cast<Index>(c)], t.sd[static_cast<Index>(c)],

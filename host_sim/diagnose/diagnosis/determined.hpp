@@ -19,7 +19,7 @@ enum class Mark {
 struct Marks {
   std::vector<Mark> eta, amplitude;
   // The amplitudes together are larger than their covariance explains by chance, and a parameter at least is
-  // determined.
+  // determined. Coefficients of a form mean nothing one by one and have no marks; for it the first is enough.
   bool usable = true;
 };
 Marks MarkParameters(const Term& term);

@@ -42,8 +42,7 @@ nlohmann::ordered_json MarksJson(const Term& t) {
       out[name] = mark == diagnosis::Mark::kOnBound ? "on its bound" : "not determined";
   };
   for (std::size_t k = 0; k < t.eta.size(); ++k) add(t.unknowns[k].name, marks.eta[k]);
-  for (std::size_t c = 0; c < t.columns.size() && t.record->generic_penalty == 0; ++c)
-    add(t.columns[c].name, marks.amplitude[c]);
+  for (std::size_t c = 0; c < t.columns.size(); ++c) add(t.columns[c].name, marks.amplitude[c]);
   return out;
 }
 

@@ -67,6 +67,26 @@ TEST(Determined, AmplitudesThatAreDeterminedTogether_AreUsable) {
   EXPECT_TRUE(MarkParameters(t).usable);
 }
 
+// An arm that does not feel gravity: the column of the load is zero in every row, and its estimate and deviation are.
+TEST(Determined, AColumnThatTheLogsDoNotSee_CostsTheTermNothing) {
+  const Term t = TermOf("backlash", {3e-4}, {1e-5}, {1e5, 0}, {1e3, 0});
+  EXPECT_TRUE(MarkParameters(t).usable);
+  EXPECT_EQ(MarkParameters(t).amplitude[1], Mark::kUndetermined);
+}
+
+// Coefficients of neighbouring splines, each uncertain: the form is not.
+TEST(Determined, AFormWhoseCoefficientsAreUncertainOneByOne_IsUsable) {
+  Term t = TermOf("torque_drift", {0, 20}, {0, 0}, std::vector<double>(40, 0.1), std::vector<double>(40, 1));
+  const auto n = static_cast<Eigen::Index>(t.columns.size());
+  t.amplitude.conservativeResize(n), t.sd.conservativeResize(n);
+  // All coefficients have one common error: their differences are sharp.
+  t.covariance = Eigen::MatrixXd::Zero(n + 2, n + 2);
+  t.covariance.bottomRightCorner(n, n) = Eigen::MatrixXd::Constant(n, n, 1) + 1e-4 * Eigen::MatrixXd::Identity(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) t.amplitude[k] = k % 2 ? 0.1 : -0.1;
+  EXPECT_TRUE(MarkParameters(t).usable);
+  EXPECT_EQ(MarkText(t), "");
+}
+
 TEST(Determined, AParameterWhereItsRangeEnds_IsOnItsBound) {
   const Term t = TermOf("torque_ripple", {4}, {0.01}, {0.3, 0.2}, {0.01, 0.01});  // the record's range begins at 4
   EXPECT_EQ(MarkParameters(t).eta[0], Mark::kOnBound);

@@ -35,8 +35,10 @@ void Print(const DiagnosisRun& run, const DiagnoseOptions& o) {
   if (!o.model_out.empty() && !run.view.finding->terms.empty()) {
     const bool held = std::any_of(json["terms"].begin(), json["terms"].end(),
                                   [](const auto& t) { return t["in_model"].template get<bool>(); });
+    const bool confirmed = verdict::AnyConfirmed(*run.view.finding);
     fmt::print("new model: {} ({})\n", o.model_out,
-               !held                                   ? "with what was found as comments: no model can hold it"
+               !confirmed                              ? "the declared one: no term is confirmed"
+               : !held                                 ? "with what was found as comments: no model can hold it"
                : json["model"]["by_table"].get<bool>() ? "a table switches it on"
                                                        : "generate it and build the drive anew");
   }
@@ -49,6 +51,9 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   run->catalogue = LoadCatalogue();
   run->model = std::make_unique<codegen::Model>(codegen::ReadRobot(RobotPath(o.robot)), run->catalogue);
   const codegen::Model& model = *run->model;
+  for (const std::string& p : o.train)
+    if (std::error_code none; std::filesystem::equivalent(p, o.test, none))
+      throw io::InputError("--test " + o.test + ": expected another log than those of --train");
   const LogReader read(model, o.channels, o.cutoff_Hz);
   for (const calibration::Dataset& log : read.All(o.train)) run->train.push_back(calibration::ThinToBand(log));
   std::vector<calibration::Dataset> narrow;
@@ -76,12 +81,15 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   }
   run->test = read.One(o.test);
   run->held_out = run->diagnosis->Judge(run->test);
+  const calibration::HeldOutMotion motion =
+      calibration::CompareMotion(model, finding.declared, calibration::Pointers(run->train), run->test);
+  if (motion.repeats()) run->diagnosis->ConfirmNothing(verdict::MotionText(motion)[0]);
   const std::string after_test = diagnosis::ModelFile(model, finding, provenance);
   if (!o.model_out.empty() && after_test != before_test)
     files::WriteWholeFile(o.model_out, after_test);  // what was not confirmed is taken out
 
   run->view = {&model,  &finding,   &run->test, &run->held_out, run->diagnosis->TermTorque(run->test),
-               seconds, exogeneity, {}};
+               seconds, exogeneity, {},         &run->train,    motion};
   for (const diagnosis::Term& t : finding.terms)
     run->view.separation.push_back(verdict::Separations(t, finding, model, run->catalogue, o.robot, o.json));
   nlohmann::ordered_json& json = run->json;

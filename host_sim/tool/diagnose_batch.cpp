@@ -1,6 +1,7 @@
 // tool - armcal diagnose --batch and --splits: runs many diagnoses, one process each, and sums up what they found.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <set>
@@ -13,6 +14,7 @@
 #include "host_sim/diagnose/verdict/summary.hpp"
 #include "host_sim/identify/search/parallel.hpp"
 #include "host_sim/tool/diagnose.hpp"
+#include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/process.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -194,12 +196,32 @@ std::vector<DiagnosisCase> MakeSplits(const std::vector<std::string>& groups, co
   return cases;
 }
 
+// The terms of all splits on the runs of all splits. A run without a verdict is left out: its log may not be readable.
+verdict::Comparison CompareSplits(const DiagnoseOptions& one, const std::vector<DiagnosisCase>& cases,
+                                  const verdict::Verdicts& verdicts) {
+  verdict::Comparison out;
+  if (std::all_of(verdicts.begin(), verdicts.end(), [](const auto& v) { return v.second["verdict"] == "failed"; }))
+    return out;
+  const codegen::Catalogue catalogue = LoadCatalogue();
+  const codegen::Model model(codegen::ReadRobot(RobotPath(one.robot)), catalogue);
+  const LogReader read(model, one.channels, one.cutoff_Hz);
+  std::vector<calibration::Dataset> runs;
+  std::map<std::vector<std::string>, int> group;  // by training runs
+  for (const DiagnosisCase& c : cases) {
+    if (verdicts.at(c.name)["verdict"] == "failed") continue;
+    runs.push_back(read.One(c.test[0]));
+    out.group[c.name] = group.try_emplace(c.train, static_cast<int>(group.size())).first->second;
+  }
+  out.traces = verdict::TracesOf(verdicts, verdict::CommonRows(model, runs), catalogue);
+  return out;
+}
+
 // kOk, or kPartial where a split has no verdict. Throws io::InputError: fewer than two groups of runs, or two runs of
 // one name.
 int RunSplits(const DiagnoseOptions& one, const BatchOptions& options) {
   const std::vector<DiagnosisCase> cases = MakeSplits(options.splits, one.robot);
   const verdict::Verdicts verdicts = DiagnoseAll(cases, one, options.out, options.jobs);
-  const verdict::Agreed agreed = verdict::Agree(verdicts);
+  const verdict::Agreed agreed = verdict::Agree(verdicts, CompareSplits(one, cases, verdicts));
   fmt::print("{}", verdict::SplitsText(verdicts, agreed));
   nlohmann::ordered_json json = verdict::SplitsJson(verdicts, agreed);
   for (const DiagnosisCase& c : cases)

@@ -69,6 +69,12 @@ std::string RangesFromLeastSquares(calibration::Problem& problem) {
                      kDeviations);
 }
 
+// What the held-out log cannot tell, to the terminal and the JSON.
+void AddMotion(const calibration::HeldOutMotion& motion, nlohmann::ordered_json& json) {
+  for (const std::string& line : verdict::MotionText(motion)) fmt::print("{}\n", line);
+  json["held_out_motion"] = verdict::ToJson(motion);
+}
+
 // kOk, or kPartial where the method says that it did not converge. Throws io::InputError: unknown method, or a log that
 // lacks what the method needs.
 int RunMethod(const MethodOptions& o) {
@@ -104,6 +110,8 @@ int RunMethod(const MethodOptions& o) {
     verdict::PrintHeldOut(e, o.test);
     json["test"] = o.test;
     json["held_out"] = verdict::ToJson(e);
+    const auto logs = calibration::Pointers(train);
+    AddMotion(calibration::CompareMotion(model, calibration::WeightedFit(model, logs), logs, test), json);
   }
   WriteJson(o.json, json);
   return s.converged ? kOk : kPartial;
@@ -355,6 +363,7 @@ int RunIdentify(const IdentifyOptions& o) {
     verdict::PrintHeldOut(e, o.test);
     json["test"] = o.test;
     json["held_out"] = verdict::ToJson(e);
+    AddMotion(calibration::CompareMotion(model, all, calibration::Pointers(train), test), json);
   }
   WriteJson(o.json, json);
   return kOk;

@@ -116,14 +116,22 @@ std::vector<Diagnosis::Work::Deviation> Diagnosis::Work::Deviations(const std::v
   for (const auto* log : train) time.push_back(&log->s.t);
   const MatrixXd P = metric.RobustCovariance(all, kBlock_s, time);
   const int d = rows.coordinates();
-  const VectorXd x_sd = (rows.L * P.topLeftCorner(d, d) * rows.L.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
-  const VectorXd eta_sd = P.diagonal().tail(P.rows() - d).cwiseMax(0).cwiseSqrt();
+  const Eigen::Index unknown = P.rows() - d, coordinates = rows.L.rows();
+  MatrixXd map = MatrixXd::Zero(coordinates + unknown, P.rows());  // from z and the unknowns to x and the unknowns
+  map.topLeftCorner(coordinates, d) = rows.L, map.bottomRightCorner(unknown, unknown).setIdentity();
+  const MatrixXd all_covariance = map * P * map.transpose();
+  const VectorXd sd = all_covariance.diagonal().cwiseMax(0).cwiseSqrt();
   std::vector<Deviation> out;
   int at = static_cast<int>(declared.active.size()), slope = 0;
   for (const Chosen* t : terms) {
     const int columns = t->candidate->columns(t->eta), count = static_cast<int>(t->eta.size());
-    out.push_back({x_sd.segment(at, columns), VectorXd::Zero(count)});
-    if (!t->candidate->is_curve()) out.back().eta = eta_sd.segment(slope, count), slope += count;
+    out.push_back({sd.segment(at, columns), VectorXd::Zero(count), MatrixXd::Zero(count + columns, count + columns)});
+    std::vector<Eigen::Index> from, to;  // a curve's unknowns are not free
+    for (int k = 0; k < count && !t->candidate->is_curve(); ++k)
+      from.push_back(coordinates + slope + k), to.push_back(k);
+    for (int c = 0; c < columns; ++c) from.push_back(at + c), to.push_back(count + c);
+    out.back().covariance(to, to) = all_covariance(from, from);
+    if (!t->candidate->is_curve()) out.back().eta = sd.segment(coordinates + slope, count), slope += count;
     at += columns;
   }
   return out;

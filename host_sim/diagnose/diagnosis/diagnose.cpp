@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/diagnosis/selector.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 #include "host_sim/identify/calibration/dataset.hpp"
@@ -66,12 +67,13 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
     t.score = c.found.score;
     t.folds = c.folds, t.also_fits = c.also_fits;
     t.rivals = c.rivals;
-    t.training_only = c.candidate->is_event(), t.confirmed = c.confirmed;
+    t.training_only = c.candidate->is_event(), t.confirmed = t.in_fit = c.confirmed;
+    t.unconfirmed = c.unconfirmed;
     t.amplitude = VectorXd::Zero(c.candidate->columns(c.eta)), t.sd = t.amplitude;
     t.eta_sd = VectorXd::Zero(static_cast<Eigen::Index>(c.eta.size()));
     if (c.confirmed) {
       t.amplitude = w.estimate.amplitude[k];
-      t.sd = deviation[k].amplitude, t.eta_sd = deviation[k].eta, ++k;
+      t.sd = deviation[k].amplitude, t.eta_sd = deviation[k].eta, t.covariance = deviation[k].covariance, ++k;
     }
     finding.terms.push_back(std::move(t));
   }
@@ -97,6 +99,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
     for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k) w.chosen[k].earns = StaysIn(w, select, w.chosen[k]);
     w.Polish();
   }
+  const int most = static_cast<int>(w.chosen.size()) == kMaxTerms ? kMaxTerms : 0;
   // All terms but the latest have been searched again since the latest came.
   bool searched = true;
   for (std::size_t k = 0; w.chosen.size() > 1 && k < w.chosen.size();) {
@@ -111,7 +114,8 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
             [](const Chosen& a, const Chosen& b) { return a.found.score > b.found.score; });
   w.Polish();
   finding_.declared = w.declared;
-  WriteTerms(w, finding_);
+  LeaveOutUndetermined(w, finding_);
+  finding_.most_terms = most;
   finding_.smallest.resize(model.joints());
   for (int j = 0; j < model.joints(); ++j) {
     const double rows = std::max(2, w.evidence.index[j].size());
@@ -291,6 +295,13 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   WriteTerms(w, finding_);
   for (std::size_t k = 0; k < why.size(); ++k) finding_.terms[k].refuted = why[k];
   return out;
+}
+
+void Diagnosis::ConfirmNothing(const std::string& why) {
+  for (Term& t : finding_.terms) {
+    if (!t.confirmed || t.training_only || t.record->effect_class == codegen::EffectClass::kRunState) continue;
+    t.confirmed = false, t.unconfirmed = why;
+  }
 }
 
 std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) const {

@@ -19,6 +19,8 @@ struct Rival {
   const codegen::EffectRecord* record = nullptr;
   std::vector<int> joints;
   double score = 0;
+  std::string refused;  // why it was not taken, where it scored higher in that pass
+  double beside = 0;    // the term's own score in the same pass
 };
 
 // How a held-out log refuted a term: which joint it predicts worse with the term than without it.
@@ -37,13 +39,16 @@ struct Term {
   Eigen::VectorXd amplitude, sd;  // of the columns
   std::vector<double> eta;
   Eigen::VectorXd eta_sd;
+  Eigen::MatrixXd covariance;  // of eta, then amplitude
   double score = 0;
   Eigen::VectorXd folds;               // improvement of chi^2 out of fold
   std::vector<std::string> also_fits;  // kinds that this log cannot tell from it
   std::vector<Rival> rivals;           // the runner-up, then those of also_fits that are not it
   bool training_only = false;          // an event of the training log: it says nothing about the arm or another log
-  bool confirmed = true;               // false: the held-out log did not bear it out
-  std::optional<Refutation> refuted;   // why it is not confirmed
+  bool confirmed = true;               // false: the held-out log did not bear it out, or nobody could use it
+  std::optional<Refutation> refuted;   // how the held-out log refuted it
+  std::string unconfirmed;             // else why it is not confirmed
+  bool in_fit = true;                  // it is in the model that was compared; false: refuted, or not determined
 };
 
 struct Finding {
@@ -52,6 +57,7 @@ struct Finding {
   Eigen::VectorXd x;                  // filter coordinates and gains with the terms in
   Eigen::VectorXd sigma, innovation;  // [n] residual and innovation standard deviation with the terms in
   Eigen::VectorXd smallest;           // [n] RMS of the smallest effect that would have been seen
+  int most_terms = 0;                 // the search ended at so many, and did not ask for another; 0: it did
 };
 
 struct HeldOut {
@@ -76,6 +82,10 @@ class Diagnosis {
   // of all joints' errors, by more than 0.5 %, against the declared model or against the other terms, as not confirmed,
   // says why, and leaves them out of `after`; kinds and nonlinear parameters do not change.
   HeldOut Judge(const calibration::Dataset& test);
+
+  // After Judge: the held-out log repeats a trajectory of the training logs. What was found there about the arm is no
+  // longer confirmed, and says this as the reason; it stays in the comparison. A state of a run is not touched.
+  void ConfirmNothing(const std::string& why);
 
   // One N x n torque a term on a log (run-state terms: as windows of that log's own time would give).
   std::vector<Eigen::MatrixXd> TermTorque(const calibration::Dataset& data) const;

@@ -1,6 +1,8 @@
 // diagnosis - ranks the candidates, accepts the next term, and checks whether a chosen one still earns its place.
 #include "host_sim/diagnose/diagnosis/selector.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -129,6 +131,7 @@ bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chose
     ranked = Rank(reach, grounds);
   }
   for (Found& f : ranked) Rescore(grounds, f);
+  refused_.clear();
   Sort(ranked);
   for (std::size_t k = 0; k < ranked.size(); ++k)
     if (ranked[k].score > kAccept && Accept(grounds, terms, ranked, k, out)) return true;
@@ -185,7 +188,7 @@ bool Selector::IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>
 }
 
 // By score; what is compiled in already wins among equals.
-void Selector::Sort(std::vector<Found>& ranked) const {
+void Selector::Sort(std::vector<Found>& ranked) {
   const auto standing = [this](const Found& f) {
     const auto& names = w_.standby;
     return f.score + (std::find(names.begin(), names.end(), f.candidate->record().name) != names.end() ? 1e-3 : 0);
@@ -197,7 +200,10 @@ void Selector::Sort(std::vector<Found>& ranked) const {
     return !f.candidate->is_curve() && f.candidate->rows() == curve.candidate->rows() && f.score > kAccept &&
            f.gain.gain > kCauseExplains * curve.gain.gain;
   });
-  if (cause != ranked.end()) std::rotate(ranked.begin(), cause, cause + 1);
+  if (cause == ranked.end()) return;
+  refused_[curve.candidate] =
+      fmt::format("names no cause, and this cause explains over {:.0f} % of what it explains", 100 * kCauseExplains);
+  std::rotate(ranked.begin(), cause, cause + 1);
 }
 
 // A chosen term, or one that looks like a chosen one on the same joints. The two together would only fit noise, and
@@ -253,9 +259,16 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   if (!holds && !f.candidate->is_event() && !once) {
     if (!f.candidate->is_curve() && metric.LargestFold(c, gain.amplitude, kBlocks, kFolds) > kOnce)
       bursts_.push_back(f.candidate);
+    refused_[f.candidate] = fmt::format(
+        "out of fold it keeps {:.0f} % of its gain (accepted above {:.0f} %) and improves {} of {} folds "
+        "(accepted from {})",
+        100 * folds.sum() / gain.gain, 100 * kKeepsOutOfFold, (folds.array() > 0).count(), kFolds, kFoldsThatImprove);
     return false;
   }
-  if (!StaysAtLowerBandwidth(f, terms, gain, noise)) return false;
+  if (!StaysAtLowerBandwidth(f, terms, gain, noise)) {
+    refused_[f.candidate] = "it does not keep its gain where speed and acceleration are derived with a lower bandwidth";
+    return false;
+  }
   out = Chosen{};
   out.candidate = f.candidate;
   out.eta = f.eta;
@@ -265,7 +278,9 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     if (other == k) continue;
     const Candidate& o = *ranked[other].candidate;
     const std::string& kind = o.record().kind;
-    const Rival rival{&o.record(), o.joints(), ranked[other].score};
+    const auto refused = refused_.find(&o);
+    const Rival rival{&o.record(), o.joints(), ranked[other].score, refused == refused_.end() ? "" : refused->second,
+                      f.score};
     const bool runner_up = out.rivals.empty();
     if (runner_up) out.rivals.push_back(rival);
     const bool said = std::find(out.also_fits.begin(), out.also_fits.end(), kind) != out.also_fits.end();

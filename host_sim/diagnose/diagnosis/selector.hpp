@@ -29,7 +29,7 @@ class Selector {
   bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   // Best first: by score, but a named cause before a curve that explains little more.
-  void Sort(std::vector<Found>& ranked) const;
+  void Sort(std::vector<Found>& ranked);
   bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
                              const std::vector<NoiseModel>& noise);
   bool MotionIsClean(const std::vector<int>& joints) const;
@@ -37,8 +37,9 @@ class Selector {
               std::size_t k, Chosen& out);
 
   Diagnosis::Work& w_;
-  std::map<const Candidate*, double> gain_;  // as last searched
-  std::vector<Candidate*> bursts_;           // causes that this pass could not judge fold by fold
+  std::map<const Candidate*, std::string> refused_;  // of this pass: why it was not accepted
+  std::map<const Candidate*, double> gain_;          // as last searched
+  std::vector<Candidate*> bursts_;                   // causes that this pass could not judge fold by fold
 };
 
 }  // namespace armcal::diagnosis

@@ -27,7 +27,8 @@ struct Chosen {
   std::vector<Rival> rivals;
   bool earns = true;  // its place beside the others, as last seen
   bool confirmed = true;
-  double delay_s = 0;  // of a term that delays the measurement: as it has been applied to the logs
+  std::string unconfirmed;  // why it is not, where no held-out log refuted it
+  double delay_s = 0;       // of a term that delays the measurement: as it has been applied to the logs
 };
 
 // The confirmed terms, except `without`.
@@ -55,6 +56,7 @@ struct Diagnosis::Work {
   // Standard deviations of the terms' amplitudes and unknowns, all free together, at the estimate that Solve has left.
   struct Deviation {
     Eigen::VectorXd amplitude, eta;
+    Eigen::MatrixXd covariance;  // of eta, then amplitude; zero where eta is not free
   };
   std::vector<Deviation> Deviations(const std::vector<const Chosen*>& terms);
 

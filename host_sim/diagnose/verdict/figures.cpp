@@ -3,6 +3,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <map>
 
 #include "host_sim/data/logs/butterworth.hpp"
@@ -13,6 +16,8 @@ namespace armcal::verdict {
 using calibration::Exogeneity;
 
 namespace {
+
+std::string FileName(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 const char* Result(const calibration::JointExogeneity& j) {
   return j.restrictions == 0 ? "cannot be told" : j.exogenous ? "holds" : "FAILS";
@@ -107,6 +112,57 @@ nlohmann::ordered_json ToJson(const Exogeneity& e) {
                              {"left_Nm", j.left_Nm},
                              {"exogenous", j.exogenous},
                              {"told", j.restrictions > 0}});
+  return out;
+}
+
+std::string JointGroup(const std::vector<int>& joints) {
+  std::string out;
+  for (std::size_t k = 0; k < joints.size(); ++k)
+    out += fmt::format("{}{}", k == 0 ? "" : k + 1 < joints.size() ? ", " : " and ", joints[k] + 1);
+  return out;
+}
+
+std::vector<std::string> MotionText(const calibration::HeldOutMotion& m) {
+  std::vector<std::string> out;
+  if (m.samples.share > 0.5)
+    out.push_back(fmt::format("the held-out log is not held out: {:.0f} % of its samples are those of {}",
+                              100 * m.samples.share, FileName(m.samples.source)));
+  else if (m.repeats())
+    out.push_back(fmt::format("the held-out log repeats a trajectory: {:.0f} % of its motion is that of {}",
+                              100 * m.trajectory.share, FileName(m.trajectory.source)));
+  for (std::size_t j = 0; j < m.joint.size(); ++j) {
+    const calibration::Outside& o = m.joint[j];
+    if (!o.beyond()) continue;
+    out.push_back(
+        fmt::format("joint {}: extrapolation: {:.0f} % of its positions and {:.0f} % of its speeds are outside "
+                    "of the training logs' range; the model's torque is {:.1f} times as uncertain there",
+                    j + 1, 100 * o.position, 100 * o.speed, std::sqrt(std::max(0.0, o.leverage))));
+  }
+  for (const auto& group : m.in_phase) {
+    out.push_back(
+        fmt::format("joints {} move in phase in the training logs{}: these do not tell a torque over one of "
+                    "them from a torque over another",
+                    JointGroup(group.joints), group.together ? " and in the held-out log" : ""));
+  }
+  return out;
+}
+
+nlohmann::ordered_json ToJson(const calibration::HeldOutMotion& m) {
+  nlohmann::ordered_json out{{"same_samples", m.samples.share},
+                             {"same_as", m.samples.source},
+                             {"repeated", m.trajectory.share},
+                             {"repeats", m.trajectory.source}};
+  out["joints"] = out["in_phase"] = nlohmann::ordered_json::array();
+  for (const calibration::Outside& o : m.joint)
+    out["joints"].push_back({{"positions_outside", o.position},
+                             {"speeds_outside", o.speed},
+                             {"variance_ratio", o.leverage},
+                             {"extrapolation", o.beyond()}});
+  for (const auto& group : m.in_phase) {
+    nlohmann::ordered_json joints;
+    for (const int j : group.joints) joints.push_back(j + 1);
+    out["in_phase"].push_back({{"joints", joints}, {"held_out_too", group.together}});
+  }
   return out;
 }
 

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_sim/identify/calibration/dataset.hpp"
+#include "host_sim/identify/calibration/held_out.hpp"
 #include "host_sim/identify/methods/exogeneity.hpp"
 
 namespace armcal::verdict {
@@ -27,5 +27,15 @@ std::vector<double> ToList(const Eigen::VectorXd& v);
 std::string ExogeneityText(const calibration::Exogeneity& e, const std::string& otherwise);
 inline constexpr const char* kLacksMore = "the model lacks a torque that no record describes";
 nlohmann::ordered_json ToJson(const calibration::Exogeneity& e);
+
+// "1, 3 and 4" of joints counted from 0.
+std::string JointGroup(const std::vector<int>& joints);
+
+// What a held-out log cannot tell, a line each: its samples or trajectory are a training log's; a joint of it is
+// outside of what training has shown; joints that move in phase. Empty: nothing to say.
+std::vector<std::string> MotionText(const calibration::HeldOutMotion& motion);
+// {"same_samples", "same_as", "repeated", "repeats", "joints": [{"positions_outside", "speeds_outside",
+// "variance_ratio", "extrapolation"}], "in_phase": [{"joints", "held_out_too"}]}
+nlohmann::ordered_json ToJson(const calibration::HeldOutMotion& motion);
 
 }  // namespace armcal::verdict

@@ -8,6 +8,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
+#include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
 
@@ -28,6 +29,27 @@ std::vector<std::string> Signals(const Term& t) {
     else if (s.back() == ')') out.push_back(s.insert(s.size() - 1, joint));
     else out.push_back(s == "tau_rigid" ? "load" + joint : s + joint);
   }
+  return out;
+}
+
+// {"r": "not determined", "gap": "on its bound"}: parameters that nobody should use alone.
+nlohmann::ordered_json MarksJson(const Term& t) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::object();
+  if (!t.in_fit) return out;
+  const diagnosis::Marks marks = diagnosis::MarkParameters(t);
+  const auto add = [&](const std::string& name, diagnosis::Mark mark) {
+    if (mark != diagnosis::Mark::kNone)
+      out[name] = mark == diagnosis::Mark::kOnBound ? "on its bound" : "not determined";
+  };
+  for (std::size_t k = 0; k < t.eta.size(); ++k) add(t.unknowns[k].name, marks.eta[k]);
+  for (std::size_t c = 0; c < t.columns.size(); ++c) add(t.columns[c].name, marks.amplitude[c]);
+  return out;
+}
+
+// Rows of a matrix.
+nlohmann::ordered_json ToJson(const Eigen::MatrixXd& m) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (Eigen::Index r = 0; r < m.rows(); ++r) out.push_back(ToList(m.row(r)));
   return out;
 }
 
@@ -70,10 +92,14 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
       parameters[t.columns[c].name] = t.amplitude[c], deviations[t.columns[c].name] = t.sd[c];
     term["parameters"] = parameters;
     term["parameter_sd"] = deviations;
+    term["eta"] = t.eta, term["amplitude"] = ToList(t.amplitude), term["covariance"] = ToJson(t.covariance);
     term["also_fits"] = t.also_fits;
     term["confirmed"] = t.confirmed;
     if (t.refuted) term["refuted"] = RefutedJson(*t.refuted);
-    if (t.confirmed && !t.training_only) {
+    if (!t.unconfirmed.empty()) term["unconfirmed"] = t.unconfirmed;
+    term["marks"] = MarksJson(t);
+    term["sentence"] = Sentence(v, n);
+    if (t.in_fit && !t.training_only) {
       const Dependence d = DependenceOf(v, n);
       term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true));
       term["dependence"] = {
@@ -82,6 +108,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["score"] = t.score;
     term["folds"] = ToList(t.folds);
     term["runner_up"] = t.rivals.empty() ? "" : RivalName(t.rivals[0]);
+    if (!t.rivals.empty()) term["runner_up_refused"] = t.rivals[0].refused;
     term["runner_up_score"] = t.rivals.empty() ? 0 : t.rivals[0].score;
     term["separate"] = nlohmann::ordered_json::array();
     for (const Separation& apart : v.separation[n])
@@ -104,6 +131,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["noise_innovation"] = ToList(f.innovation);
   j["smallest_detectable"] = ToList(f.smallest);
   if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
+  j["held_out_motion"] = ToJson(v.motion);
+  j["not_looked_at"] = NotLookedAt(v);
   j["exogeneity"] = ToJson(v.exogeneity);
   j["seconds"] = v.seconds;
   return j;
@@ -144,6 +173,31 @@ std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::ve
   if (out.empty())
     throw io::InputError(
         fmt::format("{}: expected a term with nonlinear parameters among {}", path, fmt::join(effects, ", ")));
+  return out;
+}
+
+diagnosis::KnownTerm ReadKnownTerm(const ordered_json& term, const codegen::Catalogue& catalogue,
+                                   Eigen::MatrixXd& covariance) {
+  diagnosis::KnownTerm out;
+  const auto number = [](const ordered_json& j) { return j.is_number() ? j.get<double>() : 0; };  // null: not finite
+  try {
+    const auto record = catalogue.find(term.at("record").get<std::string>());
+    if (record == catalogue.end()) throw io::InputError(term["record"].dump() + ": expected a record of the catalogue");
+    out.record = &record->second;
+    for (const int joint : term.at("joints")) out.joints.push_back(joint - 1);
+    out.eta = term.at("eta").get<std::vector<double>>();
+    const ordered_json &amplitude = term.at("amplitude"), &rows = term.at("covariance");
+    out.amplitude.resize(static_cast<Eigen::Index>(amplitude.size()));
+    for (std::size_t c = 0; c < amplitude.size(); ++c)
+      out.amplitude[static_cast<Eigen::Index>(c)] = number(amplitude[c]);
+    const auto size = static_cast<Eigen::Index>(out.eta.size() + amplitude.size());
+    covariance.setZero(size, size);
+    for (Eigen::Index r = 0; r < size; ++r)
+      for (Eigen::Index c = 0; c < size; ++c)
+        covariance(r, c) = number(rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)));
+  } catch (const nlohmann::json::exception&) {
+    throw io::InputError("expected a verdict with eta, amplitude and covariance of each term: diagnose anew");
+  }
   return out;
 }
 

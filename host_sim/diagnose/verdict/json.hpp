@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "codegen/src/robot/robot.hpp"
+#include "host_sim/diagnose/diagnosis/known_term.hpp"
 #include "host_sim/diagnose/verdict/verdict.hpp"
 
 namespace armcal::verdict {
@@ -19,6 +20,11 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);
 // What a verdict found of these effects ("record", "record:2", "record:1-2"): joints and nonlinear parameters. An empty
 // path: nothing. Throws io::InputError: no verdict, or none of its terms is among them and has such parameters.
 std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::vector<std::string>& effects);
+
+// A term of a verdict, and the covariance of its eta and amplitudes. InputError: it was written by another version, or
+// its record is not in the catalogue.
+diagnosis::KnownTerm ReadKnownTerm(const nlohmann::ordered_json& term, const codegen::Catalogue& catalogue,
+                                   Eigen::MatrixXd& covariance);
 
 // Verdicts by the name of their log, as armcal diagnose --json writes them, or the reason why there is none.
 using Verdicts = std::map<std::string, nlohmann::ordered_json>;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "host_sim/data/report/axis.hpp"
+#include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
 
@@ -74,8 +75,13 @@ std::string DiagnosisText(const DiagnosisView& v) {
   for (std::size_t k = 0; k < v.finding->terms.size(); ++k) {
     const Term& t = v.finding->terms[k];
     out += fmt::format("  {}, joint {}{}: {}\n", t.record->kind, JointName(t), Remark(t), t.record->title);
-    if (t.confirmed) out += fmt::format("    {}\n", Parameters(t));
-    else out += fmt::format("    refuted on the held-out log: {}\n", WhyRefuted(t, v.model->robot()));
+    out += fmt::format("    {}\n", Sentence(v, k));
+    if (t.in_fit) out += fmt::format("    {}\n", Parameters(t));
+    if (const std::string marked = t.in_fit ? diagnosis::MarkText(t) : ""; !marked.empty())
+      out += fmt::format("    do not use alone: {}\n", marked);
+    if (!t.confirmed)
+      out += fmt::format("    {}{}\n", t.refuted ? "refuted on the held-out log: " : "",
+                         WhyNotConfirmed(t, v.model->robot()));
     out += fmt::format("    score {}; {}\n", ScoreText(t), FoldText(t));
     out += fmt::format("    runner-up: {}; fits equally: {}\n", RunnerUp(t), AlsoFits(t));
     for (const Separation& s : v.separation[k]) {
@@ -84,7 +90,11 @@ std::string DiagnosisText(const DiagnosisView& v) {
     }
     if (t.confirmed && !t.record->on_target) out += fmt::format("    {}\n", t.record->remedy);
   }
-  return out + ExogeneityText(v.exogeneity, kLacksMore);
+  for (const std::string& line : MotionText(v.motion)) out += line + "\n";
+  out += ExogeneityText(v.exogeneity, kLacksMore);
+  const char* title = "not looked at: ";
+  for (const std::string& line : NotLookedAt(v)) out += title + line + "\n", title = "               ";
+  return out;
 }
 
 namespace {
@@ -118,9 +128,15 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
     page.Box(report::Tone::kGood, "Nothing is missing",
              "No effect of the catalogue improves the declared model by more than chance would. What these logs would "
              "have shown is in the table: smallest effect seen.");
-  else if (!AnyConfirmed(f))
-    page.Box(report::Tone::kNeutral, "Nothing is missing that the held-out log bears out", list);
+  else if (!AnyConfirmed(f)) page.Box(report::Tone::kNeutral, Headline(f), list);
   else page.Box(report::Tone::kWarning, "The model lacks: " + list, f.terms[0].record->title);
+  std::vector<std::string> sentences;
+  for (std::size_t k = 0; k < f.terms.size(); ++k) sentences.push_back(Sentence(v, k));
+  if (!sentences.empty()) page.List(sentences);
+  if (const auto lines = MotionText(v.motion); !lines.empty()) {
+    page.Section("What the held-out log cannot tell");
+    page.List(lines);
+  }
   page.Section("Error on the held-out log");
   report::Table table{
       {"joint", "before", "after", "before, moving", "after, moving", "noise floor (estimate)", "smallest effect seen"},
@@ -137,6 +153,10 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
                           report::Number(am[j]), report::Number(f.sigma[j]), report::Number(f.smallest[j])});
   page.Add(table);
   if (!v.held_out->tracking.empty()) page.Text(v.held_out->tracking + ".");
+  if (const auto lines = NotLookedAt(v); !lines.empty()) {
+    page.Section("Not looked at");
+    page.List(lines);
+  }
   page.Section("Exogeneity");
   page.Text("A Durbin-Wu-Hausman test on the training logs, with the terms in the model.");
   page.Code(ExogeneityText(v.exogeneity, kLacksMore));
@@ -145,6 +165,7 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
     page.Section(fmt::format("{}, joint {}", t.record->kind, JointName(t)));
     page.Text(t.record->title + ". " + t.record->source + ".");
     page.Facts({{"parameters", Parameters(t)},
+                {"not to be used alone", t.in_fit ? diagnosis::MarkText(t) : ""},
                 {"in the new model", InTheModel(t, v.model->robot())},
                 {"score", ScoreText(t)},
                 {"folds", FoldText(t)},

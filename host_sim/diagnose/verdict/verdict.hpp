@@ -6,6 +6,7 @@
 
 #include "host_sim/data/report/page.hpp"
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
+#include "host_sim/identify/calibration/held_out.hpp"
 #include "host_sim/identify/methods/exogeneity.hpp"
 
 namespace armcal::verdict {
@@ -26,6 +27,8 @@ struct DiagnosisView {
   double seconds = 0;
   calibration::Exogeneity exogeneity;               // of the training logs, with the terms in
   std::vector<std::vector<Separation>> separation;  // per term
+  const std::vector<calibration::Dataset>* train = nullptr;
+  calibration::HeldOutMotion motion;
 };
 
 // Means over bins of a signal, over the held-out log where the joint moves: the residual with the term's torque put

@@ -33,14 +33,20 @@ std::string Headline(const diagnosis::Finding& f) {
   if (f.terms.empty())
     return "none. Nothing is missing that these logs could show; what they would have shown is in the table: smallest "
            "effect seen";
-  if (!AnyConfirmed(f)) return "none. What the training logs suggested did not hold on the held-out log";
+  const auto any = [&](auto is) { return std::any_of(f.terms.begin(), f.terms.end(), is); };
+  if (!AnyConfirmed(f) && any([](const Term& t) { return t.in_fit; }))
+    return "none confirmed. The held-out log repeats a training trajectory: terms are found on this trajectory only";
+  if (!AnyConfirmed(f) && any([](const Term& t) { return t.refuted.has_value(); }))
+    return "none. What the training logs suggested did not hold on the held-out log";
+  if (!AnyConfirmed(f)) return "none. What the training logs suggested they do not determine";
   const bool of_the_arm =
       std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed && !t.training_only; });
   return of_the_arm ? "effect" : "effect, in the training log only: it says nothing about the arm";
 }
 
 std::string Remark(const Term& t) {
-  if (!t.confirmed) return " (NOT CONFIRMED on the held-out log)";
+  if (!t.confirmed && t.in_fit) return " (found on this trajectory, NOT CONFIRMED)";
+  if (!t.confirmed) return t.refuted ? " (NOT CONFIRMED on the held-out log)" : " (NOT CONFIRMED: not determined)";
   return t.training_only ? " (in the training log only)" : "";
 }
 
@@ -86,7 +92,13 @@ std::string RivalName(const Rival& rival) {
 }
 
 std::string RunnerUp(const Term& t) {
-  return t.rivals.empty() ? "none" : fmt::format("{} (score {:.0f})", RivalName(t.rivals[0]), t.rivals[0].score);
+  if (t.rivals.empty()) return "none";
+  const Rival& rival = t.rivals[0];
+  const std::string name = fmt::format("{} (score {:.0f})", RivalName(rival), rival.score);
+  if (!rival.refused.empty()) return fmt::format("{}, not taken: {}", name, rival.refused);
+  if (rival.score <= t.score) return name;
+  return fmt::format("{}; when both were tried this term scored {:.0f}, before the other terms took their share", name,
+                     rival.beside);
 }
 
 std::string AlsoFits(const Term& t) {
@@ -129,7 +141,8 @@ std::vector<Separation> Separations(const Term& t, const diagnosis::Finding& fin
   return out;
 }
 
-std::string WhyRefuted(const Term& t, const codegen::Robot& robot) {
+std::string WhyNotConfirmed(const Term& t, const codegen::Robot& robot) {
+  if (!t.refuted) return t.unconfirmed;
   const diagnosis::Refutation& why = *t.refuted;
   const char* without = why.beside_others ? "with the other terms alone" : "by the declared model";
   if (why.joint < 0)
@@ -143,7 +156,8 @@ std::string WhyRefuted(const Term& t, const codegen::Robot& robot) {
 }
 
 std::string InTheModel(const Term& t, const codegen::Robot& robot) {
-  if (!t.confirmed) return "left out; refuted on the held-out log: " + WhyRefuted(t, robot);
+  if (!t.confirmed)
+    return (t.refuted ? "left out; refuted on the held-out log: " : "left out; ") + WhyNotConfirmed(t, robot);
   return t.record->on_target ? "yes, as an estimated effect" : "no model can hold it: " + t.record->remedy;
 }
 

@@ -26,7 +26,8 @@ std::string JointNumbers(const std::vector<int>& joints);
 // "stribeck:2", "wrist_coupling:5-6", "base_tilt": an effect as armcal excite --separate takes it.
 std::string EffectWord(const std::string& record, const std::vector<int>& joints);
 
-// What must be said with a term's name: " (NOT CONFIRMED ...)", " (in the training log only)", or nothing.
+// What must be said with a term's name: " (NOT CONFIRMED ...)", " (found on this trajectory, NOT CONFIRMED)", " (in the
+// training log only)", or nothing.
 std::string Remark(const diagnosis::Term& t);
 
 // "vs2 = 0.08 +- 0.002 rad/s, ..."; a curve's first coefficients only.
@@ -53,7 +54,14 @@ std::vector<Separation> Separations(const diagnosis::Term& t, const diagnosis::F
 inline constexpr const char* kNoMotion = "armcal excite cannot search a motion for it";
 
 // "joint 3 is predicted worse with it than by the declared model: 0.412 instead of 0.398 N m"; of one not confirmed.
-std::string WhyRefuted(const diagnosis::Term& t, const codegen::Robot& robot);
+std::string WhyNotConfirmed(const diagnosis::Term& t, const codegen::Robot& robot);
+
+// One sentence: what, on which joint, over which other one, how much of the held-out error, and what to do.
+std::string Sentence(const DiagnosisView& v, std::size_t term);
+
+// What this diagnosis could not see, a line each: the band, rows left out, joints that stood, a search that was cut
+// off.
+std::vector<std::string> NotLookedAt(const DiagnosisView& v);
 
 // What the new model file makes of the term.
 std::string InTheModel(const diagnosis::Term& t, const codegen::Robot& robot);

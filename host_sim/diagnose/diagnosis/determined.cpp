@@ -1,0 +1,129 @@
+// diagnosis - compares a term's parameters with their deviations and with the ranges that its record gives them.
+#include "host_sim/diagnose/diagnosis/determined.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/diagnose/diagnosis/work.hpp"
+
+namespace armcal::diagnosis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kEdge = 1e-3;  // of a range: a search that ends at a bound stops this close to it
+
+bool IsSearched(const Term& t) {
+  const codegen::SearchWay how = t.record->search.how;
+  return t.record->generic_penalty == 0 &&
+         (how == codegen::SearchWay::kProfile || how == codegen::SearchWay::kSpectral);
+}
+
+bool IsAtEdge(const codegen::EffectUnknown& u, double value) {
+  if (u.logarithmic && u.lower > 0 && value > 0) {
+    const double room = kEdge * std::log(u.upper / u.lower);
+    return std::log(value / u.lower) < room || std::log(u.upper / value) < room;
+  }
+  const double room = kEdge * (u.upper - u.lower);
+  return value < u.lower + room || value > u.upper - room;
+}
+
+// Its coefficients mean nothing one by one: neighbours stand for each other.
+bool IsForm(const Term& t) {
+  constexpr std::size_t kMany = 4;
+  return t.record->generic_penalty > 0 || t.record->search.how == codegen::SearchWay::kSpline ||
+         t.columns.size() > kMany;
+}
+
+// a' C^-1 a over the directions of C that are not rounding. Every sd is above zero.
+double Significance(const VectorXd& a, const MatrixXd& C) {
+  const VectorXd sd = C.diagonal().cwiseSqrt();
+  const VectorXd scaled = a.cwiseQuotient(sd);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
+      MatrixXd(sd.cwiseInverse().asDiagonal() * C * sd.cwiseInverse().asDiagonal()));
+  double sum = 0;
+  for (Index k = 0; k < a.size(); ++k)
+    if (const double value = eigen.eigenvalues()[k]; value > 1e-9)
+      sum += std::pow(eigen.eigenvectors().col(k).dot(scaled), 2) / value;
+  return sum;
+}
+
+std::string MarkedValue(const std::string& name, double value, double sd, const std::string& unit, Mark mark) {
+  return fmt::format("{} = {:.3g} +- {:.2g} {} {}", name, value, sd, unit,
+                     mark == Mark::kOnBound ? "is on its bound" : "is not determined");
+}
+
+}  // namespace
+
+Marks MarkParameters(const Term& t) {
+  Marks out{std::vector<Mark>(t.eta.size(), Mark::kNone), std::vector<Mark>(t.columns.size(), Mark::kNone), true};
+  int parameters = 0, marked = 0;
+  for (std::size_t k = 0; k < t.eta.size() && IsSearched(t); ++k) {
+    const double sd = t.eta_sd[static_cast<Index>(k)];
+    if (IsAtEdge(t.unknowns[k], t.eta[k])) out.eta[k] = Mark::kOnBound;
+    else if (!(sd > 0) || !(std::abs(t.eta[k]) > sd)) out.eta[k] = Mark::kUndetermined;
+    ++parameters, marked += out.eta[k] != Mark::kNone;
+  }
+  std::vector<Index> seen;  // amplitudes of columns that the logs see at all
+  bool any_free = false;
+  for (std::size_t c = 0; c < t.columns.size(); ++c) {
+    const codegen::EffectColumn& column = t.columns[c];
+    if (column.fixed_amplitude) continue;
+    const double value = t.amplitude[static_cast<Index>(c)], sd = t.sd[static_cast<Index>(c)];
+    // What takes the place of the declared law is a change of it, which may have any sign.
+    const bool beyond = t.record->replaces.empty() && (value < column.lower || value > column.upper);
+    if (!(sd > 0) || !(std::abs(value) > sd)) out.amplitude[c] = Mark::kUndetermined;
+    else if (beyond) out.amplitude[c] = Mark::kOnBound;
+    ++parameters, marked += out.amplitude[c] != Mark::kNone;
+    any_free = true;
+    if (sd > 0) seen.push_back(static_cast<Index>(c));
+    if (IsForm(t)) out.amplitude[c] = Mark::kNone;
+  }
+  // By chance alone the sum is about as large as there are amplitudes.
+  if (any_free) {
+    std::vector<Index> place = seen;
+    for (Index& p : place) p += static_cast<Index>(t.eta.size());
+    out.usable =
+        !seen.empty() && Significance(t.amplitude(seen), t.covariance(place, place)) > static_cast<double>(seen.size());
+  }
+  out.usable = out.usable && (IsForm(t) || marked < parameters);
+  return out;
+}
+
+std::string MarkText(const Term& t) {
+  const Marks marks = MarkParameters(t);
+  std::string out;
+  const auto add = [&](const std::string& text) { out += (out.empty() ? "" : "; ") + text; };
+  for (std::size_t k = 0; k < t.eta.size(); ++k)
+    if (marks.eta[k] != Mark::kNone)
+      add(MarkedValue(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Index>(k)], t.unknowns[k].unit, marks.eta[k]));
+  for (std::size_t c = 0; c < t.columns.size(); ++c)
+    if (marks.amplitude[c] != Mark::kNone)
+      add(MarkedValue(t.columns[c].name, t.amplitude[static_cast<Index>(c)], t.sd[static_cast<Index>(c)],
+                      t.columns[c].unit, marks.amplitude[c]));
+  return out;
+}
+
+void LeaveOutUndetermined(Diagnosis::Work& w, Finding& finding) {
+  for (;;) {
+    WriteTerms(w, finding);
+    std::size_t k = w.chosen.size();  // sorted, the strongest first
+    while (k > 0 && (!w.chosen[k - 1].confirmed || w.chosen[k - 1].candidate->is_event() ||
+                     MarkParameters(finding.terms[k - 1]).usable))
+      --k;
+    if (k == 0) return;
+    w.chosen[k - 1].confirmed = false;
+    const std::string marked = MarkText(finding.terms[k - 1]);
+    w.chosen[k - 1].unconfirmed =
+        "the training logs do not determine it" + (marked.empty() ? std::string() : ": " + marked);
+    w.Polish();
+  }
+}
+
+}  // namespace armcal::diagnosis

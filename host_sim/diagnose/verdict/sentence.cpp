@@ -1,0 +1,120 @@
+// verdict - says a term in one sentence, and what the diagnosis did not look at.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/diagnose/verdict/words.hpp"
+
+namespace armcal::verdict {
+
+using diagnosis::Term;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kStands = 0.01;  // of the samples: a joint that moves less has told nothing
+
+const char* Unit(const codegen::Robot& robot, int j) {
+  return robot.joint[j].kinematics.type == codegen::JointType::kPrismatic ? "N" : "N m";
+}
+
+// "on joint 5, over the motion of joint 1". torque: [n] RMS of the term.
+std::string Where(const Term& t, const VectorXd& torque) {
+  std::vector<int> on, over;
+  for (int j = 0; j < torque.size(); ++j)
+    if (torque[j] > 0) on.push_back(j);
+  if (t.joints.empty()) return t.record->place == "all" ? "all joints" : "the " + t.record->place;
+  if (on.empty()) return "joint " + JointName(t);
+  for (const int j : t.joints)
+    if (std::find(on.begin(), on.end(), j) == on.end()) over.push_back(j);
+  std::string out = (on.size() > 1 ? "joints " : "joint ") + JointGroup(on);
+  if (!over.empty()) out += ", over the motion of joint " + JointGroup(over);
+  return out;
+}
+
+// "; joint 7 moves in phase with joints 1 and 3: it may belong to one of these": of what the term depends on.
+std::string InPhase(const Term& t, const calibration::HeldOutMotion& motion) {
+  std::string out;
+  for (const auto& group : motion.in_phase)
+    for (const int j : t.joints) {
+      if (std::find(group.joints.begin(), group.joints.end(), j) == group.joints.end()) continue;
+      std::vector<int> others = group.joints;
+      std::erase(others, j);
+      out += fmt::format("; joint {} moves in phase with joint{} {}, so it may depend on {}", j + 1,
+                         others.size() > 1 ? "s" : "", JointGroup(others),
+                         others.size() > 1 ? "one of these" : "that one");
+    }
+  return out;
+}
+
+std::string WhatToDo(const Term& t) {
+  if (t.training_only || (!t.record->on_target && t.confirmed)) return t.record->remedy;
+  if (!t.confirmed && t.in_fit) return "hold out a log of another trajectory to confirm it";
+  if (!t.confirmed) return "leave it out";
+  if (t.also_fits.empty()) return "put it in the model (--model-out)";
+  return fmt::format("it may be used for prediction (--model-out), but these logs do not tell it from {}",
+                     fmt::join(t.also_fits, " or "));
+}
+
+}  // namespace
+
+std::string Sentence(const DiagnosisView& v, std::size_t term) {
+  const Term& t = v.finding->terms[term];
+  const VectorXd torque = calibration::Rms(*v.test, v.term_torque[term], true);
+  std::string out = fmt::format("{} on {}", t.record->kind, Where(t, torque));
+  if (t.in_fit && !t.training_only && torque.maxCoeff() > 0) {
+    Eigen::Index main = 0;
+    const VectorXd after = calibration::Rms(*v.test, v.held_out->after, true),
+                   before = calibration::Rms(*v.test, v.held_out->before, true);
+    torque.cwiseQuotient(after.cwiseMax(1e-300)).maxCoeff(&main);
+    const char* unit = Unit(v.model->robot(), static_cast<int>(main));
+    out += fmt::format(
+        ": {:.3g} {} RMS of joint {} on the held-out log, where the declared model leaves {:.3g} {} and "
+        "the model with all terms {:.3g} {}",
+        torque[main], unit, main + 1, before[main], unit, after[main], unit);
+    out += InPhase(t, v.motion);
+  } else if (t.training_only) {
+    out += ": explains a time of the training log";
+  } else if (!t.confirmed) {
+    out += t.refuted ? ": the held-out log refutes it" : ": the training logs do not determine it";
+  }
+  return out + "; " + WhatToDo(t) + ".";
+}
+
+std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
+  std::vector<std::string> out;
+  if (!v.train || v.train->empty()) return out;
+  const int n = v.model->joints();
+  std::string band, left_out;
+  double slowest = 0, fastest = 0;
+  std::vector<int> standing;
+  for (int j = 0; j < n; ++j) {
+    double lowest = 0, used = 0, samples = 0, moving = 0;
+    for (const calibration::Dataset& d : *v.train) {
+      if (j < d.cutoff_Hz.size()) lowest = lowest > 0 ? std::min(lowest, d.cutoff_Hz[j]) : d.cutoff_Hz[j];
+      used += d.used.col(j).sum(), moving += d.moving.col(j).sum(), samples += d.samples();
+    }
+    slowest = j == 0 ? lowest : std::min(slowest, lowest), fastest = std::max(fastest, lowest);
+    band += fmt::format("{}{:.3g}", j == 0 ? "" : ", ", lowest);
+    left_out += fmt::format("{}{:.0f}", j == 0 ? "" : ", ", 100 * (1 - used / std::max(samples, 1.0)));
+    if (moving < kStands * samples) standing.push_back(j);
+  }
+  if ((*v.train)[0].cutoff_Hz.size() == n)
+    out.push_back(fmt::format(
+        "motion faster than {} Hz (joints 1 to {}): speed and acceleration are derived below that", band, n));
+  out.push_back(
+      fmt::format("rows at rest, near a turn and beside gaps: {} % of the samples of joints 1 to {}; presliding "
+                  "and breakaway show there",
+                  left_out, n));
+  if (!standing.empty())
+    out.push_back(
+        fmt::format("joint{} {}: at rest in the training logs", standing.size() > 1 ? "s" : "", JointGroup(standing)));
+  if (v.finding->most_terms > 0)
+    out.push_back(fmt::format("further terms: the search ended at {}; another diagnosis of the new model would go on",
+                              v.finding->most_terms));
+  return out;
+}
+
+}  // namespace armcal::verdict

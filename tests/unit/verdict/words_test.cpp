@@ -1,0 +1,87 @@
+// verdict tests - what a person reads of a term: how much, where, what to do; and what was not looked at.
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/diagnose/verdict/words.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::verdict {
+namespace {
+
+using calibration::Dataset;
+using diagnosis::Rival;
+using diagnosis::Term;
+
+TEST(RunnerUp, WithAHigherScore_IsExplainedByTheGateThatRefusedIt) {
+  Term t;
+  t.score = 300;
+  t.rivals.push_back({&tests::Records().at("stribeck"), {1}, 480, "out of fold it keeps 20 % of its gain", 500});
+  EXPECT_EQ(RunnerUp(t), "stribeck, joint 2 (score 480), not taken: out of fold it keeps 20 % of its gain");
+  t.rivals[0].refused = "";
+  EXPECT_NE(RunnerUp(t).find("this term scored 500"), std::string::npos) << RunnerUp(t);
+  t.score = 490;
+  EXPECT_EQ(RunnerUp(t), "stribeck, joint 2 (score 480)");
+}
+
+// An arm with a ripple of 0.3 N m on joint 2, trained on one run and judged on another.
+struct Diagnosed {
+  explicit Diagnosed(std::uint64_t test_seed) : arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 8) {
+    const auto ripple = [](const tests::State& s) { return s.joint == 1 ? 0.3 * std::cos(12 * s.q) : 0.0; };
+    train.push_back(arm.Run(20, 80, ripple));
+    test = arm.Run(20, test_seed, ripple);
+    test.tau.array() += test_seed == 80 ? 1e-6 : 0;  // another measurement
+    diagnosis = std::make_unique<diagnosis::Diagnosis>(arm.model(), tests::Records(), calibration::Pointers(train));
+    held_out = diagnosis->Judge(test);
+    view.model = &arm.model(), view.finding = &diagnosis->finding(), view.test = &test, view.held_out = &held_out;
+    view.train = &train;
+    view.motion = calibration::CompareMotion(arm.model(), view.finding->declared, calibration::Pointers(train), test);
+    if (view.motion.repeats()) diagnosis->ConfirmNothing("it repeats");
+    view.term_torque = diagnosis->TermTorque(test);
+    view.separation.resize(view.finding->terms.size());
+  }
+  tests::SyntheticArm arm;
+  std::vector<Dataset> train;
+  Dataset test;
+  std::unique_ptr<diagnosis::Diagnosis> diagnosis;
+  diagnosis::HeldOut held_out;
+  DiagnosisView view;
+};
+
+TEST(Sentence, SaysWhatWhereHowMuchAndWhatToDo) {
+  const Diagnosed d(81);
+  ASSERT_EQ(d.view.finding->terms.size(), 1u);
+  const std::string s = Sentence(d.view, 0);
+  EXPECT_TRUE(s.starts_with("torque_ripple on joint 2: 0.2")) << s;  // 0.3 / sqrt(2) = 0.212 N m
+  EXPECT_NE(s.find("N m RMS of joint 2 on the held-out log"), std::string::npos) << s;
+  EXPECT_TRUE(s.ends_with("put it in the model (--model-out).")) << s;
+}
+
+TEST(Verdict, OnARepeatedTrajectory_ConfirmsNothing_AndWritesNothing) {
+  const Diagnosed d(80);
+  ASSERT_EQ(d.view.finding->terms.size(), 1u);
+  EXPECT_FALSE(d.view.finding->terms[0].confirmed);
+  EXPECT_NE(DiagnosisText(d.view).find("found on this trajectory, NOT CONFIRMED"), std::string::npos);
+  EXPECT_NE(Sentence(d.view, 0).find("another trajectory"), std::string::npos) << Sentence(d.view, 0);
+  EXPECT_EQ(diagnosis::ModelFile(d.arm.model(), *d.view.finding, "").find("torque_ripple"), std::string::npos);
+  const nlohmann::ordered_json json = DiagnosisJson(d.view);
+  EXPECT_EQ(json["verdict"], "none");
+  EXPECT_EQ(json["terms"][0]["unconfirmed"], "it repeats");
+  EXPECT_LT(json["after"][1].get<double>(), 0.7 * json["before"][1].get<double>());  // it stays in the comparison
+}
+
+TEST(NotLookedAt, NamesJointsThatStoodAndRowsLeftOut) {
+  Diagnosed d(81);
+  d.train[0].moving.col(0).setZero(), d.train[0].used.col(0).setZero();
+  d.train[0].cutoff_Hz = Eigen::Vector2d(6, 8);
+  std::string all;
+  for (const std::string& line : NotLookedAt(d.view)) all += line + "\n";
+  EXPECT_NE(all.find("faster than 6, 8 Hz"), std::string::npos) << all;
+  EXPECT_NE(all.find("100, "), std::string::npos) << all;  // per cent of the rows of joint 1
+  EXPECT_NE(all.find("joint 1: at rest"), std::string::npos) << all;
+  EXPECT_EQ(all.find("further terms"), std::string::npos) << all;
+}
+
+}  // namespace
+}  // namespace armcal::verdict

@@ -101,7 +101,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["sentence"] = Sentence(v, n);
     if (t.in_fit && !t.training_only) {
       const Dependence d = DependenceOf(v, n);
-      term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true));
+      term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true)),
+      term["without_in_band"] = ToList(calibration::RmsInBand(*v.test, v.held_out->after + v.term_torque[n]));
       term["dependence"] = {
           {"over", d.signal}, {"torque", d.torque}, {"x", d.term.x}, {"without", d.without.y}, {"term", d.term.y}};
     }
@@ -123,6 +124,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["after"] = ToList(calibration::Rms(test, v.held_out->after, false));
   j["before_moving"] = ToList(calibration::Rms(test, v.held_out->before, true));
   j["after_moving"] = ToList(calibration::Rms(test, v.held_out->after, true));
+  j["before_in_band"] = ToList(calibration::RmsInBand(test, v.held_out->before));
+  j["after_in_band"] = ToList(calibration::RmsInBand(test, v.held_out->after));
   j["torque_moving"] = ToList(calibration::Rms(test, test.tau, true));
   std::vector<double> share;
   for (int k = 0; k < test.joints(); ++k) share.push_back(test.moving.col(k).cast<double>().mean());

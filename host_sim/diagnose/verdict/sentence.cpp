@@ -93,7 +93,10 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   for (int j = 0; j < n; ++j) {
     double lowest = 0, used = 0, samples = 0, moving = 0;
     for (const calibration::Dataset& d : *v.train) {
-      if (j < d.cutoff_Hz.size()) lowest = lowest > 0 ? std::min(lowest, d.cutoff_Hz[j]) : d.cutoff_Hz[j];
+      if (j < d.cutoff_Hz.size()) {
+        const double reach_Hz = j < d.band_Hz.size() ? std::min(d.cutoff_Hz[j], d.band_Hz[j]) : d.cutoff_Hz[j];
+        lowest = lowest > 0 ? std::min(lowest, reach_Hz) : reach_Hz;
+      }
       used += d.used.col(j).sum(), moving += d.moving.col(j).sum(), samples += d.samples();
     }
     slowest = j == 0 ? lowest : std::min(slowest, lowest), fastest = std::max(fastest, lowest);
@@ -103,7 +106,9 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   }
   if ((*v.train)[0].cutoff_Hz.size() == n)
     out.push_back(fmt::format(
-        "motion faster than {} Hz (joints 1 to {}): speed and acceleration are derived below that", band, n));
+        "motion faster than {} Hz (joints 1 to {}): above that the derived speeds and accelerations are filtered or "
+        "mostly noise",
+        band, n));
   out.push_back(
       fmt::format("rows at rest, near a turn and beside gaps: {} % of the samples of joints 1 to {}; presliding "
                   "and breakaway show there",

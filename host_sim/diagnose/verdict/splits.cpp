@@ -47,9 +47,12 @@ std::optional<Occurrence> Helps(const std::string& held_out, const ordered_json&
   const ordered_json& term = verdict["terms"][place];
   if (!term["confirmed"].get<bool>() || !term.contains("without_moving")) return {};
   std::optional<Occurrence> best;
+  // By the rows that terms are fitted to: motion above the band would hide what a term does below it.
+  const std::string rows =
+      verdict.contains("after_in_band") && term.contains("without_in_band") ? "_in_band" : "_moving";
   for (std::size_t j = 0; j < verdict["after_moving"].size(); ++j) {
-    const double before = verdict["before_moving"][j], after = verdict["after_moving"][j],
-                 without = term["without_moving"][j];
+    const double before = verdict["before" + rows][j], after = verdict["after" + rows][j],
+                 without = term["without" + rows][j];
     if (after >= kFalls * before || after >= kFalls * without) continue;
     if (!best || after / without < best->after / best->without)
       best = Occurrence{held_out, place, term["kind"], static_cast<int>(j), before, after, without, -1, -1, term};

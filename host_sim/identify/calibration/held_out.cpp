@@ -26,7 +26,7 @@ constexpr double kRoom = 0.05;   // of a range
 constexpr int kSameRun = 10;     // torques one after the other: that many are equal in one measurement only
 constexpr double kRate_Hz = 40, kWindow_s = 2, kStep_s = 1;
 constexpr double kApart = 0.03;    // of a joint's standard deviation: a controller repeats far better
-constexpr double kRoughly = 0.25;     // the same before the shift is refined
+constexpr double kRoughly = 0.25;  // the same before the shift is refined
 constexpr double kLively = 0.2;    // of the log's RMS speed: a window at rest repeats any other
 constexpr double kMoves = 0.01;    // of the samples
 constexpr double kInPhase = 0.95;  // correlation: a tenth of one joint's motion is its own
@@ -190,27 +190,17 @@ VectorXd Leverage(const Information& rows, const MatrixXd& inverse, const std::v
 // variance here: a log that moves along it leaves what training has shown.
 MatrixXd Covariance(const Information& train, const VectorXd& sigma, const Prior& prior,
                     const std::vector<int>& active) {
-  constexpr double kUnseen = 1e-10;  // of the largest eigenvalue
   const auto size = static_cast<Index>(active.size());
   MatrixXd H = MatrixXd::Zero(size, size);
   for (std::size_t j = 0; j < train.gram.size(); ++j)
     H += MatrixXd(train.gram[j](active, active)) / (sigma[static_cast<Index>(j)] * sigma[static_cast<Index>(j)]);
-  if (prior.informative) {
-    const MatrixXd P = prior.covariance(active, active);
-    const VectorXd sd = P.diagonal().cwiseSqrt().cwiseMax(1e-300);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
-        MatrixXd(sd.cwiseInverse().asDiagonal() * P * sd.cwiseInverse().asDiagonal()));
-    const MatrixXd L =
-        sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-    const MatrixXd M = L.transpose() * H * L + MatrixXd::Identity(size, size);
-    return L * M.ldlt().solve(MatrixXd(L.transpose()));
-  }
-  VectorXd scale = H.diagonal().cwiseSqrt();
-  for (double& s : scale) s = s > 0 ? 1 / s : 0;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(scale.asDiagonal() * H * scale.asDiagonal()));
-  const VectorXd value = eigen.eigenvalues().cwiseMax(kUnseen * eigen.eigenvalues()[size - 1]);
-  const MatrixXd V = scale.asDiagonal() * eigen.eigenvectors();
-  return V * value.cwiseInverse().asDiagonal() * V.transpose();
+  const MatrixXd P = prior.covariance(active, active);
+  const VectorXd sd = P.diagonal().cwiseSqrt().cwiseMax(1e-300);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
+      MatrixXd(sd.cwiseInverse().asDiagonal() * P * sd.cwiseInverse().asDiagonal()));
+  const MatrixXd L = sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const MatrixXd M = L.transpose() * H * L + MatrixXd::Identity(size, size);
+  return L * M.ldlt().solve(MatrixXd(L.transpose()));
 }
 
 std::vector<Outside> FindOutside(const codegen::Model& model, const Fit& fit, const std::vector<const Dataset*>& train,

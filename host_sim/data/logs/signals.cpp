@@ -222,8 +222,10 @@ constexpr int kNeighbours = 2;    // bins on either side that must agree
 }  // namespace
 
 double MotionBand_Hz(const VectorXd& q, double noise, double rate_Hz) {
-  const Index segment = static_cast<Index>(std::exp2(std::floor(std::log2(kSegment_s * rate_Hz))));
-  if (q.size() < segment + 2) return 0.5 * rate_Hz;
+  const double most = kSegment_s * rate_Hz;
+  if (!(most < static_cast<double>(q.size()) * 2)) return 0.5 * rate_Hz;  // of more samples than there are, or no rate
+  const Index segment = most >= 1 ? static_cast<Index>(std::exp2(std::floor(std::log2(most)))) : 0;
+  if (segment < 4 * kNeighbours || q.size() < segment + 2) return 0.5 * rate_Hz;
   const VectorXd bend = q.tail(q.size() - 2) - 2 * q.segment(1, q.size() - 2) + q.head(q.size() - 2);
   VectorXd window(segment);  // Blackman and Harris, four terms: what leaks of a tone is 92 dB below it
   for (Index k = 0; k < segment; ++k) {

@@ -50,6 +50,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   const codegen::Model& model = *run->model;
   const LogReader read(model, o.channels, o.cutoff_Hz);
   run->train = read.All(o.train);
+  read.PrintUntold(run->train);
   const std::vector<calibration::Dataset> narrow = read.Narrow(o.train);
   const auto start = std::chrono::steady_clock::now();
   run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, calibration::Pointers(run->train),

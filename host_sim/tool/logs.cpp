@@ -10,7 +10,9 @@
 #include "host_sim/data/logs/channels.hpp"
 #include "host_sim/data/logs/log.hpp"
 #include "host_sim/identify/calibration/body_check.hpp"
+#include "host_sim/identify/calibration/column_check.hpp"
 #include "host_sim/identify/calibration/log_check.hpp"
+#include "host_sim/identify/calibration/untold.hpp"
 
 namespace armcal::tool {
 
@@ -22,7 +24,24 @@ calibration::Dataset LogReader::One(const std::string& path) const {
   const logs::Log log = Raw(path);
   const calibration::SignalCheck check = Check(log);
   if (!check.lack.empty()) throw io::InputError(log.source + ": " + check.lack);
-  return Made(log);
+  calibration::Dataset data = Made(log);
+  CheckTogether({&data});
+  return data;
+}
+
+void LogReader::CheckTogether(const std::vector<const calibration::Dataset*>& data) const {
+  for (const std::string& note : calibration::CheckColumns(model_, data)) fmt::print(stderr, "{}\n", note);
+}
+
+void LogReader::PrintUntold(const std::vector<calibration::Dataset>& data) const {
+  if (model_.robot().has_prior) return;
+  std::string text;
+  for (const std::string& fault : calibration::UntoldFaults(model_)) text += (text.empty() ? "" : "; ") + fault;
+  if (!text.empty()) fmt::print("cannot be told without link data: {}\n", text);
+  text.clear();
+  for (const std::string& fault : calibration::EquallyGood(model_, calibration::Pointers(data)))
+    text += (text.empty() ? "" : "; ") + fault;
+  if (!text.empty()) fmt::print("cannot be told from these logs: {}\n", text);
 }
 
 calibration::SignalCheck LogReader::Check(const logs::Log& log) const {
@@ -59,6 +78,7 @@ std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>&
     else fmt::print(stderr, "{}: left out: {}\n", p, check.lack);
   }
   if (out.empty()) throw io::InputError(paths[0] + " and others: none is long enough to be fitted");
+  CheckTogether(calibration::Pointers(out));
   return out;
 }
 

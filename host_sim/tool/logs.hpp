@@ -21,11 +21,14 @@ class LogReader {
   calibration::Dataset One(const std::string& path) const;
   // The same for several logs. What one of them lacks the others may have: a log that is too short is left out.
   std::vector<calibration::Dataset> All(const std::vector<std::string>& paths) const;
+  // Says which faults of the columns nobody can see, where the robot file has no link data.
+  void PrintUntold(const std::vector<calibration::Dataset>& data) const;
   // The logs of All with speed and acceleration of a lower bandwidth.
   std::vector<calibration::Dataset> Narrow(const std::vector<std::string>& paths) const;
 
  private:
   calibration::SignalCheck Check(const logs::Log& log) const;
+  void CheckTogether(const std::vector<const calibration::Dataset*>& data) const;
   calibration::Dataset Made(const logs::Log& log) const;
 
   const codegen::Model& model_;

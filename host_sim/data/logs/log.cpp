@@ -150,8 +150,8 @@ Log FromTable(const std::string& file, files::NumericTable table, const ChannelM
   log.ignored = std::move(table.ignored);
   if (log.samples() < min_samples) {
     throw io::InputError(log.source + ": has " + std::to_string(log.samples()) + " samples" +
-                         (rows > log.samples() ? " in " + std::to_string(rows) + " rows" : "") + ", expected at least " +
-                         std::to_string(min_samples));
+                         (rows > log.samples() ? " in " + std::to_string(rows) + " rows" : "") +
+                         ", expected at least " + std::to_string(min_samples));
   }
   ListGaps(log);
   return log;
@@ -165,24 +165,30 @@ double Log::step_s() const {
 }
 
 Log ReadLog(const std::filesystem::path& path, int min_samples) {
-  files::NumericTable table = files::ReadCsv(path, [](const std::string& name) {
-    const auto split = SplitName(name);
-    return name == "t" || (split && IsQuantity(split->quantity));
-  }, files::Missing::kNan);
+  files::NumericTable table = files::ReadCsv(
+      path,
+      [](const std::string& name) {
+        const auto split = SplitName(name);
+        return name == "t" || (split && IsQuantity(split->quantity));
+      },
+      files::Missing::kNan);
   const ChannelMap map = OurNames(path.string(), table.names);
   return FromTable(path.string(), std::move(table), map, min_samples);
 }
 
 Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_samples) {
-  files::NumericTable table = files::ReadCsv(path, [&map](const std::string& name) {
-    if (name == map.time.column) return true;
-    for (const Quantity& quantity : map.quantities) {
-      for (const Channel& channel : quantity.joint) {
-        if (name == channel.column) return true;
-      }
-    }
-    return false;
-  }, files::Missing::kNan);
+  files::NumericTable table = files::ReadCsv(
+      path,
+      [&map](const std::string& name) {
+        if (name == map.time.column) return true;
+        for (const Quantity& quantity : map.quantities) {
+          for (const Channel& channel : quantity.joint) {
+            if (name == channel.column) return true;
+          }
+        }
+        return false;
+      },
+      files::Missing::kNan);
   return FromTable(path.string(), std::move(table), map, min_samples);
 }
 

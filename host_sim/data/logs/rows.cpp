@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 constexpr double kMissingShare = 0.1;  // of the rows between the log's ends
 constexpr double kUnorderedShare = 0.01;
 constexpr Index kFewUnordered = 5;
-constexpr double kSlowest_Hz = 1, kFastest_Hz = 50e3;           // of any controller that moves an arm
+constexpr double kSlowest_Hz = 1, kFastest_Hz = 50e3;            // of any controller that moves an arm
 constexpr double kUsualSlowest_Hz = 10, kUsualFastest_Hz = 2e4;  // to guess a unit
 constexpr double kJump = 100;   // median steps: a step this long is a pause, or a stamp that is wrong
 constexpr Index kJumpRows = 3;  // rows that must be gained to believe in a jump
@@ -29,7 +29,9 @@ constexpr double kEvener = 0.5;   // an even grid must halve the error of positi
 constexpr double kJitter = 0.02;  // of a step: below this stamps are even enough
 constexpr int kLine = 2;          // of the first row: the header is line 1
 
-[[noreturn]] void Fail(const RawRows& rows, const std::string& what) { throw io::InputError(rows.source + ": " + what); }
+[[noreturn]] void Fail(const RawRows& rows, const std::string& what) {
+  throw io::InputError(rows.source + ": " + what);
+}
 
 double MedianOf(std::vector<double> x) {
   if (x.empty()) return 0;
@@ -78,7 +80,8 @@ class Chooser {
       else if (first < 0) first = line(i);
     }
     const Index dropped = size() - static_cast<Index>(kept.size());
-    if (dropped > 0 && !why.empty()) out_.notes.push_back(fmt::format("{} left out ({} {})", Rows(dropped), why, first));
+    if (dropped > 0 && !why.empty())
+      out_.notes.push_back(fmt::format("{} left out ({} {})", Rows(dropped), why, first));
     out_.row = std::move(kept);
     return dropped;
   }
@@ -97,9 +100,10 @@ class Chooser {
     for (Index i = 0; i < size(); ++i)
       if (missing(i)) between[static_cast<std::size_t>(i)] = 1, ++count, first = first < 0 ? i : first;
     if (static_cast<double>(count) > kMissingShare * static_cast<double>(size()))
-      Fail(rows_, fmt::format("line {}: column '{}' has no number, and so have {} of {} rows; expected a number in nearly "
-                              "all rows",
-                              line(first), MissingColumn(row(first)), count, size()));
+      Fail(rows_,
+           fmt::format("line {}: column '{}' has no number, and so have {} of {} rows; expected a number in nearly "
+                       "all rows",
+                       line(first), MissingColumn(row(first)), count, size()));
     Drop(between, "a number is missing, first line");
   }
 
@@ -183,16 +187,17 @@ class Chooser {
       if (r >= 0) end = run[static_cast<std::size_t>(r)].end - link.tail;
     }
     const Index dropped = std::count(drop.begin(), drop.end(), 1);
-    if (dropped > allowed) FailUnordered(first < 0 ? std::find(drop.begin(), drop.end(), 1) - drop.begin() : first, dropped);
+    if (dropped > allowed)
+      FailUnordered(first < 0 ? std::find(drop.begin(), drop.end(), 1) - drop.begin() : first, dropped);
     Drop(drop, "their time is repeated, goes back or leaps, first line");
   }
 
   [[noreturn]] void FailUnordered(Index i, Index count) const {
     throw io::InputError(fmt::format("{}:{}: column '{}': time {} (such rows: {}), expected it to rise", rows_.source,
                                      line(i), rows_.time_column,
-                                     i == 0 || time(i) > time(i - 1)  ? "leaps"
-                                     : time(i) == time(i - 1) ? "is repeated"
-                                                              : "goes back",
+                                     i == 0 || time(i) > time(i - 1) ? "leaps"
+                                     : time(i) == time(i - 1)        ? "is repeated"
+                                                                     : "goes back",
                                      count));
   }
 
@@ -212,7 +217,8 @@ class Chooser {
     std::vector<char> zero = Unmarked();
     Index count = 0;
     for (Index i = 0; i < size(); ++i)
-      if (rows_.q.row(row(i)).isZero(0) && rows_.tau.row(row(i)).isZero(0)) zero[static_cast<std::size_t>(i)] = 1, ++count;
+      if (rows_.q.row(row(i)).isZero(0) && rows_.tau.row(row(i)).isZero(0))
+        zero[static_cast<std::size_t>(i)] = 1, ++count;
     if (2 * count < size()) Drop(zero, "all positions and torques are 0, first line");
   }
 
@@ -305,9 +311,10 @@ class Chooser {
         looks = fmt::format("; it looks {:g} times too short ({:.4g} Hz)", factor, as_less);
       if (!looks.empty()) break;
     }
-    Fail(rows_, fmt::format("column '{}': the time step is {:.4g} s ({:.3g} Hz), expected a sample rate of {:g} Hz to {:g} "
-                            "kHz{}",
-                            rows_.time_column, step_s, rate_Hz, kSlowest_Hz, kFastest_Hz / 1e3, looks));
+    Fail(rows_,
+         fmt::format("column '{}': the time step is {:.4g} s ({:.3g} Hz), expected a sample rate of {:g} Hz to {:g} "
+                     "kHz{}",
+                     rows_.time_column, step_s, rate_Hz, kSlowest_Hz, kFastest_Hz / 1e3, looks));
   }
 
   // Stamps may be those of the program that wrote the file, while the drive has sampled evenly. Then positions follow
@@ -343,9 +350,10 @@ class Chooser {
       if (even[i] <= even[i - 1]) return;
     const double jitter_s = std::sqrt((even - out_.t).squaredNorm() / static_cast<double>(count));
     if (jitter_s < kJitter * step_s) return;
-    out_.notes.push_back(fmt::format("stamps jitter by {:.2g} s where the joints are sampled evenly; the mean step of {:.4g} "
-                                     "s is used",
-                                     jitter_s, step_s));
+    out_.notes.push_back(
+        fmt::format("stamps jitter by {:.2g} s where the joints are sampled evenly; the mean step of {:.4g} "
+                    "s is used",
+                    jitter_s, step_s));
     out_.t = even;
   }
 

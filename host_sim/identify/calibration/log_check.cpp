@@ -14,7 +14,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kShortest_s = 3;      // a second is lost at the ends, and two are needed to fit and judge
+constexpr double kShortest_s = 3;  // a second is lost at the ends, and two are needed to fit and judge
 // Time in another unit. No arm passes its speed limit by this much in a tenth of its samples. No log of so low a rate
 // shows an arm whose fastest joint crawls like this.
 constexpr double kTooFast = 2, kTooSlow = 1.0 / 300, kSlowRate_Hz = 10;
@@ -145,15 +145,17 @@ void CheckPace(const codegen::Robot& robot, const logs::Log& log) {
     fastest = std::max(fastest, speed.maxCoeff() / joint.speed_limit_radps);
     const double usual = Quantile(speed, 0.9);
     if (usual > kTooFast * joint.speed_limit_radps)
-      Fail(log, Joint(j) + fmt::format("moves faster than {:.3g} {}/s for a tenth of the time, expected at most {:.3g}; is "
-                                       "time (step {:.3g} s) in another unit than s?",
-                                       usual, PositionUnit(joint), joint.speed_limit_radps, log.step_s()));
+      Fail(log,
+           Joint(j) + fmt::format("moves faster than {:.3g} {}/s for a tenth of the time, expected at most {:.3g}; is "
+                                  "time (step {:.3g} s) in another unit than s?",
+                                  usual, PositionUnit(joint), joint.speed_limit_radps, log.step_s()));
   }
   if (fastest == 0) Fail(log, "no joint moves, expected motion");
   if (fastest < kTooSlow && log.step_s() * kSlowRate_Hz > 1)
-    Fail(log, fmt::format("time step {:.3g} s, and no joint is faster than 1/{:.0f} of its limit; expected time in s, it "
-                          "looks like ms ({:.4g} Hz)",
-                          log.step_s(), 1 / fastest, 1000 / log.step_s()));
+    Fail(log,
+         fmt::format("time step {:.3g} s, and no joint is faster than 1/{:.0f} of its limit; expected time in s, it "
+                     "looks like ms ({:.4g} Hz)",
+                     log.step_s(), 1 / fastest, 1000 / log.step_s()));
 }
 
 // A logged speed against the positions: slope of dq/dt over qd, and the share of dq/dt that it explains.
@@ -183,11 +185,12 @@ std::vector<std::string> CheckSpeedColumns(const codegen::Robot& robot, const lo
     if (m.told < kTold) continue;
     slope.push_back(m.slope);
     if (near(m.slope, 1)) continue;
-    const char* looks = near(m.slope, -1)                        ? "; its sign looks wrong"
-                        : near(m.slope * kDegPerRad, 1)          ? "; it looks like deg/s"
-                        : near(m.slope, 0.10471975511965977)     ? "; it looks like rpm"
-                                                                 : "";
-    notes.push_back(Joint(j) + fmt::format("the logged speed is {:.3g} times that of the positions{}", 1 / m.slope, looks));
+    const char* looks = near(m.slope, -1)                    ? "; its sign looks wrong"
+                        : near(m.slope * kDegPerRad, 1)      ? "; it looks like deg/s"
+                        : near(m.slope, 0.10471975511965977) ? "; it looks like rpm"
+                                                             : "";
+    notes.push_back(Joint(j) +
+                    fmt::format("the logged speed is {:.3g} times that of the positions{}", 1 / m.slope, looks));
   }
   const auto all_near = [&](double y) {
     return !slope.empty() && std::all_of(slope.begin(), slope.end(), [&](double s) { return near(s, y); });
@@ -195,9 +198,10 @@ std::vector<std::string> CheckSpeedColumns(const codegen::Robot& robot, const lo
   for (const double factor : {10.0, 100.0, 1e3, 1e6, 1e9})
     for (const double y : {factor, 1 / factor})
       if (all_near(y))
-        Fail(log, fmt::format("the positions move {:g} times {} than the logged speeds say (time step {:.3g} s); expected "
-                              "time in s",
-                              factor, y > 1 ? "faster" : "more slowly", log.step_s()));
+        Fail(log,
+             fmt::format("the positions move {:g} times {} than the logged speeds say (time step {:.3g} s); expected "
+                         "time in s",
+                         factor, y > 1 ? "faster" : "more slowly", log.step_s()));
   return notes;
 }
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <random>
@@ -123,7 +124,8 @@ std::vector<unsigned> UnseenSigns(const Faults& faults, int n) {
       if (std::popcount(set) != size || (n > kMost && size > 1 && size < n) || reduced(set) == 0) continue;
       ColumnChange change(n);
       for (int j = 0; j < n; ++j)
-        if (set >> j & 1U) change.q_sign[static_cast<std::size_t>(j)] = change.tau_sign[static_cast<std::size_t>(j)] = -1;
+        if (set >> j & 1U)
+          change.q_sign[static_cast<std::size_t>(j)] = change.tau_sign[static_cast<std::size_t>(j)] = -1;
       if (!faults.Unseen(change)) continue;
       found.push_back(set);
       basis.push_back(reduced(set));
@@ -160,12 +162,6 @@ std::vector<std::string> UntoldFaults(const codegen::Model& model) {
   pace.pace = kFactor;
   if (faults.Unseen(pace)) out.push_back("the unit of time");
   return out;
-}
-
-std::string UntoldText(const codegen::Model& model) {
-  std::string text;
-  for (const std::string& fault : UntoldFaults(model)) text += (text.empty() ? "" : "; ") + fault;
-  return text.empty() ? text : "cannot be told without link data: " + text;
 }
 
 }  // namespace armcal::calibration

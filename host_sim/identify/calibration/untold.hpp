@@ -15,7 +15,4 @@ namespace armcal::calibration {
 // Empty if the robot file has link data.
 std::vector<std::string> UntoldFaults(const codegen::Model& model);
 
-// "cannot be told without link data: ...", a line without its end; empty if there is nothing to say.
-std::string UntoldText(const codegen::Model& model);
-
 }  // namespace armcal::calibration

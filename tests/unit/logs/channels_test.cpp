@@ -69,7 +69,8 @@ TEST(Channels, TimeInNanoseconds_IsReadAsSeconds) {
   std::string map = kMap, text = "ms,pos1,pos2,motor,force\n";
   map.replace(map.find("\"ms\"\n[q]"), 4, "\"ns\"");
   for (int k = 0; k < 5; ++k) text += std::to_string(4000000 * k) + ",0,0,0.5,0.25\n";
-  EXPECT_DOUBLE_EQ(ReadLog(folder.Write("log.csv", text), ReadChannelMap(folder.Write("map.toml", map)), 2).t[1], 0.004);
+  EXPECT_DOUBLE_EQ(ReadLog(folder.Write("log.csv", text), ReadChannelMap(folder.Write("map.toml", map)), 2).t[1],
+                   0.004);
 }
 
 TEST(Channels, BadMap_NamesKeyAndExpected) {

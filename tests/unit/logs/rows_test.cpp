@@ -100,7 +100,8 @@ TEST(Rows, ManyThatGoBack_AreRefused) {
             "run.csv:103: column 't': time goes back (such rows: 40), expected it to rise");
   RawRows repeated = Good(1000);  // stamps of a coarse clock
   for (Index k = 0; k + 1 < 1000; k += 2) repeated.t[k + 1] = repeated.t[k];
-  EXPECT_NE(ErrorOf([&] { ChooseSamples(repeated); }).find("run.csv:3: column 't': time is repeated"), std::string::npos);
+  EXPECT_NE(ErrorOf([&] { ChooseSamples(repeated); }).find("run.csv:3: column 't': time is repeated"),
+            std::string::npos);
   const std::vector<Index> first = Count(600);  // two runs in one file, of one clock that started again
   std::vector<Index> twice = first;
   twice.insert(twice.end(), first.begin(), first.end());

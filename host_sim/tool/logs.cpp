@@ -24,13 +24,14 @@ calibration::Dataset LogReader::One(const std::string& path) const {
   const logs::Log log = Raw(path);
   const calibration::SignalCheck check = Check(log);
   if (!check.lack.empty()) throw io::InputError(log.source + ": " + check.lack);
-  calibration::Dataset data = Made(log);
+  calibration::Dataset data = calibration::Prepare(model_, log, {cutoff_Hz_});
   CheckTogether({&data});
   return data;
 }
 
 void LogReader::CheckTogether(const std::vector<const calibration::Dataset*>& data) const {
   for (const std::string& note : calibration::CheckColumns(model_, data)) fmt::print(stderr, "{}\n", note);
+  for (const calibration::Dataset* log : data) calibration::CheckAgainstModel(model_, *log);
 }
 
 void LogReader::PrintUntold(const std::vector<calibration::Dataset>& data) const {
@@ -51,12 +52,6 @@ calibration::SignalCheck LogReader::Check(const logs::Log& log) const {
   return check;
 }
 
-calibration::Dataset LogReader::Made(const logs::Log& log) const {
-  calibration::Dataset data = calibration::Prepare(model_, log, {cutoff_Hz_});
-  calibration::CheckAgainstModel(model_, data);
-  return data;
-}
-
 std::vector<calibration::Dataset> LogReader::Narrow(const std::vector<std::string>& paths) const {
   constexpr double kNarrow = 0.62;  // of the cut-off: half the noise of an acceleration
   std::vector<calibration::Dataset> out;
@@ -74,7 +69,7 @@ std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>&
   for (const std::string& p : paths) {
     const logs::Log log = Raw(p);
     const calibration::SignalCheck check = Check(log);
-    if (check.lack.empty()) out.push_back(Made(log));
+    if (check.lack.empty()) out.push_back(calibration::Prepare(model_, log, {cutoff_Hz_}));
     else fmt::print(stderr, "{}: left out: {}\n", p, check.lack);
   }
   if (out.empty()) throw io::InputError(paths[0] + " and others: none is long enough to be fitted");

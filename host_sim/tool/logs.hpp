@@ -29,7 +29,6 @@ class LogReader {
  private:
   calibration::SignalCheck Check(const logs::Log& log) const;
   void CheckTogether(const std::vector<const calibration::Dataset*>& data) const;
-  calibration::Dataset Made(const logs::Log& log) const;
 
   const codegen::Model& model_;
   std::string channels_;

@@ -94,7 +94,7 @@ inline std::vector<Mangled> SixAxisFaults() {
            if (k < 500 || k >= 520) rows.push_back(k);
          Keep(l, rows);
        },
-       "", "20 samples are missing"},
+       "", "samples are missing"},
       {"a fifth of the samples missing",
        [](Log& l) {
          std::vector<Eigen::Index> rows;
@@ -142,7 +142,7 @@ inline std::vector<Mangled> SixAxisFaults() {
       {"all signs of torque", [](Log& l) { l.tau *= -1; }, "joint 1"},
       {"shuffled tau3", [](Log& l) { Shuffle(l, 2); }, "joint 3: "},
       {"shuffled tau6", [](Log& l) { Shuffle(l, 5); }, "joint 6: "},
-      {"a speed in deg/s", [](Log& l) { l.qd.col(3) *= kDegree; }, "", "joint 4: the logged speed is 57.3 times", true},
+      {"a speed in deg/s", [](Log& l) { l.qd.col(3) *= kDegree; }, "", "joint 4: the logged speed is 57", true},
       {"a gain of 1.1", [](Log& l) { l.tau.col(0) *= 1.1; }, ""},
   };
 }

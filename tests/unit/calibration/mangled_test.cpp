@@ -34,9 +34,9 @@ Said Judge(const codegen::Model& model, const std::vector<logs::Log>& read) {
       for (const std::string& note : check.notes) said.notes += note + "\n";
       if (!check.lack.empty()) throw io::InputError(log.source + ": " + check.lack);
       data.push_back(Prepare(model, log));
-      CheckAgainstModel(model, data.back());
     }
     for (const std::string& note : CheckColumns(model, Pointers(data))) said.notes += note + "\n";
+    for (const Dataset& d : data) CheckAgainstModel(model, d);
   } catch (const io::InputError& e) {
     said.refused = e.what();
   }

@@ -46,10 +46,11 @@ inline Eigen::Index Fastest(const logs::Log& log, Eigen::Index j) {
   return half + at;
 }
 
+inline constexpr double kDegree = 57.29577951308232;  // a radian in degrees
+
 // Faults of six-axis logs of ten seconds or more, at 50 to 250 Hz.
 inline std::vector<Mangled> SixAxisFaults() {
   using logs::Log;
-  constexpr double kDegree = 57.29577951308232;
   const auto time = [](double factor) { return [factor](Log& l) { l.t = (l.t.array() - l.t[0]) * factor; }; };
   const auto swap_q = [](int i, int j) { return [i, j](Log& l) { l.q.col(i - 1).swap(l.q.col(j - 1)); }; };
   const auto swap_tau = [](int i, int j) { return [i, j](Log& l) { l.tau.col(i - 1).swap(l.tau.col(j - 1)); }; };

@@ -55,7 +55,9 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
     if (std::error_code none; std::filesystem::equivalent(p, o.test, none))
       throw io::InputError("--test " + o.test + ": expected another log than those of --train");
   const LogReader read(model, o.channels, o.cutoff_Hz);
-  for (const calibration::Dataset& log : read.All(o.train)) run->train.push_back(calibration::ThinToBand(log));
+  const std::vector<calibration::Dataset> train = read.All(o.train);
+  read.PrintUntold(train);
+  for (const calibration::Dataset& log : train) run->train.push_back(calibration::ThinToBand(log));
   std::vector<calibration::Dataset> narrow;
   for (const calibration::Dataset& log : read.Narrow(o.train)) narrow.push_back(calibration::ThinToBand(log));
   const auto start = std::chrono::steady_clock::now();

@@ -312,6 +312,7 @@ int RunIdentify(const IdentifyOptions& o) {
   const codegen::Model model = LoadModel(o.robot);
   const LogReader read(model, o.channels, o.cutoff_Hz);
   std::vector<calibration::Dataset> train = read.All(o.train);
+  read.PrintUntold(train);
   const calibration::Fit all = calibration::WeightedFit(model, calibration::Pointers(train));
   PrintColumns(model, all);
   nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}, {"columns", Columns(model, all)}};

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host_sim/identify/calibration/dataset.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -18,12 +19,16 @@ class LogReader {
   logs::Log Raw(const std::string& path) const;
   // Throws io::InputError where a log cannot be one of this arm; what is worth a line goes to stderr.
   calibration::Dataset One(const std::string& path) const;
+  // The same for several logs. What one of them lacks the others may have: a log that is too short is left out.
   std::vector<calibration::Dataset> All(const std::vector<std::string>& paths) const;
-  // The same logs with speed and acceleration of a lower bandwidth.
+  // Says which faults of the columns nobody can see, where the robot file has no link data.
+  void PrintUntold(const std::vector<calibration::Dataset>& data) const;
+  // The logs of All with speed and acceleration of a lower bandwidth.
   std::vector<calibration::Dataset> Narrow(const std::vector<std::string>& paths) const;
 
  private:
-  calibration::Dataset Checked(const logs::Log& log) const;
+  calibration::SignalCheck Check(const logs::Log& log) const;
+  void CheckTogether(const std::vector<const calibration::Dataset*>& data) const;
 
   const codegen::Model& model_;
   std::string channels_;

@@ -65,10 +65,19 @@ TEST_F(BadFiles, Logs_AreRefusedNamingTheFile) {
   };
   ExpectRefused("er20_like", folder_ / "absent.csv", "absent.csv");
   bad("column.csv", 400, [](Cells& c) { c[0][7] = "torque1"; });
-  bad("nan.csv", 400, [](Cells& c) { c[200][3] = "nan"; });
+  bad("nan.csv", 400, [](Cells& c) {
+    for (int k = 100; k < 200; ++k) c[k][3] = "nan";
+  });
   bad("word.csv", 400, [](Cells& c) { c[200][3] = "fast"; });
-  bad("time.csv", 400, [](Cells& c) { std::swap(c[200][0], c[201][0]); });
-  bad("same_time.csv", 400, [](Cells& c) { c[200][0] = c[201][0]; });
+  bad("time.csv", 400, [](Cells& c) {
+    for (int k = 100; k < 200; k += 10) std::swap(c[k][0], c[k + 1][0]);
+  });
+  bad("same_time.csv", 400, [](Cells& c) {
+    for (int k = 100; k < 200; k += 10) c[k][0] = c[k + 1][0];
+  });
+  bad("milliseconds.csv", 400, [](Cells& c) {
+    for (std::size_t k = 1; k < c.size(); ++k) c[k][0] = std::to_string(8 * k);
+  });
   bad("short.csv", 50, {});
   bad("ragged.csv", 400, [](Cells& c) { c[200].pop_back(); });
   bad("twice.csv", 400, [](Cells& c) { c[0][2] = "q1"; });

@@ -74,8 +74,15 @@ std::vector<std::string> ScanHeader(Scanner& scan) {
   return names;
 }
 
-double Number(const Scanner& scan, std::string_view field, const std::string& name) {
+// Empty, or NaN as the common programs write it.
+bool IsMissing(std::string_view field) {
+  if (field.starts_with('-') || field.starts_with('+')) field.remove_prefix(1);
+  return field.empty() || field == "nan" || field == "NaN" || field == "NAN" || field == "NA";
+}
+
+double Number(const Scanner& scan, std::string_view field, const std::string& name, Missing missing) {
   field = Trim(field);
+  if (missing == Missing::kNan && IsMissing(field)) return NAN;
   if (field.starts_with('+')) field.remove_prefix(1);
   double value = NAN;
   const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
@@ -89,7 +96,8 @@ double Number(const Scanner& scan, std::string_view field, const std::string& na
 
 }  // namespace
 
-NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool(const std::string& name)>& wanted) {
+NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool(const std::string& name)>& wanted,
+                     Missing missing) {
   const std::string text = ReadWholeFile(path);
   Scanner scan(path.string(), text);
   const std::vector<std::string> header = ScanHeader(scan);
@@ -115,7 +123,7 @@ NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool
     std::string_view field;
     std::size_t c = 0;
     for (; scan.NextField(field); ++c) {
-      if (c < columns && keep[c]) flat.push_back(Number(scan, field, header[c]));
+      if (c < columns && keep[c]) flat.push_back(Number(scan, field, header[c], missing));
     }
     if (c != columns) {
       scan.Fail("has " + std::to_string(c) + " fields, expected " + std::to_string(columns) + " as in the header");

@@ -15,12 +15,16 @@ struct NumericTable {
   std::vector<std::string> ignored;  // names in the file that were not wanted
 };
 
+// What a field without a number means: an empty one, or "nan".
+enum class Missing { kRefused, kNan };
+
 // Reads the columns whose name is `wanted` (all of them without it), in the order of the file. Fields are separated by
 // commas; blanks around a field, CRLF and a byte-order mark are accepted; blank lines at the end too.
 // InputError with file, line, column and what was expected: unreadable file, empty or repeated name, a row of another
-// length than the header, a wanted field that is not a finite number. Unwanted fields are not read at all.
-NumericTable ReadCsv(const std::filesystem::path& path,
-                     const std::function<bool(const std::string& name)>& wanted = {});
+// length than the header, a wanted field that is not a finite number (with Missing::kNan a missing one reads as NaN).
+// Unwanted fields are not read at all.
+NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool(const std::string& name)>& wanted = {},
+                     Missing missing = Missing::kRefused);
 
 // Writes atomically, gzip if the name ends in ".gz". digits[c] significant digits in column c (9 if `digits` is empty).
 void WriteCsv(const std::filesystem::path& path, const NumericTable& table, const std::vector<int>& digits = {});

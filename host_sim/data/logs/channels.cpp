@@ -29,6 +29,7 @@ constexpr Unit kUnits[] = {
     {"s", "time", 1},
     {"ms", "time", 1e-3},
     {"us", "time", 1e-6},
+    {"ns", "time", 1e-9},
     {"rad", "position", 1},
     {"deg", "position", kDegree_rad},
     {"mrad", "position", 1e-3},

@@ -4,7 +4,7 @@
 //   joints = 6
 //   [time]
 //   column = "t_s"          # name in the log
-//   unit = "s"              # s, ms, us
+//   unit = "s"              # s, ms, us, ns
 //   [q]                     # q and tau must be there; also qd qdd qref tauff ext temp flag
 //   column = "pos_{}_deg"   # {} stands for 1..n; or a list of n names
 //   unit = "deg"            # one for all joints, or a list of n

@@ -7,6 +7,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/csv.hpp"
 #include "host_sim/data/logs/channels.hpp"
+#include "host_sim/data/logs/rows.hpp"
 
 namespace armcal::logs {
 namespace {
@@ -103,16 +104,24 @@ double MedianStep(const Eigen::VectorXd& t) {
   return step[step.size() / 2];
 }
 
-void CheckTime(Log& log, const std::string& time_column, int min_samples) {
-  if (log.samples() < min_samples) {
-    throw io::InputError(log.source + ": has " + std::to_string(log.samples()) + " samples, expected at least " +
-                         std::to_string(min_samples));
-  }
-  for (Eigen::Index k = 1; k < log.samples(); ++k) {
-    if (log.t[k] > log.t[k - 1]) continue;
-    throw io::InputError(log.source + ":" + std::to_string(k + 2) + ": column '" + time_column + "': time " +
-                         (log.t[k] == log.t[k - 1] ? "is repeated" : "goes back") + ", expected it to rise");
-  }
+// The columns that decide which rows are samples.
+RawRows Raw(const std::string& file, const files::NumericTable& table, const ChannelMap& map) {
+  const Columns columns(file, table);
+  RawRows rows;
+  rows.source = file;
+  rows.time_column = map.time.column;
+  rows.t = columns.Take(map.time);
+  for (const char* name : {"q", "tau"})
+    for (const Quantity& quantity : map.quantities) {
+      if (quantity.name != name) continue;
+      (quantity.name == "q" ? rows.q : rows.tau) = columns.Take(quantity);
+      for (const Channel& channel : quantity.joint) rows.columns.push_back(channel.column);
+    }
+  rows.missing = table.values.array().isNaN().rowwise().any().cast<int>();
+  return rows;
+}
+
+void ListGaps(Log& log) {
   if (log.samples() < 2) return;
   const double median = MedianStep(log.t);
   for (Eigen::Index k = 0; k + 1 < log.samples(); ++k) {
@@ -121,17 +130,30 @@ void CheckTime(Log& log, const std::string& time_column, int min_samples) {
 }
 
 Log FromTable(const std::string& file, files::NumericTable table, const ChannelMap& map, int min_samples) {
+  const Eigen::Index rows = table.values.rows();
+  Samples samples = ChooseSamples(Raw(file, table, map));
+  table.values = table.values(samples.row, Eigen::all).eval();
   const Columns columns(file, table);
   Log log;
   log.joints = map.joints;
   log.source = file;
-  log.t = columns.Take(map.time);
   for (const Quantity& quantity : map.quantities) {
     if (quantity.name == "flag") log.flags = columns.Take(quantity).cast<int>();
     else Block(log, quantity.name) = columns.Take(quantity);
   }
+  log.t = samples.t;
+  log.notes = std::move(samples.notes);
+  log.line.resize(log.samples());
+  constexpr int kFirstLine = 2;  // behind the header
+  for (Eigen::Index k = 0; k < log.samples(); ++k)
+    log.line[k] = static_cast<int>(samples.row[static_cast<std::size_t>(k)]) + kFirstLine;
   log.ignored = std::move(table.ignored);
-  CheckTime(log, map.time.column, min_samples);
+  if (log.samples() < min_samples) {
+    throw io::InputError(log.source + ": has " + std::to_string(log.samples()) + " samples" +
+                         (rows > log.samples() ? " in " + std::to_string(rows) + " rows" : "") +
+                         ", expected at least " + std::to_string(min_samples));
+  }
+  ListGaps(log);
   return log;
 }
 
@@ -143,24 +165,30 @@ double Log::step_s() const {
 }
 
 Log ReadLog(const std::filesystem::path& path, int min_samples) {
-  files::NumericTable table = files::ReadCsv(path, [](const std::string& name) {
-    const auto split = SplitName(name);
-    return name == "t" || (split && IsQuantity(split->quantity));
-  });
+  files::NumericTable table = files::ReadCsv(
+      path,
+      [](const std::string& name) {
+        const auto split = SplitName(name);
+        return name == "t" || (split && IsQuantity(split->quantity));
+      },
+      files::Missing::kNan);
   const ChannelMap map = OurNames(path.string(), table.names);
   return FromTable(path.string(), std::move(table), map, min_samples);
 }
 
 Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_samples) {
-  files::NumericTable table = files::ReadCsv(path, [&map](const std::string& name) {
-    if (name == map.time.column) return true;
-    for (const Quantity& quantity : map.quantities) {
-      for (const Channel& channel : quantity.joint) {
-        if (name == channel.column) return true;
-      }
-    }
-    return false;
-  });
+  files::NumericTable table = files::ReadCsv(
+      path,
+      [&map](const std::string& name) {
+        if (name == map.time.column) return true;
+        for (const Quantity& quantity : map.quantities) {
+          for (const Channel& channel : quantity.joint) {
+            if (name == channel.column) return true;
+          }
+        }
+        return false;
+      },
+      files::Missing::kNan);
   return FromTable(path.string(), std::move(table), map, min_samples);
 }
 

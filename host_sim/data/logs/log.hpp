@@ -23,17 +23,22 @@ struct Log {
   std::string source;                    // the file's name
   std::vector<int> gaps;                 // k where t[k+1] - t[k] > 1.5 x the median step
   std::vector<std::string> ignored;      // columns of the file that mean nothing here
+  std::vector<std::string> notes;        // what reading left out or changed, a line each
+  Eigen::VectorXi line;                  // [N] each sample's line in the file; empty if the log was not read from one
 
   Eigen::Index samples() const { return t.size(); }
+  int line_of(Eigen::Index k) const { return line.size() ? line[k] : static_cast<int>(k) + 2; }
   double step_s() const;  // the median sample time; InputError if there are fewer than two samples
 };
 
 inline constexpr int kMinSamples = 200;  // below this no statistic of the project means anything
 
 // Reads CSV or gzip CSV with our names: t, q1..qn, tau1..taun and optionally qd*, qdd*, qref*, tauff*, ext*, temp*,
-// flag*, each for all n joints. Other columns are listed in `ignored`.
-// InputError, one line with file, line, column and what was expected: column missing or twice, not a finite number,
-// rows of unequal length, time that does not rise, fewer than `min_samples` rows.
+// flag*, each for all n joints. Other columns are listed in `ignored`. Rows that are no samples are left out, and
+// `notes` says which (rows.hpp).
+// InputError, one line with file, line, column and what was expected: column missing or twice, not a number, many rows
+// without a number, rows of unequal length, time that does not rise, a sample rate below 1 Hz or above 50 kHz, fewer
+// than `min_samples` samples.
 Log ReadLog(const std::filesystem::path& path, int min_samples = kMinSamples);
 
 // The same for a foreign file whose columns, units and zero points `map` describes.

@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 
 // An arm's motion lies below this frequency. Its position shows how far below.
 constexpr double kLowest_Hz = 20;
-constexpr double kSlowest_Hz = 2;  // a lower cut-off would take seconds to settle at either end of a log
+constexpr double kLeastCutoff_Hz = 2;  // a lower cut-off would take seconds to settle at either end of a log
 // Cut-off over the motion's band. The filter then removes 4 % of a signal at the edge of the band, and less below it.
 constexpr double kAboveMotion = 1.5;
 constexpr double kHighest_Hz = 60;      // above, the current loop no longer follows
@@ -161,12 +161,12 @@ double QuietCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, d
   double cutoff_Hz = highest_Hz;
   if (torque > 0) cutoff_Hz = std::min(cutoff_Hz, std::pow(kShareOfJitter * noise.torque_Nm / torque, 2.0 / 5));
   if (speed > 0) cutoff_Hz = std::min(cutoff_Hz, std::pow(kShareOfWidth * sign_width_radps / speed, 2.0 / 3));
-  return std::min(std::max(cutoff_Hz, kSlowest_Hz), highest_Hz);
+  return std::min(std::max(cutoff_Hz, kLeastCutoff_Hz), highest_Hz);
 }
 
 double MotionCutoff_Hz(const JointNoise& noise, double rate_Hz) {
   const double motion_Hz = noise.band_Hz > 0 ? kAboveMotion * noise.band_Hz : kLowest_Hz;
-  return std::min({std::max(motion_Hz, kSlowest_Hz), kLowest_Hz, kHighestOfRate * rate_Hz});
+  return std::min({std::max(motion_Hz, kLeastCutoff_Hz), kLowest_Hz, kHighestOfRate * rate_Hz});
 }
 
 // What the user has set.
@@ -229,8 +229,10 @@ constexpr int kNeighbours = 2;    // bins on either side that must agree
 }  // namespace
 
 double MotionBand_Hz(const VectorXd& q, double noise, double rate_Hz) {
-  const Index segment = static_cast<Index>(std::exp2(std::floor(std::log2(kSegment_s * rate_Hz))));
-  if (q.size() < segment + 2) return 0.5 * rate_Hz;
+  const double most = kSegment_s * rate_Hz;
+  if (!(most < static_cast<double>(q.size()) * 2)) return 0.5 * rate_Hz;  // of more samples than there are, or no rate
+  const Index segment = most >= 1 ? static_cast<Index>(std::exp2(std::floor(std::log2(most)))) : 0;
+  if (segment < 4 * kNeighbours || q.size() < segment + 2) return 0.5 * rate_Hz;
   const VectorXd bend = q.tail(q.size() - 2) - 2 * q.segment(1, q.size() - 2) + q.head(q.size() - 2);
   VectorXd window(segment);  // Blackman and Harris, four terms: what leaks of a tone is 92 dB below it
   for (Index k = 0; k < segment; ++k) {

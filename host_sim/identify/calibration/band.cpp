@@ -23,7 +23,7 @@ constexpr int kFewSegments = 5;   // fewer tell nothing
 // where it has a tenth.
 constexpr double kMuchNoise = 0.8, kSomeNoise = 0.9;
 constexpr double kNoLag = 0.9;  // of the inverse gain: noise in the prediction does not lower it
-constexpr double kSure = 2;     // standard deviations
+constexpr double kSureOfGain = 2;     // standard deviations
 constexpr double kReach = 3;    // of a Gaussian's standard deviation, over which an average goes
 constexpr double kSeen = 0.6;   // of an average's weight: the used samples have so much of it at least
 
@@ -100,7 +100,7 @@ std::vector<TransferBand> Transfer(const Dataset& data, int joint, const VectorX
 
 double AgreedBand_Hz(const std::vector<TransferBand>& transfer) {
   const auto below = [](const TransferBand& b, double gain) {
-    return b.gain + kSure * b.gain_sd < gain && b.inverse_gain > kNoLag;
+    return b.gain + kSureOfGain * b.gain_sd < gain && b.inverse_gain > kNoLag;
   };
   for (std::size_t k = 0; k + 1 < transfer.size(); ++k) {
     if (!below(transfer[k], kMuchNoise) || !below(transfer[k + 1], kMuchNoise)) continue;

@@ -1,7 +1,7 @@
-// calibration - checks a log against the robot's limits, then against the torque that the robot file's bodies need.
+// calibration - checks the samples of a log against the robot's limits and against each other.
 #include "host_sim/identify/calibration/log_check.hpp"
 #include <fmt/core.h>
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -14,7 +14,10 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kShortest_s = 3;      // a second is lost at the ends, and two are needed to fit and judge
+constexpr double kShortest_s = 3;  // a second is lost at the ends, and two are needed to fit and judge
+// Time in another unit. No arm passes its speed limit by this much in a tenth of its samples. No log of so low a rate
+// shows an arm whose fastest joint crawls like this.
+constexpr double kTooFast = 2, kTooSlow = 1.0 / 300, kSlowRate_Hz = 10;
 constexpr double kMissingShare = 0.1;  // of the samples
 constexpr double kOutside = 0.5;   // of a joint's range: how far a position may lie beyond it, since limits may be soft
 constexpr double kOverTorque = 3;  // times the limit; smaller peaks above the rated torque are normal
@@ -28,6 +31,10 @@ constexpr double kDegPerRad = 57.29577951308232;
 }
 
 std::string Joint(int j) { return fmt::format("joint {}: ", j + 1); }
+
+bool Slides(const codegen::Joint& joint) { return joint.kinematics.type == codegen::JointType::kPrismatic; }
+const char* PositionUnit(const codegen::Joint& joint) { return Slides(joint) ? "m" : "rad"; }
+const char* TorqueUnit(const codegen::Joint& joint) { return Slides(joint) ? "N" : "N m"; }
 
 // At a true gap in time the joints move on by as many samples as are missing. If they move on by one sample only, the
 // clock jumped.
@@ -45,32 +52,52 @@ void CheckClock(const logs::Log& log) {
     Fail(log,
          fmt::format("line {}: time jumps by {:.3g} s while the joints move on by one sample; expected the clock of "
                      "one run",
-                     k + 3, log.t[k + 1] - log.t[k]));
+                     log.line_of(k + 1), log.t[k + 1] - log.t[k]));
   }
 }
 
 std::vector<std::string> CheckGaps(const logs::Log& log) {
   if (log.gaps.empty()) return {};
   double missing = 0;
-  for (const int k : log.gaps) missing += std::round((log.t[k + 1] - log.t[k]) / log.step_s()) - 1;
+  for (const int k : log.gaps) {  // rows that reading has left out are not missing
+    const double steps = std::round((log.t[k + 1] - log.t[k]) / log.step_s());
+    missing += std::max(0.0, steps - static_cast<double>(log.line_of(k + 1) - log.line_of(k)));
+  }
+  if (missing == 0) return {};
   const std::string text = fmt::format("{:.0f} samples are missing in {} gaps", missing, log.gaps.size());
   if (missing > kMissingShare * (missing + static_cast<double>(log.samples())))
     Fail(log, text + fmt::format(" ({:.0f} %), expected less than {:.0f} %",
                                  100 * missing / (missing + static_cast<double>(log.samples())), 100 * kMissingShare));
-  return {log.source + ": " + text + "; samples beside them are not used"};
+  return {text + "; samples beside them are not used"};
 }
 
-void CheckPosition(const codegen::Robot& robot, const logs::Log& log, int j) {
+// Within reach, and not at rest while another column says that the joint moves.
+void CheckRange(const codegen::Robot& robot, const logs::Log& log, int j) {
   const codegen::Joint& joint = robot.joint[j];
   const auto [lower, upper] = joint.position_limit_rad;
   const double room = kOutside * (upper - lower), low = log.q.col(j).minCoeff(), high = log.q.col(j).maxCoeff();
-  const bool angle = joint.kinematics.type == codegen::JointType::kRevolute;
   if (low < lower - room || high > upper + room) {
-    const bool degrees = angle && low / kDegPerRad > lower - room && high / kDegPerRad < upper + room;
+    const bool degrees = !Slides(joint) && low / kDegPerRad > lower - room && high / kDegPerRad < upper + room;
+    const bool millimetres = Slides(joint) && low / 1000 > lower - room && high / 1000 < upper + room;
     Fail(log, Joint(j) + fmt::format("position {:.4g} .. {:.4g}{}, expected within {:.3g} .. {:.3g} {}", low, high,
-                                     degrees ? " looks like degrees" : "", lower, upper, angle ? "rad" : "m"));
+                                     degrees       ? " looks like degrees"
+                                     : millimetres ? " looks like mm"
+                                                   : "",
+                                     lower, upper, PositionUnit(joint)));
   }
-  if (low == high) Fail(log, Joint(j) + "position never changes, expected motion (is the encoder stuck?)");
+  if (low < high) return;
+  const auto moves = [&](const Eigen::MatrixXd& block, double least) {
+    return block.cols() == log.joints && block.col(j).maxCoeff() - block.col(j).minCoeff() > least;
+  };
+  const double v_min = joint.v_min_radps;
+  if (moves(log.qd, 2 * v_min) || moves(log.qref, 100 * v_min * log.step_s()))
+    Fail(log, Joint(j) + fmt::format("position never changes while its {} does (is the encoder stuck?)",
+                                     moves(log.qd, 2 * v_min) ? "logged speed" : "command"));
+}
+
+// Leaps between two samples, and stretches at which the encoder sticks.
+void CheckPosition(const codegen::Robot& robot, const logs::Log& log, int j) {
+  const codegen::Joint& joint = robot.joint[j];
   const double step_s = log.step_s();
   int held = 0;  // samples for which it has stayed the same
   for (Index k = 1; k < log.samples(); ++k) {
@@ -81,26 +108,108 @@ void CheckPosition(const codegen::Robot& robot, const logs::Log& log, int j) {
     }
     const bool stuck = held * dt > kHeld_s;
     if (std::abs(step) > kJumpSpeed * joint.speed_limit_radps * dt)
-      Fail(log, Joint(j) + fmt::format("line {}: position {} by {:.3g} in one sample, expected at most {:.3g}", k + 2,
-                                       stuck ? "is stuck, then jumps" : "jumps", step, joint.speed_limit_radps * dt));
+      Fail(log, Joint(j) + fmt::format("line {}: position {} by {:.3g} {} in one sample, expected at most {:.3g}",
+                                       log.line_of(k), stuck ? "is stuck, then jumps" : "jumps", step,
+                                       PositionUnit(joint), joint.speed_limit_radps * dt));
     const bool leaps = std::abs(step) > kStopAcceleration * joint.acceleration_limit_radps2 * dt * dt;
     if (stuck && step != 0 && leaps)
-      Fail(log,
-           Joint(j) + fmt::format("line {}: position is stuck for {:.2g} s, then moves at once", k + 2, held * dt));
+      Fail(log, Joint(j) + fmt::format("line {}: position is stuck for {:.2g} s, then moves at once", log.line_of(k),
+                                       held * dt));
     held = step == 0 ? held + 1 : 0;
     if (held * dt <= kHeld_s || (held - 1) * dt > kHeld_s || k - held < 3) continue;
     const Index start = k - held;  // the last sample before it froze; the speed into it
     const double speed = (log.q(start, j) - log.q(start - 3, j)) / (log.t[start] - log.t[start - 3]);
     if (std::abs(speed) > kStopAcceleration * joint.acceleration_limit_radps2 * dt)
-      Fail(log, Joint(j) + fmt::format("line {}: position freezes at a speed of {:.2g} (is the encoder stuck?)",
-                                       start + 2, speed));
+      Fail(log, Joint(j) + fmt::format("line {}: position freezes at a speed of {:.2g} {}/s (is the encoder stuck?)",
+                                       log.line_of(start), speed, PositionUnit(joint)));
   }
+}
+
+double Quantile(VectorXd x, double share) {
+  const Index at = std::min(x.size() - 1, static_cast<Index>(share * static_cast<double>(x.size())));
+  std::nth_element(x.begin(), x.begin() + at, x.end());
+  return x[at];
+}
+
+VectorXd Speeds(const logs::Log& log, int j) {
+  const Index last = log.samples() - 1;
+  return (log.q.col(j).tail(last) - log.q.col(j).head(last)).cwiseQuotient(log.t.tail(last) - log.t.head(last));
+}
+
+// Speeds that no clock in seconds shows.
+void CheckPace(const codegen::Robot& robot, const logs::Log& log) {
+  double fastest = 0;  // of all joints, as a share of its limit
+  for (int j = 0; j < log.joints; ++j) {
+    const codegen::Joint& joint = robot.joint[j];
+    const VectorXd speed = Speeds(log, j).cwiseAbs();
+    fastest = std::max(fastest, speed.maxCoeff() / joint.speed_limit_radps);
+    const double usual = Quantile(speed, 0.9);
+    if (usual > kTooFast * joint.speed_limit_radps)
+      Fail(log,
+           Joint(j) + fmt::format("moves faster than {:.3g} {}/s for a tenth of the time, expected at most {:.3g}; is "
+                                  "time (step {:.3g} s) in another unit than s?",
+                                  usual, PositionUnit(joint), joint.speed_limit_radps, log.step_s()));
+  }
+  if (fastest == 0) Fail(log, "no joint moves, expected motion");
+  if (fastest < kTooSlow && log.step_s() * kSlowRate_Hz > 1)
+    Fail(log,
+         fmt::format("time step {:.3g} s, and no joint is faster than 1/{:.0f} of its limit; expected time in s, it "
+                     "looks like ms ({:.4g} Hz)",
+                     log.step_s(), 1 / fastest, 1000 / log.step_s()));
+}
+
+// A logged speed against the positions: slope of dq/dt over qd, and the share of dq/dt that it explains.
+struct SpeedMatch {
+  double slope = 0, told = 0;
+};
+
+SpeedMatch MatchSpeed(const logs::Log& log, int j) {
+  const Index last = log.samples() - 1;
+  const VectorXd dt = log.t.tail(last) - log.t.head(last), dq = log.q.col(j).tail(last) - log.q.col(j).head(last);
+  const VectorXd way = 0.5 * (log.qd.col(j).tail(last) + log.qd.col(j).head(last)).cwiseProduct(dt);
+  const double square = way.squaredNorm(), cross = way.dot(dq), all = dq.squaredNorm();
+  if (square == 0 || all == 0) return {};
+  return {cross / square, cross * cross / (square * all)};
+}
+
+// All joints agree on another time unit, or one joint's speed has another unit or sign.
+std::vector<std::string> CheckSpeedColumns(const codegen::Robot& robot, const logs::Log& log) {
+  constexpr double kTold = 0.7, kAlike = 0.2;
+  if (log.qd.cols() != log.joints) return {};
+  const auto near = [](double x, double y) { return std::abs(x / y - 1) < kAlike; };
+  std::vector<std::string> notes;
+  std::vector<double> slope;
+  for (int j = 0; j < log.joints; ++j) {
+    if (Quantile(Speeds(log, j).cwiseAbs(), 0.9) < robot.joint[j].v_min_radps) continue;
+    const SpeedMatch m = MatchSpeed(log, j);
+    if (m.told < kTold) continue;
+    slope.push_back(m.slope);
+    if (near(m.slope, 1)) continue;
+    const char* looks = near(m.slope, -1)                    ? "; its sign looks wrong"
+                        : near(m.slope * kDegPerRad, 1)      ? "; it looks like deg/s"
+                        : near(m.slope, 0.10471975511965977) ? "; it looks like rpm"
+                                                             : "";
+    notes.push_back(Joint(j) +
+                    fmt::format("the logged speed is {:.3g} times that of the positions{}", 1 / m.slope, looks));
+  }
+  const auto all_near = [&](double y) {
+    return !slope.empty() && std::all_of(slope.begin(), slope.end(), [&](double s) { return near(s, y); });
+  };
+  for (const double factor : {10.0, 100.0, 1e3, 1e6, 1e9})
+    for (const double y : {factor, 1 / factor})
+      if (all_near(y))
+        Fail(log,
+             fmt::format("the positions move {:g} times {} than the logged speeds say (time step {:.3g} s); expected "
+                         "time in s",
+                         factor, y > 1 ? "faster" : "more slowly", log.step_s()));
+  return notes;
 }
 
 void CheckTorque(const codegen::Robot& robot, const logs::Log& log, int j) {
   const codegen::Joint& joint = robot.joint[j];
   const double largest = log.tau.col(j).cwiseAbs().maxCoeff();
-  if (log.tau.col(j).minCoeff() == log.tau.col(j).maxCoeff())
+  const bool moves = log.q.col(j).minCoeff() < log.q.col(j).maxCoeff();  // a brake may hold a joint that rests
+  if (moves && log.tau.col(j).minCoeff() == log.tau.col(j).maxCoeff())
     Fail(log, Joint(j) + (largest == 0 ? "torque is zero throughout, expected a measured torque"
                                        : "torque never changes, expected a measured torque"));
   // The median is no peak: a limit may be passed now and then, not most of the time.
@@ -108,9 +217,11 @@ void CheckTorque(const codegen::Robot& robot, const logs::Log& log, int j) {
   std::nth_element(size.begin(), size.begin() + size.size() / 2, size.end());
   const double median = size[size.size() / 2];
   if (median > kOverTorque * joint.torque_limit_Nm)
-    Fail(log, Joint(j) + fmt::format("torque {:.4g} most of the time{}, expected at most {:.4g} N m", median,
-                                     largest / 1000 <= kOverTorque * joint.torque_limit_Nm ? " looks like mN m" : "",
-                                     joint.torque_limit_Nm));
+    Fail(log, Joint(j) + fmt::format("torque {:.4g} most of the time{}, expected at most {:.4g} {}", median,
+                                     largest / 1000 > kOverTorque * joint.torque_limit_Nm ? ""
+                                     : Slides(joint)                                      ? " looks like mN"
+                                                                                          : " looks like mN m",
+                                     joint.torque_limit_Nm, TorqueUnit(joint)));
   int silent = 0;
   for (Index k = 1; k < log.samples(); ++k) {
     const double dt = log.t[k] - log.t[k - 1];
@@ -118,129 +229,31 @@ void CheckTorque(const codegen::Robot& robot, const logs::Log& log, int j) {
     silent = moving && log.tau(k, j) == log.tau(k - 1, j) ? silent + 1 : 0;
     if (silent * dt <= kSilent_s) continue;
     Fail(log,
-         Joint(j) + fmt::format("line {}: torque stays at {:.3g} while the joint moves, expected a measured torque",
-                                k + 2, log.tau(k, j)));
+         Joint(j) + fmt::format("line {}: torque stays at {:.3g} {} while the joint moves, expected a measured torque",
+                                log.line_of(k), log.tau(k, j), TorqueUnit(joint)));
   }
 }
 
 }  // namespace
 
-std::vector<std::string> CheckSignals(const codegen::Robot& robot, const logs::Log& log) {
+SignalCheck CheckSignals(const codegen::Robot& robot, const logs::Log& log) {
+  SignalCheck check;
+  check.notes = log.notes;
   const double seconds = log.t[log.samples() - 1] - log.t[0];
   if (seconds < kShortest_s)
-    Fail(log, fmt::format("{:.2g} s of log, expected at least {:.0f} s", seconds, kShortest_s));
+    check.lack = fmt::format("{:.2g} s of log, expected at least {:.0f} s", seconds, kShortest_s);
+  for (int j = 0; j < log.joints; ++j) CheckRange(robot, log, j);
+  const std::vector<std::string> speeds = CheckSpeedColumns(robot, log);  // they know the unit of time better than limits
+  CheckPace(robot, log);
   for (int j = 0; j < log.joints; ++j) CheckTorque(robot, log, j);
   CheckClock(log);
-  std::vector<std::string> notes = CheckGaps(log);
-  for (int j = 0; j < log.joints; ++j) CheckPosition(robot, log, j);
-  return notes;
-}
-
-namespace {
-
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-constexpr int kRows = 600;        // of a log: enough to tell columns apart
-constexpr double kExchanged = 2;  // by how much an exchange of two columns must cut the sum of log residual variances
-constexpr double kScale = 20;     // a torque this much larger or smaller than the bodies need is in another unit
-constexpr double kTelling =
-    0.5;  // share of the torque without friction that the bodies must explain before its scale is judged
-constexpr double kTiny = 0.01;  // of the torque limit: a cable may need as much
-
-struct Match {
-  double log_left = 0;  // log of the share of variance left
-  double told = 0;      // share of what friction leaves that the bodies explain
-  double scale = 1;     // measured over needed
-  double needed = 0;    // RMS about its mean
-};
-
-// torque = scale needed + Coulomb, viscous, offset, over rows of one joint.
-Match Compare(const VectorXd& torque, const VectorXd& needed, const VectorXd& speed) {
-  MatrixXd A(torque.size(), 4);
-  A << needed, speed.cwiseSign(), speed, VectorXd::Ones(torque.size());
-  const VectorXd x = A.colPivHouseholderQr().solve(torque);
-  const double left = (torque - A * x).squaredNorm();
-  const double all = (torque.array() - torque.mean()).square().sum();
-  const MatrixXd friction = A.rightCols(3);
-  const double without = (torque - friction * friction.colPivHouseholderQr().solve(torque)).squaredNorm();
-  return {std::log(std::max(left, 1e-12 * all) / std::max(all, 1e-300)), 1 - left / std::max(without, 1e-300), x[0],
-          std::sqrt((needed.array() - needed.mean()).square().mean())};
-}
-
-codegen::Signals EveryOf(const Dataset& d, MatrixXd& tau) {
-  const int step = std::max(1, d.samples() / kRows);
-  const auto rows = Eigen::seq(0, d.samples() - 1, step);
-  tau = d.tau(rows, Eigen::all);
-  codegen::Signals s;
-  s.t = d.s.t(rows), s.q = d.s.q(rows, Eigen::all), s.qd = d.s.qd(rows, Eigen::all), s.qdd = d.s.qdd(rows, Eigen::all);
-  return s;
-}
-
-class Checker {
- public:
-  Checker(const codegen::Model& model, const Dataset& data) : model_(model), signals_(EveryOf(data, tau_)) {
-    VectorXd bodies(model.body_parameters());
-    for (int k = 0; k < bodies.size(); ++k) bodies[k] = model.table()[k].mean;
-    base_ = model.base_map() * bodies;
+  for (const auto& notes : {CheckGaps(log), speeds})
+    check.notes.insert(check.notes.end(), notes.begin(), notes.end());
+  for (int j = 0; j < log.joints; ++j) {
+    CheckPosition(robot, log, j);
+    if (log.q.col(j).minCoeff() == log.q.col(j).maxCoeff()) check.resting.push_back(j);
   }
-
-  std::vector<Match> Compare(const codegen::Signals& s, const MatrixXd& tau) const {
-    std::vector<MatrixXd> row;
-    model_.Regressor(s, {}, {}, row);
-    std::vector<Match> out;
-    for (int j = 0; j < model_.joints(); ++j)
-      out.push_back(
-          calibration::Compare(tau.col(j), row[j].middleCols(model_.front(), model_.rigid()) * base_, s.qd.col(j)));
-    return out;
-  }
-  double Left(bool positions, bool torques, int i, int j) const {
-    codegen::Signals s = signals_;
-    MatrixXd tau = tau_;
-    if (positions)
-      for (MatrixXd* m : {&s.q, &s.qd, &s.qdd}) m->col(i).swap(m->col(j));
-    if (torques) tau.col(i).swap(tau.col(j));
-    double sum = 0;
-    for (const Match& m : Compare(s, tau)) sum += m.log_left;
-    return sum;
-  }
-  const codegen::Signals& signals() const { return signals_; }
-  const MatrixXd& tau() const { return tau_; }
-
- private:
-  const codegen::Model& model_;
-  MatrixXd tau_;
-  codegen::Signals signals_;
-  VectorXd base_;
-};
-
-}  // namespace
-
-void CheckAgainstModel(const codegen::Model& model, const Dataset& data) {
-  if (!model.robot().has_prior) return;
-  const Checker checker(model, data);
-  const double as_given = checker.Left(false, false, 0, 0);
-  double least = as_given - kExchanged;
-  std::string exchanged;
-  for (int i = 0; i < model.joints(); ++i)
-    for (int j = i + 1; j < model.joints(); ++j)
-      for (const auto& [positions, torques, name] : {std::tuple{true, false, "q"}, std::tuple{false, true, "tau"}}) {
-        const double left = checker.Left(positions, torques, i, j);
-        if (left < least) least = left, exchanged = fmt::format("{0}{1} and {0}{2}", name, i + 1, j + 1);
-      }
-  if (!exchanged.empty())
-    throw io::InputError(data.source + ": columns " + exchanged +
-                         " seem to be exchanged; expected each in its joint's place");
-  const std::vector<Match> match = checker.Compare(checker.signals(), checker.tau());
-  for (int j = 0; j < model.joints(); ++j) {
-    const Match& m = match[static_cast<std::size_t>(j)];
-    if (m.needed < kTiny * model.robot().joint[j].torque_limit_Nm || m.told < kTelling) continue;
-    if (m.scale > 1 / kScale && m.scale < kScale) continue;
-    throw io::InputError(
-        data.source + fmt::format(": joint {}: torque is {:.2g} times what the robot file's bodies need, expected N m "
-                                  "(N) on the joint side with the sign of q",
-                                  j + 1, m.scale));
-  }
+  return check;
 }
 
 }  // namespace armcal::calibration

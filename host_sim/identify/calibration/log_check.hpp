@@ -1,23 +1,27 @@
-// calibration - checks that a log is what it says it is: one run of this arm, in SI units, with each column in place.
+// calibration - checks that the samples of a log can be those of one run of this arm, in SI units.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "host_sim/identify/calibration/dataset.hpp"
+#include "codegen/src/robot/robot.hpp"
+#include "host_sim/data/logs/log.hpp"
 
 namespace armcal::calibration {
 
-// Checks the samples alone against the robot's limits. Returns remarks that are worth a line: gaps. InputError, one
-// line that names file, joint and problem, where
-// - the log is shorter than 3 s, its clock jumps, or more than a tenth of its samples are missing;
-// - positions or torques lie far outside of the limits (degrees, mN m);
-// - a position jumps or sticks;
-// - a torque is zero, or does not change while the joint moves.
-std::vector<std::string> CheckSignals(const codegen::Robot& robot, const logs::Log& log);
+// What a log says beside its samples. No text names the file.
+struct SignalCheck {
+  std::vector<std::string> notes;  // worth a line each: what reading left out, gaps, joints at rest
+  std::vector<int> resting;        // joints (0-based) whose position never changes
+  std::string lack;                // why the log is too little to be fitted alone; empty: it is not
+};
 
-// Checks a log against the torque that the robot file's bodies need; an arm without a prior passes. InputError: two
-// columns are exchanged, or a torque has another unit or sign.
-void CheckAgainstModel(const codegen::Model& model, const Dataset& data);
+// Checks the samples alone against the robot's limits. InputError, one line that names file, joint and problem, where
+// - the clock jumps, more than a tenth of the samples are missing, or time has another unit than s: the joints are far
+//   slower or faster than their limits, or a logged speed is another one than that of the positions;
+// - positions or torques lie far outside of the limits (degrees, mN m);
+// - no joint moves; a position jumps, sticks, or rests while its logged speed or command moves;
+// - a torque is zero, or does not change while the joint moves.
+SignalCheck CheckSignals(const codegen::Robot& robot, const logs::Log& log);
 
 }  // namespace armcal::calibration

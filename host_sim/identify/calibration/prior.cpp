@@ -64,15 +64,15 @@ MatrixXd BodyCovariance(const codegen::Model& model) {
 
 namespace {
 
-constexpr int kStates = 256;
+constexpr int kDrawnStates = 256;
 
 // [columns] The deviation at which a column's torque, over states within the arm's limits, is as large as the limit of
 // one of its joints.
 VectorXd WideDeviations(const codegen::Model& model) {
   const int n = model.joints();
   codegen::Signals s;
-  s.t = VectorXd::LinSpaced(kStates, 0, kStates - 1);
-  s.q.resize(kStates, n), s.qd = s.q, s.qdd = s.q;
+  s.t = VectorXd::LinSpaced(kDrawnStates, 0, kDrawnStates - 1);
+  s.q.resize(kDrawnStates, n), s.qd = s.q, s.qdd = s.q;
   // Multiples of irrational numbers fill each range evenly.
   const auto share = [](int k, int dimension) {
     const double turns = k * std::sqrt(2 + dimension * (dimension + 3));
@@ -81,7 +81,7 @@ VectorXd WideDeviations(const codegen::Model& model) {
   for (int j = 0; j < n; ++j) {
     const codegen::Joint& joint = model.robot().joint[j];
     const auto [lower, upper] = joint.position_limit_rad;
-    for (int k = 0; k < kStates; ++k) {
+    for (int k = 0; k < kDrawnStates; ++k) {
       s.q(k, j) = lower + share(k, 3 * j) * (upper - lower);
       s.qd(k, j) = (2 * share(k, 3 * j + 1) - 1) * joint.speed_limit_radps;
       s.qdd(k, j) = (2 * share(k, 3 * j + 2) - 1) * joint.acceleration_limit_radps2;
@@ -95,7 +95,7 @@ VectorXd WideDeviations(const codegen::Model& model) {
   model.Regressor(s, {none.data(), static_cast<std::size_t>(none.size())}, eta, row);
   VectorXd largest = VectorXd::Zero(model.columns());
   for (int j = 0; j < n; ++j)
-    largest = largest.cwiseMax(row[static_cast<std::size_t>(j)].colwise().norm().transpose() / std::sqrt(kStates) /
+    largest = largest.cwiseMax(row[static_cast<std::size_t>(j)].colwise().norm().transpose() / std::sqrt(kDrawnStates) /
                                model.robot().joint[j].torque_limit_Nm);
   return largest.cwiseInverse();
 }

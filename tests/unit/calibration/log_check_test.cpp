@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/calibration/body_check.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::calibration {
@@ -20,7 +21,8 @@ class LogCheck : public testing::Test {
   }
   std::string Said() const {
     try {
-      (void)CheckSignals(arm_.model().robot(), log_);
+      if (const std::string lack = CheckSignals(arm_.model().robot(), log_).lack; !lack.empty())
+        return "run.csv: " + lack;
       CheckAgainstModel(arm_.model(), data_);
     } catch (const io::InputError& e) {
       return e.what();
@@ -61,9 +63,22 @@ TEST_F(LogCheck, OfAJointWithoutTorque_NamesIt) {
   ExpectRefused("joint 2: torque is zero");
 }
 
-TEST_F(LogCheck, OfAnEncoderThatNeverMoves_NamesIt) {
+TEST_F(LogCheck, OfAJointThatRests_SaysWhichOneAndRefusesItOnlyIfOtherColumnsMove) {
   log_.q.col(1).setConstant(0.3);
-  ExpectRefused("joint 2: position never changes");
+  EXPECT_EQ(CheckSignals(arm_.model().robot(), log_).resting, std::vector<int>{1});
+  log_.qd = data_.s.qd;
+  ExpectRefused("joint 2: position never changes while its logged speed does");
+  log_.q.col(0).setConstant(0.1), log_.qd.resize(0, 0);
+  ExpectRefused("no joint moves");
+}
+
+TEST_F(LogCheck, OfTimeInAnotherUnit_TheLoggedSpeedTells) {
+  log_.qd = data_.s.qd;
+  EXPECT_EQ(Said(), "");
+  log_.t *= 10;
+  ExpectRefused("10 times more slowly");
+  log_.t /= 100;
+  ExpectRefused("10 times faster");
 }
 
 TEST_F(LogCheck, OfAnEncoderThatSticksForASecond_NamesIt) {
@@ -95,7 +110,7 @@ TEST_F(LogCheck, OfAFewMissingSamples_IsALineAndOfManyARefusal) {
     cut.gaps = {first - 1};
     return cut;
   };
-  const std::vector<std::string> notes = CheckSignals(arm_.model().robot(), without(1000, 20));
+  const std::vector<std::string> notes = CheckSignals(arm_.model().robot(), without(1000, 20)).notes;
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_NE(notes[0].find("20 samples are missing"), std::string::npos) << notes[0];
   log_ = without(1000, 600);

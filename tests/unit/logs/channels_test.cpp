@@ -64,6 +64,15 @@ TEST(Channels, MissingForeignColumn_IsNamedAsInTheLog) {
   EXPECT_EQ(ErrorOf([&] { ReadLog(path, map, 2); }), path.string() + ":1: expected a column 'pos2'");
 }
 
+TEST(Channels, TimeInNanoseconds_IsReadAsSeconds) {
+  const TemporaryFolder folder;
+  std::string map = kMap, text = "ms,pos1,pos2,motor,force\n";
+  map.replace(map.find("\"ms\"\n[q]"), 4, "\"ns\"");
+  for (int k = 0; k < 5; ++k) text += std::to_string(4000000 * k) + ",0,0,0.5,0.25\n";
+  EXPECT_DOUBLE_EQ(ReadLog(folder.Write("log.csv", text), ReadChannelMap(folder.Write("map.toml", map)), 2).t[1],
+                   0.004);
+}
+
 TEST(Channels, BadMap_NamesKeyAndExpected) {
   const TemporaryFolder folder;
   const auto error = [&folder](const std::string& from, const std::string& to) {
@@ -75,7 +84,7 @@ TEST(Channels, BadMap_NamesKeyAndExpected) {
   };
   EXPECT_EQ(error("joints = 2", "joints = 0"), ": joints: expected a number of joints, 1 to 64");
   EXPECT_EQ(error("[time]", "[clock]"), ": clock: unknown key, expected joints, title, time or a quantity");
-  EXPECT_EQ(error("unit = \"ms\"", "unit = \"min\""), ": time.unit: 'min' is no unit of time, expected s, ms, us");
+  EXPECT_EQ(error("unit = \"ms\"", "unit = \"min\""), ": time.unit: 'min' is no unit of time, expected s, ms, us, ns");
   EXPECT_EQ(error("\"mm\"]", "\"mm\", \"m\"]"), ": q.unit: expected one text or a list of 2");
   EXPECT_EQ(error("[1, 2]", "[1, \"two\"]"), ": q.scale: expected a list of numbers");
   EXPECT_EQ(error("\"pos{}\"", "\"pos\""), ": q.column: 'pos' is used for two joints");

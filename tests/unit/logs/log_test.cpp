@@ -100,12 +100,8 @@ TEST(Log, BadFile_NamesLineColumnAndExpected) {
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,2,3")), ":4: has 4 fields, expected 3 as in the header");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,two")), ":4: column 'tau1': 'two' is not a number");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,2 3")), ":4: column 'tau1': '2 3' is not a number");
-  EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,,2")), ":4: column 'q1': '' is not a number");
-  EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,nan,2")), ":4: column 'q1': 'nan', expected a finite number");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,-inf")), ":4: column 'tau1': '-inf', expected a finite number");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,1e999")), ":4: column 'tau1': '1e999', expected a finite number");
-  EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.004,1,2")), ":4: column 't': time is repeated, expected it to rise");
-  EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.001,1,2")), ":4: column 't': time goes back, expected it to rise");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1"), kMinSamples), ": has 10 samples, expected at least 200");
   EXPECT_EQ(ErrorFor("t,q1,tau1\n0,0,0\n\n1,0,0\n"), ":4: follows a blank line, expected the end of the file");
 }

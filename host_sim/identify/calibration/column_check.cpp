@@ -1,0 +1,355 @@
+// calibration - compares the fit of logs as given with fits of exchanged and turned columns, and looks at its friction.
+#include "host_sim/identify/calibration/column_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/calibration/column_fit.hpp"
+
+namespace armcal::calibration {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kScreenRows = 300, kFullRows = 1200, kRounds = 3, kTried = 3;
+constexpr int kRowsPerColumn = 2;  // fewer rows fit anything
+// A change must cut the sum of log variances by this much. Healthy measured logs stay below a half of it.
+constexpr double kClearGain = 2;
+constexpr double kWorse = 1.1;     // no torque may fit worse by more than this under a change that is right
+constexpr double kForeign = 3;     // a log whose sum of log variances is this much above that of all is looked at alone
+constexpr double kNothing = 0.95;  // of the spread left: the model explains nothing
+constexpr double kWhite = 0.75;    // mean square of steps over twice the variance; noise has 1
+constexpr double kOverNoise = 3;   // times the declared noise: a spread that is more than noise
+constexpr double kSure = 9;        // standard deviations of independent rows; rows are not independent
+constexpr double kFedShare = 0.1;  // of the torque's spread
+// A joint at rest: RMS of its torque that the pose does not explain, of the torque limit and of the torque's spread.
+// Stiction of measured arms leaves 2 % of the limit; joints that move behind a stuck encoder leave 7 % and more.
+constexpr double kResting = 0.04, kUnexplained = 0.7;
+
+std::string Names(const std::vector<const Dataset*>& data) {
+  std::string text = data[0]->source;
+  if (data.size() == 2) text += " and " + data[1]->source;
+  if (data.size() > 2) text += fmt::format(" and {} more", data.size() - 1);
+  return text;
+}
+
+struct Named {
+  ColumnChange change;
+  std::string what;
+};
+
+void Exchange(std::vector<int>& columns, int i, int j) {
+  std::swap(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
+}
+
+// One step away from `from`, those of one motion behind each other.
+std::vector<Named> Neighbours(const ColumnChange& from, int n) {
+  std::vector<Named> out;
+  const auto add = [&](const std::string& what, const auto& make) {
+    out.push_back({from, what});
+    make(out.back().change);
+  };
+  for (int i = 0; i < n; ++i) {
+    for (int j = i + 1; j < n; ++j)
+      add(fmt::format("columns tau{} and tau{} seem to be exchanged", i + 1, j + 1),
+          [&](ColumnChange& c) { Exchange(c.tau, i, j); });
+    add(fmt::format("tau{} seems to have the wrong sign", i + 1),
+        [&](ColumnChange& c) { c.tau_sign[static_cast<std::size_t>(i)] *= -1; });
+  }
+  for (int i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    for (int j = i + 1; j < n; ++j) {
+      add(fmt::format("columns q{} and q{} seem to be exchanged", i + 1, j + 1),
+          [&](ColumnChange& c) { Exchange(c.q, i, j); });
+      add(fmt::format("joints {} and {} seem to be exchanged (q and tau)", i + 1, j + 1),
+          [&](ColumnChange& c) { Exchange(c.q, i, j), Exchange(c.tau, i, j); });
+    }
+    add(fmt::format("q{} seems to have the wrong sign", i + 1), [&](ColumnChange& c) { c.q_sign[at] *= -1; });
+    add(fmt::format("q{0} and tau{0} seem to have the wrong sign", i + 1),
+        [&](ColumnChange& c) { c.q_sign[at] *= -1, c.tau_sign[at] *= -1; });
+  }
+  for (const double pace : {10.0, 100.0, 0.1, 0.01})
+    add(fmt::format("time seems to be {:g} times too {}", pace > 1 ? pace : 1 / pace, pace > 1 ? "long" : "short"),
+        [&](ColumnChange& c) { c.pace *= pace; });
+  return out;
+}
+
+// log_left of each candidate; a motion is evaluated once for all candidates that share it.
+std::vector<double> Scores(const ColumnFit& fit, const std::vector<Named>& candidates) {
+  std::vector<double> out;
+  std::optional<ColumnFit::Motion> motion;
+  const ColumnChange* of = nullptr;
+  for (const Named& c : candidates) {
+    if (of == nullptr || !of->same_motion(c.change)) motion = fit.Move(c.change), of = &c.change;
+    out.push_back(fit.Fit(*motion, c.change).log_left);
+  }
+  return out;
+}
+
+// The right columns suit every torque. Wrong ones may suit one by chance, at the cost of another.
+bool NoneWorse(const ColumnFitResult& given, const ColumnFitResult& changed, const ColumnChange& change) {
+  for (std::size_t j = 0; j < change.tau.size(); ++j)
+    if (changed.left[static_cast<Index>(j)] > kWorse * given.left[change.tau[j]]) return false;
+  return true;
+}
+
+}  // namespace
+
+ColumnGain BestColumnChange(const codegen::Model& model, const std::vector<const Dataset*>& data) {
+  const int n = model.joints();
+  const ColumnFit screen(model, data, kScreenRows), full(model, data, kFullRows);
+  if (full.rows() < kRowsPerColumn * model.columns()) return {};
+  ColumnChange best(n);
+  const ColumnFitResult given = full.Fit(full.Move(best), best);
+  double least = given.log_left;
+  bool none_worse = false;
+  ColumnGain out;
+  for (int round = 0; round < kRounds; ++round) {
+    const double here = screen.Fit(screen.Move(best), best).log_left;
+    const std::vector<Named> candidates = Neighbours(best, n);
+    const std::vector<double> score = Scores(screen, candidates);
+    std::vector<std::size_t> order(score.size());
+    for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return score[a] < score[b]; });
+    const Named* winner = nullptr;
+    double found = least;
+    bool fair = false;  // under the winner no torque fits worse
+    for (std::size_t k = 0; k < std::min<std::size_t>(kTried, order.size()) && score[order[k]] < here; ++k) {
+      const Named& c = candidates[order[k]];
+      const ColumnFitResult result = full.Fit(full.Move(c.change), c.change);
+      const bool here_fair = NoneWorse(given, result, c.change);
+      if (result.log_left >= least || (fair && !here_fair) || (fair == here_fair && result.log_left >= found)) continue;
+      found = result.log_left, fair = here_fair, winner = &c;
+    }
+    if (winner == nullptr || (round > 0 && least - found < kClearGain)) break;
+    out.what += (out.what.empty() ? "" : "; ") + winner->what;
+    least = found, none_worse = fair;
+    best = winner->change;
+    if (given.log_left - least < kClearGain) break;
+  }
+  out.gain = none_worse ? given.log_left - least : 0;
+  out.as_given = std::exp(0.5 * given.log_left / n), out.changed = std::exp(0.5 * least / n);
+  return out;
+}
+
+namespace {
+
+// What each joint of a fit says about itself.
+class Examiner {
+ public:
+  Examiner(const codegen::Model& model, const std::vector<const Dataset*>& data)
+      : model_(model),
+        data_(data),
+        fit_(model, data, kFullRows),
+        given_(model.joints()),
+        motion_(fit_.Move(given_)),
+        result_(fit_.Fit(motion_, given_)) {}
+
+  const ColumnFit& fit() const { return fit_; }
+  const ColumnFitResult& result() const { return result_; }
+
+  std::vector<std::string> Notes() const {
+    std::vector<std::string> notes;
+    for (int j = 0; j < model_.joints(); ++j) {
+      if (MovingShare(j) < 0.1 || !(result_.spread[j] > 0)) continue;
+      const double left = result_.left[j] / result_.spread[j];
+      if (left > kNothing) {
+        if (Steps(j) > kWhite && result_.spread[j] > kOverNoise * model_.robot().joint[j].torque_noise_Nm)
+          Fail(j,
+               "the torque is noise: it changes from sample to sample by as much as it varies at all, and the model "
+               "explains nothing of it; expected a measured torque");
+        notes.push_back(
+            fmt::format("joint {}: the model explains nothing of the torque ({:.0f} % of its spread is left): "
+                        "are the kinematics and the columns right?",
+                        j + 1, 100 * left));
+      }
+      if (const std::string said = FedEnergy(j); !said.empty()) notes.push_back(said);
+    }
+    return notes;
+  }
+
+ private:
+  [[noreturn]] void Fail(int j, const std::string& what) const {
+    throw io::InputError(fmt::format("{}: joint {}: {}", Names(data_), j + 1, what));
+  }
+
+  double MovingShare(int j) const {
+    return (fit_.signals().qd.col(j).cwiseAbs().array() > model_.robot().joint[j].v_min_radps).cast<double>().mean();
+  }
+
+  // Mean square of the torque's steps over twice its variance.
+  double Steps(int j) const {
+    double steps = 0, variance = 0;
+    for (const Dataset* d : data_) {
+      const auto tau = d->tau.col(j);
+      const Index last = tau.size() - 1;
+      steps += (tau.tail(last) - tau.head(last)).squaredNorm();
+      variance += 2 * (tau.array() - tau.mean()).square().sum();
+    }
+    return variance > 0 ? steps / variance : 0;
+  }
+
+  std::vector<int> FrictionColumns(int j) const {
+    std::vector<int> out;
+    for (int c = model_.front_begin(j); c < model_.front_begin(j + 1); ++c)
+      if (model_.table()[static_cast<std::size_t>(model_.table_index(c))].group == 1) out.push_back(c);
+    return out;
+  }
+
+  // Friction torque along the motion, of rows where the joint moves: its mean, the mean's deviation, and the value that
+  // 95 % of the rows do not pass.
+  struct Drag {
+    double mean = 0, sd = 0, high = 0;
+    bool feeds(double spread) const { return high < 0 && -mean > kSure * sd && -mean > kFedShare * spread; }
+  };
+  Drag DragOf(int j, const ColumnFit::Motion& motion, const ColumnFitResult& result) const {
+    const auto at = static_cast<std::size_t>(j);
+    const std::vector<int> friction = FrictionColumns(j);
+    const auto& speed = fit_.signals().qd.col(j);
+    VectorXd pick = VectorXd::Zero(motion.columns);
+    std::vector<double> drag;
+    for (Index r = 0; r < fit_.rows(); ++r) {
+      if (std::abs(speed[r]) < model_.robot().joint[j].v_min_radps) continue;
+      const double sign = speed[r] > 0 ? 1 : -1;
+      double torque = 0;
+      for (std::size_t c = 0; c < motion.column[at].size(); ++c) {
+        if (std::find(friction.begin(), friction.end(), motion.column[at][c]) == friction.end()) continue;
+        const double value = sign * motion.A[at](r, static_cast<Index>(c));
+        pick[motion.column[at][c]] += value;
+        torque += value * result.x[motion.column[at][c]];
+      }
+      drag.push_back(torque);
+    }
+    if (drag.empty()) return {};
+    pick /= static_cast<double>(drag.size());
+    std::sort(drag.begin(), drag.end());
+    return {pick.dot(result.x), std::sqrt(std::max(0.0, pick.dot(result.covariance * pick))),
+            drag[static_cast<std::size_t>(0.95 * static_cast<double>(drag.size() - 1))]};
+  }
+
+  // A line if the joint's friction drives it at every speed of the logs. Another joint's motor, coupled to this one, is
+  // tried first.
+  std::string FedEnergy(int j) const {
+    const Drag drag = DragOf(j, motion_, result_);
+    if (!drag.feeds(result_.spread[j])) return "";
+    for (int i = 0; i < model_.joints(); ++i) {
+      if (i == j || MovingShare(i) < 0.1) continue;
+      const auto& speed = fit_.signals().qd.col(i);
+      MatrixXd other(fit_.rows(), 2);
+      other << speed.cwiseSign(), speed;
+      ColumnFit::Motion coupled = motion_;
+      coupled.Add(j, other);
+      const ColumnFitResult result = fit_.Fit(coupled, given_);
+      if (DragOf(j, coupled, result).feeds(result.spread[j]) || result_.log_left - result.log_left < kClearGain / 4)
+        continue;
+      return fmt::format("joint {}: its friction follows the speed of joint {}: are their motors coupled?", j + 1,
+                         i + 1);
+    }
+    ColumnFit::Motion without = motion_;
+    without.Remove(j, FrictionColumns(j));
+    const double gain = fit_.Fit(without, given_).log_left - result_.log_left;
+    const std::string what = fmt::format(
+        "friction of {:.3g} {} would drive the joint at every speed, where it must brake it; is the sign of "
+        "tau{} or q{} right?",
+        drag.mean, Slides(j) ? "N" : "N m", j + 1, j + 1);
+    if (gain > kClearGain) Fail(j, what);
+    return fmt::format("joint {}: suspect: {}", j + 1, what);
+  }
+  bool Slides(int j) const { return model_.robot().joint[j].kinematics.type == codegen::JointType::kPrismatic; }
+
+  const codegen::Model& model_;
+  const std::vector<const Dataset*>& data_;
+  ColumnFit fit_;
+  ColumnChange given_;
+  ColumnFit::Motion motion_;
+  ColumnFitResult result_;
+};
+
+// What each joint of one log leaves under a fit of all of them.
+VectorXd LeftOn(const codegen::Model& model, const Dataset& log, const ColumnFitResult& all) {
+  const ColumnFit one(model, {&log}, kScreenRows);
+  if (one.rows() == 0) return VectorXd::Zero(model.joints());
+  const ColumnFit::Motion motion = one.Move(ColumnChange(model.joints()));
+  VectorXd left(model.joints());
+  for (int j = 0; j < model.joints(); ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    left[j] = std::sqrt((one.tau().col(j) - motion.A[at] * all.x(motion.column[at])).squaredNorm() / one.rows());
+  }
+  return left;
+}
+
+// A joint whose position rests has a torque that its pose, the other joints and stiction explain.
+void CheckResting(const codegen::Model& model, const Dataset& log, const VectorXd& left) {
+  for (int j = 0; j < model.joints(); ++j) {
+    if (log.s.q.col(j).minCoeff() < log.s.q.col(j).maxCoeff()) continue;
+    const double spread = std::sqrt((log.tau.col(j).array() - log.tau.col(j).mean()).square().mean());
+    if (left[j] > kResting * model.robot().joint[j].torque_limit_Nm && left[j] > kUnexplained * spread)
+      throw io::InputError(
+          fmt::format("{}: joint {}: position never changes, but its torque varies by {:.3g} that a "
+                      "joint at rest does not explain (is the encoder stuck?)",
+                      log.source, j + 1, left[j]));
+  }
+}
+
+void RefuseChange(const codegen::Model& model, const std::vector<const Dataset*>& data) {
+  const ColumnGain best = BestColumnChange(model, data);
+  if (best.gain < kClearGain) return;
+  throw io::InputError(fmt::format("{}: {}: a fit leaves {:.1f} % of the torques' spread as given, {:.1f} % so",
+                                   Names(data), best.what, 100 * best.as_given, 100 * best.changed));
+}
+
+}  // namespace
+
+std::vector<std::string> EquallyGood(const codegen::Model& model, const std::vector<const Dataset*>& data) {
+  const int n = model.joints();
+  const ColumnFit fit(model, data, kScreenRows);
+  if (fit.rows() < kRowsPerColumn * model.columns()) return {};
+  const ColumnChange given(n);
+  const double least = fit.Fit(fit.Move(given), given).log_left;
+  std::vector<std::string> out;
+  const auto add = [&](const ColumnChange& change, const std::string& what) {
+    if (fit.Fit(fit.Move(change), change).log_left < least + kClearGain) out.push_back(what);
+  };
+  for (int i = 0; i < n; ++i) {
+    ColumnChange signs(n);
+    signs.q_sign[static_cast<std::size_t>(i)] = signs.tau_sign[static_cast<std::size_t>(i)] = -1;
+    add(signs, fmt::format("the sign of q{0} with tau{0}", i + 1));
+    for (int j = i + 1; j < n; ++j) {
+      ColumnChange joints(n);
+      Exchange(joints.q, i, j), Exchange(joints.tau, i, j);
+      add(joints, fmt::format("joints {} and {} exchanged", i + 1, j + 1));
+    }
+  }
+  for (const double pace : {10.0, 0.1}) {
+    ColumnChange time(n);
+    time.pace = pace;
+    add(time, fmt::format("time {} by 10", pace > 1 ? "divided" : "multiplied"));
+  }
+  return out;
+}
+
+std::vector<std::string> CheckColumns(const codegen::Model& model, const std::vector<const Dataset*>& data) {
+  if (ColumnFit(model, data, kFullRows).rows() < kRowsPerColumn * model.columns()) return {};
+  const Examiner all(model, data);
+  for (const Dataset* log : data) {
+    const VectorXd left = LeftOn(model, *log, all.result());
+    CheckResting(model, *log, left);
+    double above = 0;
+    for (int j = 0; j < model.joints(); ++j)
+      if (left[j] > 0) above += 2 * std::log(left[j] / std::max(all.result().left[j], 1e-9 * left[j]));
+    if (data.size() > 1 && above > kForeign) RefuseChange(model, {log});
+  }
+  RefuseChange(model, data);
+  std::vector<std::string> notes = all.Notes();
+  for (std::string& note : notes) note = Names(data) + ": " + note;
+  return notes;
+}
+
+}  // namespace armcal::calibration

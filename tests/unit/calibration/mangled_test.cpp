@@ -1,0 +1,160 @@
+// calibration tests - mangled logs of a simulated and of a measured arm: each ends in one line or is taken with a note.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/logs/channels.hpp"
+#include "host_sim/identify/calibration/body_check.hpp"
+#include "host_sim/identify/calibration/column_check.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
+#include "tests/unit/calibration/mangled_logs.hpp"
+#include "tests/unit/calibration/measured_arms.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
+
+namespace armcal::calibration {
+namespace {
+
+namespace fs = std::filesystem;
+using tests::Mangled;
+
+struct Said {
+  std::string refused, notes;
+};
+
+// What every verb asks of a log before it is used.
+Said Judge(const codegen::Model& model, const std::vector<logs::Log>& read) {
+  Said said;
+  try {
+    std::vector<Dataset> data;
+    for (const logs::Log& log : read) {
+      const SignalCheck check = CheckSignals(model.robot(), log);
+      for (const std::string& note : check.notes) said.notes += note + "\n";
+      if (!check.lack.empty()) throw io::InputError(log.source + ": " + check.lack);
+      data.push_back(Prepare(model, log));
+    }
+    for (const std::string& note : CheckColumns(model, Pointers(data))) said.notes += note + "\n";
+    for (const Dataset& d : data) CheckAgainstModel(model, d);
+  } catch (const io::InputError& e) {
+    said.refused = e.what();
+  }
+  return said;
+}
+
+Said Judge(const codegen::Model& model, const fs::path& path) {
+  try {
+    return Judge(model, {logs::ReadLog(path)});
+  } catch (const io::InputError& e) {
+    return {e.what(), ""};
+  }
+}
+
+void ExpectAllSaid(const codegen::Model& model, const logs::Log& good) {
+  const files::test::TemporaryFolder folder;
+  const fs::path path = folder / "run.csv";
+  for (const Mangled& m : tests::SixAxisFaults()) {
+    logs::Log log = good;
+    if (!m.speeds) log.qd.resize(0, 0);
+    m.mangle(log);
+    logs::WriteLog(path, log);
+    const Said said = Judge(model, path);
+    if (m.said.empty()) {
+      EXPECT_EQ(said.refused, "") << m.name;
+      EXPECT_NE(said.notes.find(m.note), std::string::npos) << m.name << ": " << said.notes;
+      EXPECT_EQ(said.notes.find("suspect"), std::string::npos) << m.name << ": " << said.notes;
+      continue;
+    }
+    EXPECT_NE(said.refused.find(m.said), std::string::npos) << m.name << ": " << said.refused << "\n" << said.notes;
+    EXPECT_EQ(said.refused.find(path.string()), 0u) << m.name << ": " << said.refused;
+    EXPECT_EQ(said.refused.find('\n'), std::string::npos) << m.name;
+  }
+}
+
+codegen::Robot WithoutLinkData(codegen::Robot robot) {
+  robot.has_prior = false;
+  return robot;
+}
+
+logs::Log LogOf(const Dataset& d) {
+  logs::Log log;
+  log.joints = d.joints(), log.source = d.source;
+  log.t = d.s.t, log.q = d.s.q, log.qd = d.s.qd, log.tau = d.tau;
+  return log;
+}
+
+TEST(Mangled, SimulatedSixAxes_WithLinkData) {
+  tests::SyntheticArm arm(tests::Er20(), 1);
+  ExpectAllSaid(arm.model(), LogOf(arm.Run(20, 2)));
+}
+
+TEST(Mangled, SimulatedSixAxes_WithoutLinkData) {
+  tests::SyntheticArm arm(tests::Er20(), 1);
+  const codegen::Model free(WithoutLinkData(tests::Er20()), tests::Records());
+  ExpectAllSaid(free, LogOf(arm.Run(20, 2)));
+}
+
+TEST(Mangled, MeasuredUr10e_WithoutLinkData) {
+  const fs::path file = tests::MeasuredFile("ur10e/ur-20_02_12-50sec_12harm.csv.gz");
+  if (file.empty()) GTEST_SKIP() << "set ARMCAL_DATA to the folder of measured logs";
+  const codegen::Model model(tests::Ur10e(), tests::Records());
+  logs::Log log = logs::ReadLog(file, tests::Ur10eChannels());
+  log.qdd.resize(0, 0), log.gaps.clear();
+  ExpectAllSaid(model, log);
+}
+
+// One of three logs has two columns exchanged: that one is named.
+TEST(Mangled, OneOfSeveralLogs_IsTheOneNamed) {
+  tests::SyntheticArm arm(tests::Er20(), 1);
+  const codegen::Model free(WithoutLinkData(tests::Er20()), tests::Records());
+  std::vector<logs::Log> run;
+  for (const int k : {1, 2, 3}) {
+    run.push_back(LogOf(arm.Run(15, static_cast<std::uint64_t>(k))));
+    run.back().qd.resize(0, 0);
+    run.back().source = "run" + std::to_string(k) + ".csv";
+  }
+  EXPECT_EQ(Judge(free, run).refused, "");
+  run[1].tau.col(1).swap(run[1].tau.col(2));
+  EXPECT_EQ(Judge(free, run).refused.find("run2.csv: columns tau2 and tau3"), 0u) << Judge(free, run).refused;
+}
+
+// A joint that rests while the others move is no fault, alone or among others.
+TEST(Mangled, RestingJoints_AreNone) {
+  tests::SyntheticArm arm(tests::Er20(), 4);
+  const codegen::Model free(WithoutLinkData(tests::Er20()), tests::Records());
+  for (const std::vector<int>& still : {std::vector<int>{1}, {0, 2}, {3, 4, 5}}) {
+    logs::Log log = LogOf(arm.Run(15, 7, {}, 0.5, still));
+    log.qd.resize(0, 0);
+    for (const codegen::Model* model : {&free, &arm.model()}) {
+      const Said said = Judge(*model, {log});
+      EXPECT_EQ(said.refused, "") << still[0];
+      EXPECT_EQ(said.notes.find("suspect"), std::string::npos) << said.notes;
+    }
+  }
+}
+
+// All healthy logs that are there: at most one in 200 is refused or called suspect.
+TEST(Mangled, HealthyMeasuredLogs_AreTaken) {
+  if (tests::MeasuredFile("ur10e").empty()) GTEST_SKIP() << "set ARMCAL_DATA to the folder of measured logs";
+  int taken = 0, doubted = 0;
+  for (const tests::MeasuredSet& set : tests::MeasuredSets()) {
+    const codegen::Model model(set.robot, tests::Records());
+    for (const fs::path& file : set.files) {
+      Said said;
+      try {
+        said = Judge(model, {set.channels ? logs::ReadLog(file, *set.channels) : logs::ReadLog(file)});
+      } catch (const io::InputError& e) {
+        said.refused = e.what();
+      }
+      const bool suspect = said.notes.find("suspect") != std::string::npos;
+      ++(said.refused.empty() && !suspect ? taken : doubted);
+      if (!said.refused.empty() || suspect) std::printf("%s\n%s", said.refused.c_str(), said.notes.c_str());
+    }
+  }
+  std::printf("%d healthy logs taken, %d refused or called suspect\n", taken, doubted);
+  EXPECT_LE(200 * doubted, taken + doubted + 199);
+}
+
+}  // namespace
+}  // namespace armcal::calibration

@@ -92,15 +92,19 @@ void ArmStep::SetFriction(const Instant& at) {
   }
 }
 
-// A v + friction(v) = right for the speeds qd, friction between `backward_` (v < 0) and `forward_` (v > 0) at v = 0:
-// projected Gauss-Seidel, which converges because A is positive definite.
-void ArmStep::Balance(const VectorXd& right, VectorXd& qd) const {
+// A v + friction(v) = right for the speeds qd, friction between `backward` (v < 0) and `forward` (v > 0) at v = 0:
+// projected Gauss-Seidel, which converges because A is positive definite. Where friction feeds energy (forward below
+// backward), both directions may balance: the joint keeps its own.
+void ArmStep::Balance(const VectorXd& right, const VectorXd& forward, const VectorXd& backward, VectorXd& qd) const {
   for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     double change = 0;
     for (Eigen::Index i = 0; i < qd.size(); ++i) {
       const double rest = right[i] - A_.row(i).dot(qd) + A_(i, i) * qd[i];
-      const double upper = std::max(forward_[i], backward_[i]), lower = std::min(forward_[i], backward_[i]);
-      const double v = rest > upper ? (rest - upper) / A_(i, i) : rest < lower ? (rest - lower) / A_(i, i) : 0;
+      const bool can_forward = rest > forward[i], can_backward = rest < backward[i];
+      const bool goes_forward = can_forward && (!can_backward || qd[i] > 0);
+      const double v = goes_forward   ? (rest - forward[i]) / A_(i, i)
+                       : can_backward ? (rest - backward[i]) / A_(i, i)
+                                      : 0;
       change = std::max(change, std::abs(v - qd[i]));
       qd[i] = v;
     }
@@ -113,14 +117,25 @@ VectorXd ArmStep::Step(double h, const Law& law, const VectorXd& q, const Vector
   A_.diagonal() += law.kd + 0.5 * h * law.kp;
   const VectorXd right = mass_ * before / h + law.torque - law.kp.cwiseProduct(q + 0.5 * h * before) - bias_;
   qd = before;
-  Balance(right, qd);
+  Balance(right, forward_, backward_, qd);
   return law.torque - law.kp.cwiseProduct(q + 0.5 * h * (before + qd)) - law.kd.cwiseProduct(qd);
 }
 
 void ArmStep::Step(double h, const VectorXd& torque, const VectorXd& before, VectorXd& qd) {
   A_ = mass_ / h;
   qd = before;
-  Balance(mass_ * before / h + torque - bias_, qd);
+  Balance(mass_ * before / h + torque - bias_, forward_, backward_, qd);
+}
+
+void ArmStep::Slide(double h, const VectorXd& torque, const VectorXd& before, VectorXd& qd) {
+  VectorXd forward = forward_, backward = backward_;
+  for (Eigen::Index j = 0; j < before.size(); ++j) {
+    if (before[j] > 0) backward[j] = forward[j];
+    if (before[j] < 0) forward[j] = backward[j];
+  }
+  A_ = mass_ / h;
+  qd = before;
+  Balance(mass_ * before / h + torque - bias_, forward, backward, qd);
 }
 
 }  // namespace armcal::calibration

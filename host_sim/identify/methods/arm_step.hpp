@@ -35,9 +35,13 @@ class ArmStep {
                        Eigen::VectorXd& qd);
   // The same under a torque that does not depend on the motion.
   void Step(double h, const Eigen::VectorXd& torque, const Eigen::VectorXd& before, Eigen::VectorXd& qd);
+  // The same where a joint that moves keeps the friction of its direction, even if its speed changes sign: who looks
+  // for the instant of the turn finds it on the straight line from `before` to qd.
+  void Slide(double h, const Eigen::VectorXd& torque, const Eigen::VectorXd& before, Eigen::VectorXd& qd);
 
  private:
-  void Balance(const Eigen::VectorXd& right, Eigen::VectorXd& qd) const;
+  void Balance(const Eigen::VectorXd& right, const Eigen::VectorXd& forward, const Eigen::VectorXd& backward,
+               Eigen::VectorXd& qd) const;
 
   const codegen::Model& model_;
   EffectPoint effects_;

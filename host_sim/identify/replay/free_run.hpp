@@ -1,8 +1,9 @@
 // replay - simulates an arm in open loop: from a logged torque and a state at the start, without any feedback.
 //
 // Between two samples the torque is a straight line, and a step takes its mean. A step is second order in its length
-// and implicit in the sign of friction (methods/arm_step.hpp): a joint that friction can hold stands still. End stops
-// are not part of a model: a motion beyond the position limits goes on.
+// and implicit in the sign of friction (methods/arm_step.hpp): a joint that friction can hold stands still. It is cut
+// at the instant at which a joint stops. End stops are not part of a model: a motion beyond the position limits goes
+// on.
 #pragma once
 
 #include <string>
@@ -42,9 +43,12 @@ class FreeRun {
   int Stride(const Record& log) const;
 
  private:
+  void Advance(double h, double t, const Eigen::VectorXd& torque, const Eigen::VectorXd& temp);
+
   const codegen::Model& model_;
   calibration::ArmStep arm_;
   double step_s_;
+  Eigen::VectorXd q_, qd_, qdd_;
 };
 
 // State in the middle of the first `samples` samples: a parabola through their positions, by least squares.

@@ -24,6 +24,7 @@ constexpr double kSeenEach_s = 0.02;   // positions are compared this often
 constexpr double kIndependent = 2;     // errors of one segment and joint count as this many: they are one smooth curve
 constexpr double kSearchStart = 0.25;  // share of a segment within which its start is looked for
 constexpr int kParts[] = {24, 12, 6, 3, 2, 1};  // of a block: the lengths that are compared
+constexpr int kRounds = 2;                      // more, with the scale of the errors that are left
 constexpr int kMostSteps = 40;
 constexpr double kSmallGain = 1e-4;  // of the sum of squares: the step was the last one
 
@@ -136,7 +137,6 @@ class Shooting {
   // RMS over left-out blocks and joints, each block one free run, in standard deviations of the joint's position.
   double LeftOut(const std::vector<Segment>& segments, const VectorXd& start) {
     VectorXd sum = VectorXd::Zero(model_.joints());
-    const VectorXd scale = scale_;
     for (int b = 0; b < blocks(); ++b) {
       VectorXd weight = VectorXd::Ones(blocks()), w = start, e;
       weight[b] = 0;
@@ -250,15 +250,16 @@ Refined Refine(const codegen::Model& model, const std::vector<Training>& logs, c
   Shooting shooting(model, logs, fit, settings);
   Refined out;
   out.eta = fit.eta;
-  const VectorXd at_fit = VectorXd::Zero(shooting.size());
+  const VectorXd at_fit = VectorXd::Zero(shooting.size()), once = VectorXd::Ones(shooting.blocks());
   out.segment_s = settings.segment_s;
   if (settings.segment_s <= 0) {
     for (const int parts : kParts) {
       const double length = shooting.block_s() / parts;
       const std::vector<Segment> segments = shooting.Cut(length);
-      const double error = shooting.SetScale(segments, at_fit) ? shooting.LeftOut(segments, at_fit)
-                                                               : std::numeric_limits<double>::infinity();
-      out.lengths.push_back({length, error});
+      VectorXd w = at_fit;
+      const bool runs = shooting.SetScale(segments, w) && std::isfinite(shooting.Minimise(segments, once, w)) &&
+                        shooting.SetScale(segments, w);
+      out.lengths.push_back({length, runs ? shooting.LeftOut(segments, w) : std::numeric_limits<double>::infinity()});
     }
     const auto best = std::min_element(out.lengths.begin(), out.lengths.end(),
                                        [](const auto& a, const auto& b) { return a.error < b.error; });
@@ -273,7 +274,7 @@ Refined Refine(const codegen::Model& model, const std::vector<Training>& logs, c
     throw io::InputError(logs[0].record.source + ": the arm of the fitted parameters runs away in segments of " +
                          std::to_string(out.segment_s) + " s: expected shorter ones (--segment)");
   std::mt19937_64 random(settings.seed);
-  VectorXd weight = VectorXd::Ones(shooting.blocks());
+  VectorXd weight = once;
   if (settings.resample) {
     weight.setZero();
     std::uniform_int_distribution<int> draw(0, shooting.blocks() - 1);
@@ -288,12 +289,14 @@ Refined Refine(const codegen::Model& model, const std::vector<Training>& logs, c
     values.push_back(value);
     if (value < best) best = value, best_w = w;
   }
+  // The first scale was the fit's error, which gives the prior too much weight if the fit is poor.
+  for (int round = 0; round < kRounds && shooting.SetScale(segments, best_w); ++round)
+    shooting.Minimise(segments, weight, best_w);
   out.agree = static_cast<int>(std::count_if(values.begin(), values.end(), [&](double v) { return v <= 1.01 * best; }));
   out.x = shooting.X(best_w);
   out.drift = shooting.Drift(best_w);
   VectorXd e;
-  if (shooting.Errors(segments, VectorXd::Ones(shooting.blocks()), best_w, e))
-    out.rms = shooting.JointRms(e, segments.size());
+  if (shooting.Errors(segments, once, best_w, e)) out.rms = shooting.JointRms(e, segments.size());
   out.segments = static_cast<int>(segments.size());
   return out;
 }

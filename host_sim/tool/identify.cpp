@@ -277,6 +277,15 @@ nlohmann::ordered_json Columns(const codegen::Model& model, const calibration::F
   return out;
 }
 
+nlohmann::ordered_json Nonlinear(const codegen::Model& model, const std::vector<double>& eta) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (int k = 0; k < model.nonlinear(); ++k)
+    out.push_back({{"name", model.unknowns()[k].name},
+                   {"unit", model.unknowns()[k].unit},
+                   {"value", eta[static_cast<std::size_t>(k)]}});
+  return out;
+}
+
 Eigen::VectorXd Unknowns(const codegen::Model& model, const calibration::Fit& fit) {
   Eigen::VectorXd z(model.columns() + model.nonlinear());
   z << fit.x.head(model.columns()), Eigen::VectorXd::Map(fit.eta.data(), model.nonlinear());
@@ -320,6 +329,7 @@ int RunIdentify(const IdentifyOptions& o) {
     json["sigma_Nm"].push_back(all.sigma[j]);
     json["torque_gain"].push_back(1 + all.x[model.columns() + j]);
   }
+  if (model.nonlinear() > 0) json["nonlinear"] = Nonlinear(model, all.eta);
   const calibration::Exogeneity exogeneity =
       calibration::CheckExogeneity(model, train, Unknowns(model, all), calibration::Instruments::kSimulated);
   fmt::print("{}", verdict::ExogeneityText(exogeneity, "the model lacks a term: armcal diagnose"));
@@ -345,6 +355,7 @@ int RunIdentify(const IdentifyOptions& o) {
                                {"sd", row.sd},
                                {"posterior_sd", row.posterior_sd},
                                {"from_prior", row.from_prior}});
+    for (int j = 0; j < model.joints(); ++j) json["table_gain"].push_back(1 + x[model.columns() + j]);
     fmt::print(
         "standard parameters: {} of {} rest mostly on the prior (posterior / prior sd above {}); bodies physical: {}\n",
         from_prior, table.row.size(), calibration::kFromPrior, calibration::IsPhysical(bodies.bodies) ? "yes" : "no");

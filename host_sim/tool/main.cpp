@@ -24,6 +24,8 @@ int Main(int argc, char** argv) {
   AddRecord(app, action);
   AddEstimate(app, action);
   AddIdentify(app, action);
+  AddEvaluate(app, action);
+  AddReplay(app, action);
   AddDiagnose(app, action);
   AddGenerate(app, action);
   AddFlash(app, action);

@@ -25,6 +25,8 @@ void AddExcite(CLI::App& app, Action& action);
 void AddRecord(CLI::App& app, Action& action);
 void AddEstimate(CLI::App& app, Action& action);
 void AddIdentify(CLI::App& app, Action& action);
+void AddEvaluate(CLI::App& app, Action& action);
+void AddReplay(CLI::App& app, Action& action);
 void AddDiagnose(CLI::App& app, Action& action);
 void AddFlash(CLI::App& app, Action& action);
 void AddVerify(CLI::App& app, Action& action);

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 
+#include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/butterworth.hpp"
 #include "host_sim/data/report/table.hpp"
 
@@ -32,51 +33,122 @@ std::string Remedy(const Exogeneity& e) {
   return lower + ", which needs qref in the log and a [control] table in the robot file";
 }
 
+// Sums of one joint over the samples that `counts` says.
+template <class Counts>
+double RootMean(const std::vector<Predicted>& logs, const std::vector<Eigen::MatrixXd>& value, int joint,
+                const Counts& counts) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l)
+    for (int k = 0; k < logs[l].log->samples(); ++k)
+      if (counts(*logs[l].log, k)) sum += value[l](k, joint) * value[l](k, joint), ++count;
+  return count ? std::sqrt(sum / count) : 0;
+}
+
+// Population standard deviation over every sample.
+double Spread(const std::vector<Eigen::MatrixXd>& value, int joint) {
+  double sum = 0, square = 0, count = 0;
+  for (const Eigen::MatrixXd& v : value) sum += v.col(joint).sum(), count += static_cast<double>(v.rows());
+  for (const Eigen::MatrixXd& v : value) square += (v.col(joint).array() - sum / count).square().sum();
+  return std::sqrt(square / count);
+}
+
+ErrorFigures FiguresOf(const std::vector<Predicted>& logs, const std::vector<Eigen::MatrixXd>& torque,
+                       const std::vector<Eigen::MatrixXd>& error) {
+  const Eigen::Index n = logs[0].log->joints();
+  ErrorFigures f;
+  f.rms.resize(n), f.rms_moving.resize(n), f.relative.resize(n), f.nrmse.resize(n);
+  for (int j = 0; j < n; ++j) {
+    const auto scored = [](const calibration::Dataset& d, int k) { return d.scored[k] != 0; };
+    const auto moving = [j](const calibration::Dataset& d, int k) { return d.scored[k] && d.moving(k, j); };
+    f.rms[j] = RootMean(logs, error, j, scored);
+    f.rms_moving[j] = RootMean(logs, error, j, moving);
+    f.relative[j] = f.rms_moving[j] / std::max(RootMean(logs, torque, j, moving), 1e-300);
+    f.nrmse[j] = RootMean(logs, error, j, [](const calibration::Dataset&, int) { return true; }) /
+                 std::max(Spread(torque, j), 1e-300);
+  }
+  return f;
+}
+
+Eigen::MatrixXd Below(const calibration::Dataset& log, const Eigen::MatrixXd& value, double band_Hz) {
+  const double rate = (log.samples() - 1) / (log.s.t[log.samples() - 1] - log.s.t[0]);
+  if (band_Hz >= 0.5 * rate)
+    throw io::InputError(fmt::format("{}: --band {:g}: expected a frequency below {:g} Hz, half the log's sample rate",
+                                     log.source, band_Hz, 0.5 * rate));
+  Eigen::MatrixXd out = value;
+  for (Eigen::Index j = 0; j < value.cols(); ++j) out.col(j) = logs::ZeroPhaseLowPass(value.col(j), band_Hz, rate);
+  return out;
+}
+
 }  // namespace
 
-HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::MatrixXd& predicted, double band_Hz) {
-  const int n = test.joints();
+HeldOutError CompareHeldOut(const std::vector<Predicted>& logs, double band_Hz) {
+  std::vector<Eigen::MatrixXd> torque, error;
+  for (const Predicted& p : logs) torque.push_back(p.log->tau), error.push_back(p.log->tau - p.torque);
   HeldOutError e;
-  Eigen::MatrixXd residual = test.tau - predicted;
-  e.rms = calibration::Rms(test, residual, false);
-  e.rms_moving = calibration::Rms(test, residual, true);
-  const Eigen::VectorXd torque = calibration::Rms(test, test.tau, true);
-  e.relative = e.rms_moving.cwiseQuotient(torque.cwiseMax(1e-300));
-  e.moving_share.resize(n);
-  for (int j = 0; j < n; ++j) e.moving_share[j] = test.moving.col(j).cast<double>().mean();
-  if (band_Hz > 0) {
-    const double rate = (test.samples() - 1) / (test.s.t[test.samples() - 1] - test.s.t[0]);
-    Eigen::MatrixXd filtered = test.tau;
-    for (int j = 0; j < n; ++j) {
-      residual.col(j) = logs::ZeroPhaseLowPass(residual.col(j), band_Hz, rate);
-      filtered.col(j) = logs::ZeroPhaseLowPass(test.tau.col(j), band_Hz, rate);
-    }
-    e.band_Hz = band_Hz;
-    e.relative_band =
-        calibration::Rms(test, residual, true).cwiseQuotient(calibration::Rms(test, filtered, true).cwiseMax(1e-300));
+  e.full = FiguresOf(logs, torque, error);
+  e.moving_share.setZero(logs[0].log->joints());
+  int samples = 0;
+  for (const Predicted& p : logs) {
+    e.moving_share += p.log->moving.cast<double>().colwise().sum().transpose();
+    samples += p.log->samples();
   }
+  e.moving_share /= samples;
+  if (band_Hz <= 0) return e;
+  for (std::size_t l = 0; l < logs.size(); ++l)
+    for (auto* value : {&torque[l], &error[l]}) *value = Below(*logs[l].log, *value, band_Hz);
+  e.band_Hz = band_Hz;
+  e.band = FiguresOf(logs, torque, error);
   return e;
 }
 
+HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::MatrixXd& predicted, double band_Hz) {
+  return CompareHeldOut({{&test, predicted}}, band_Hz);
+}
+
 void PrintHeldOut(const HeldOutError& e, const std::string& name) {
-  report::Table t{{"joint", "error rms", "moving", "moving / torque %"}, {}, "held out: " + name};
-  if (e.band_Hz > 0) t.header.push_back(fmt::format("below {:g} Hz %", e.band_Hz));
-  for (int j = 0; j < e.rms.size(); ++j) {
-    t.rows.push_back({std::to_string(j + 1), fmt::format("{:.4g}", e.rms[j]), fmt::format("{:.4g}", e.rms_moving[j]),
-                      fmt::format("{:.2f}", 100 * e.relative[j])});
-    if (e.band_Hz > 0) t.rows.back().push_back(fmt::format("{:.2f}", 100 * e.relative_band[j]));
+  report::Table t{{"joint", "error rms", "moving", "moving / torque %", "NRMSE", "R2"}, {}, "held out: " + name};
+  const auto add = [](std::vector<std::string>& row, const ErrorFigures& f, int j) {
+    for (const double v : {f.rms[j], f.rms_moving[j]}) row.push_back(fmt::format("{:.4g}", v));
+    row.push_back(fmt::format("{:.2f}", 100 * f.relative[j]));
+    row.push_back(fmt::format("{:.4f}", f.nrmse[j]));
+    row.push_back(fmt::format("{:.4f}", f.r2()[j]));
+  };
+  const bool band = e.band_Hz > 0;
+  if (band)
+    for (const char* title : {"rms", "moving", "%", "NRMSE", "R2"})
+      t.header.push_back(fmt::format("{}{}", *title == 'r' ? fmt::format("below {:g} Hz: ", e.band_Hz) : "", title));
+  for (int j = 0; j < e.full.rms.size(); ++j) {
+    t.rows.push_back({std::to_string(j + 1)});
+    add(t.rows.back(), e.full, j);
+    if (band) add(t.rows.back(), e.band, j);
   }
   fmt::print("{}", report::Text(t));
+  if (e.full.rms.size() < 2) return;
+  const auto mean = [](const ErrorFigures& f) {
+    return fmt::format("NRMSE {:.4f}, R2 {:.4f}", f.nrmse.mean(), f.r2().mean());
+  };
+  fmt::print("mean of joints: {}{}\n", mean(e.full),
+             band ? fmt::format("; below {:g} Hz: {}", e.band_Hz, mean(e.band)) : "");
 }
 
 std::vector<double> ToList(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
 nlohmann::ordered_json ToJson(const HeldOutError& e) {
-  nlohmann::ordered_json j{{"rms", ToList(e.rms)},
-                           {"rms_moving", ToList(e.rms_moving)},
-                           {"relative_moving", ToList(e.relative)},
-                           {"moving_share", ToList(e.moving_share)}};
-  if (e.band_Hz > 0) j["band_Hz"] = e.band_Hz, j["relative_moving_in_band"] = ToList(e.relative_band);
+  nlohmann::ordered_json j{{"rms", ToList(e.full.rms)},
+                           {"rms_moving", ToList(e.full.rms_moving)},
+                           {"relative_moving", ToList(e.full.relative)},
+                           {"moving_share", ToList(e.moving_share)},
+                           {"nrmse", ToList(e.full.nrmse)},
+                           {"r2", ToList(e.full.r2())},
+                           {"nrmse_mean", e.full.nrmse.mean()},
+                           {"r2_mean", e.full.r2().mean()}};
+  if (e.band_Hz > 0) {
+    j["band_Hz"] = e.band_Hz, j["relative_moving_in_band"] = ToList(e.band.relative);
+    j["rms_in_band"] = ToList(e.band.rms), j["rms_moving_in_band"] = ToList(e.band.rms_moving);
+    j["nrmse_in_band"] = ToList(e.band.nrmse), j["r2_in_band"] = ToList(e.band.r2());
+    j["nrmse_mean_in_band"] = e.band.nrmse.mean(), j["r2_mean_in_band"] = e.band.r2().mean();
+  }
   return j;
 }
 

@@ -11,13 +11,28 @@
 
 namespace armcal::verdict {
 
-// Per joint, over scored samples: all, and where the joint moves. relative: error / torque, moving samples. band: the
-// same in a band.
+// Per joint [n]. rms: over scored samples; rms_moving, relative (error / torque): over those where the joint moves.
+// nrmse: rms(error) / std(torque) over every sample of the record, as the public benchmarks define it; R2 is one minus
+// its square.
+struct ErrorFigures {
+  Eigen::VectorXd rms, rms_moving, relative, nrmse;
+  Eigen::VectorXd r2() const { return 1 - nrmse.array().square(); }
+};
+// band: the same of torque and prediction below band_Hz, both through one zero-phase filter.
 struct HeldOutError {
-  Eigen::VectorXd rms, rms_moving, relative, relative_band, moving_share;
-  double band_Hz = 0;
+  ErrorFigures full, band;
+  Eigen::VectorXd moving_share;
+  double band_Hz = 0;  // 0: no band was asked for
 };
 
+// A log and its predicted torque [N x n].
+struct Predicted {
+  const calibration::Dataset* log = nullptr;
+  Eigen::MatrixXd torque;
+};
+
+// All logs as one record; each is filtered by itself. InputError: a band from half a log's sample rate on.
+HeldOutError CompareHeldOut(const std::vector<Predicted>& logs, double band_Hz);
 HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::MatrixXd& predicted, double band_Hz);
 void PrintHeldOut(const HeldOutError& e, const std::string& name);
 nlohmann::ordered_json ToJson(const HeldOutError& e);

@@ -1,29 +1,24 @@
 // methods - simulates the arm under its control law, step by step, and makes logs along that motion.
 #include "host_sim/identify/methods/closed_loop.hpp"
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <numbers>
 
-#include "codegen/src/generator/dynamics.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/quintic_spline.hpp"
 #include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
-using codegen::Expr;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
 
 constexpr int kSubsteps = 2;          // steps of one control period
-constexpr double kSlowest = 0.02;     // share of v_min at which friction of a joint about to move is taken
 constexpr double kRunaway_rad = 1e3;  // beyond: the parameters are no arm's
-constexpr int kMaxSweeps = 60;        // of the balance; a sweep's error falls by far more than half
 
 const codegen::Model& Checked(const codegen::Model& model) {
   if (model.robot().control.structure != "pd_feedforward")
@@ -31,22 +26,12 @@ const codegen::Model& Checked(const codegen::Model& model) {
   return model;
 }
 
-// M (upper triangle, by column), V and G of (1), from base parameters as inputs.
-std::vector<Expr> DynamicsRoots(codegen::Graph& g, const codegen::Model& model) {
-  const codegen::Dynamics d = codegen::MakeDynamics(g, model.robot(), model.base_columns());
-  std::vector<Expr> roots;
-  for (const auto& column : d.mass) roots.insert(roots.end(), column.begin(), column.end());
-  roots.insert(roots.end(), d.velocity.begin(), d.velocity.end());
-  roots.insert(roots.end(), d.gravity.begin(), d.gravity.end());
-  return roots;
-}
-
 VectorXd Map(const std::vector<double>& v) { return VectorXd::Map(v.data(), static_cast<Eigen::Index>(v.size())); }
 
 }  // namespace
 
 LoopSimulator::LoopSimulator(const codegen::Model& model, const LoopSettings& settings)
-    : model_(Checked(model)), settings_(settings), effects_(model), dynamics_(graph_, DynamicsRoots(graph_, model)) {
+    : model_(Checked(model)), settings_(settings), arm_(model) {
   const int n = model.joints();
   kp_ = Map(model.robot().control.kp_Nmprad), kd_ = Map(model.robot().control.kd_Nmsprad);
   limit_.resize(n), resolution_.resize(n);
@@ -55,28 +40,7 @@ LoopSimulator::LoopSimulator(const codegen::Model& model, const LoopSettings& se
     limit_[j] = joint.torque_limit_Nm;
     resolution_[j] = 2 * std::numbers::pi / (joint.motor.counts_per_turn * std::abs(joint.motor.gear_ratio));
   }
-  std::map<codegen::InputId, int> known;
-  for (int j = 0; j < n; ++j)
-    known[{codegen::Quantity::kPosition, j}] = j, known[{codegen::Quantity::kSpeed, j}] = n + j;
-  for (int d = 0; d < model.rigid(); ++d)
-    known[{.quantity = codegen::Quantity::kBaseParameter, .parameter = d}] = 2 * n + d;
-  for (const codegen::InputId& input : graph_.inputs()) source_.push_back(known.contains(input) ? known[input] : -1);
-  input_.assign(source_.size(), 0);
-  value_.resize(static_cast<std::size_t>(n * (n + 1) / 2 + 2 * n));
   if (settings_.feedforward.size() == 0) settings_.feedforward = MakeProblem(model, {}).start;
-}
-
-void LoopSimulator::Dynamics(const VectorXd& q, const VectorXd& qd) {
-  const int n = model_.joints();
-  for (std::size_t i = 0; i < source_.size(); ++i)
-    if (const int s = source_[i]; s >= 0)
-      input_[i] = s < n ? q[s] : s < 2 * n ? qd[s - n] : z_[model_.front() + s - 2 * n];
-  dynamics_.EvaluateAt<double>(input_, scratch_, value_);
-  mass_.resize(n, n);
-  std::size_t k = 0;
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i <= j; ++i) mass_(i, j) = mass_(j, i) = value_[k++];
-  bias_ = VectorXd::Map(&value_[k], n) + VectorXd::Map(&value_[k + static_cast<std::size_t>(n)], n);
 }
 
 // The believed model's torque along the reference; friction takes the reference's direction, none below v_min.
@@ -100,39 +64,11 @@ MatrixXd LoopSimulator::FeedForward(const codegen::Signals& s) const {
   return tau;
 }
 
-// A v + friction(v) = right for the speeds qd_, friction between `backward` (v < 0) and `forward` (v > 0) at v = 0:
-// projected Gauss-Seidel, which converges because A is positive definite.
-void LoopSimulator::Balance(const VectorXd& right, const VectorXd& forward, const VectorXd& backward) {
-  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
-    double change = 0;
-    for (Eigen::Index i = 0; i < qd_.size(); ++i) {
-      const double rest = right[i] - A_.row(i).dot(qd_) + A_(i, i) * qd_[i];
-      const double upper = std::max(forward[i], backward[i]), lower = std::min(forward[i], backward[i]);
-      const double v = rest > upper ? (rest - upper) / A_(i, i) : rest < lower ? (rest - lower) / A_(i, i) : 0;
-      change = std::max(change, std::abs(v - qd_[i]));
-      qd_[i] = v;
-    }
-    if (change < 1e-12) return;
-  }
-}
-
 // law: the control law's torque at rest in q = 0; kp, kd: its gains, zero for a joint at its limit.
 void LoopSimulator::Step(double h, const VectorXd& law, const VectorXd& kp, const VectorXd& kd) {
   const VectorXd before = qd_;
-  VectorXd side(qd_.size());
-  const auto friction = [&](double sign) {
-    for (Eigen::Index j = 0; j < qd_.size(); ++j)
-      side[j] = sign *
-                std::max(std::abs(before[j]), kSlowest * model_.robot().joint[static_cast<std::size_t>(j)].v_min_radps);
-    effects_.Set(0, q_, side, qdd_, {}, z_);
-    return effects_.Torque();
-  };
-  const VectorXd forward = friction(1), backward = friction(-1);
-  A_ = mass_ / h;
-  A_.diagonal() += kd + 0.5 * h * kp;
-  const VectorXd right = mass_ * before / h + law - kp.cwiseProduct(q_ + 0.5 * h * before) - bias_;
-  Balance(right, forward, backward);
-  tau_ = law - kp.cwiseProduct(q_ + 0.5 * h * (before + qd_)) - kd.cwiseProduct(qd_);
+  arm_.SetFriction({0, q_, before, qdd_, {}});
+  tau_ = arm_.Step(h, {law, kp, kd}, q_, before, qd_);
 }
 
 LoopRun LoopSimulator::Run(const VectorXd& t, const MatrixXd& reference, const VectorXd& z) {
@@ -146,7 +82,7 @@ LoopRun LoopSimulator::Run(const VectorXd& t, const MatrixXd& reference, const V
   ref.q = spline.Evaluate(ref.t, 0), ref.qd = spline.Evaluate(ref.t, 1), ref.qdd = spline.Evaluate(ref.t, 2);
   const MatrixXd ahead = FeedForward(ref);
 
-  z_ = z;
+  arm_.SetParameters(z);
   q_ = ref.q.row(0), qd_ = ref.qd.row(0), qdd_ = ref.qdd.row(0), tau_ = ahead.row(0);
   MatrixXd q(steps + 1, n), qd(steps + 1, n), tau(steps + 1, n);
   q.row(0) = q_, qd.row(0) = qd_, tau.row(0) = tau_;
@@ -159,7 +95,7 @@ LoopRun LoopSimulator::Run(const VectorXd& t, const MatrixXd& reference, const V
       speed_error = (read_error - last_error) * model_.robot().control.rate_Hz;
       last_error = read_error;
     }
-    Dynamics(q_ + 0.5 * h * qd_, qd_ + 0.5 * h * qdd_);  // of the step's middle
+    arm_.SetDynamics(q_ + 0.5 * h * qd_, qd_ + 0.5 * h * qdd_);  // of the step's middle
     const VectorXd before = qd_;
     const VectorXd law = ahead.row(k).transpose() + kp_.cwiseProduct(ref.q.row(k).transpose() - read_error) +
                          kd_.cwiseProduct(ref.qd.row(k).transpose() - speed_error);

@@ -4,16 +4,15 @@
 // M(q) qdd + V(q, qd) + G(q) + friction and effects = tau, from the model's own expressions.
 //
 // An arm without rotor inertia is very stiff: 0.003 kg m^2 against 8 N m of friction. So a step, half a control period
-// long, is implicit in the control law and in friction's sign (Moreau's time stepping). A joint's speed after a step is
-// the one at which all torques balance, or zero where friction can hold it. The sign needs no smoothing, and every gain
-// is stable. The sampled law's delay of half a period is left out.
+// long, is implicit in the control law, as it is in friction's sign (arm_step.hpp), and every gain is stable. The
+// sampled law's delay of half a period is left out.
 #pragma once
 
 #include <map>
 #include <string>
 #include <vector>
 
-#include "host_sim/identify/methods/effect_point.hpp"
+#include "host_sim/identify/methods/arm_step.hpp"
 #include "host_sim/identify/methods/method.hpp"
 
 namespace armcal::calibration {
@@ -39,21 +38,14 @@ class LoopSimulator {
   LoopRun Run(const Eigen::VectorXd& t, const Eigen::MatrixXd& reference, const Eigen::VectorXd& z);
 
  private:
-  void Dynamics(const Eigen::VectorXd& q, const Eigen::VectorXd& qd);
   Eigen::MatrixXd FeedForward(const codegen::Signals& reference) const;
-  void Balance(const Eigen::VectorXd& right, const Eigen::VectorXd& forward, const Eigen::VectorXd& backward);
   void Step(double h, const Eigen::VectorXd& law, const Eigen::VectorXd& kp, const Eigen::VectorXd& kd);
 
   const codegen::Model& model_;
   LoopSettings settings_;
-  EffectPoint effects_;
-  codegen::Graph graph_;
-  codegen::Tape dynamics_;   // M (upper triangle, by column), V, G
-  std::vector<int> source_;  // of each input: joint, n + joint, 2 n + base parameter
-  std::vector<double> input_, scratch_, value_;
+  ArmStep arm_;
   Eigen::VectorXd kp_, kd_, limit_, resolution_;
-  Eigen::VectorXd z_, q_, qd_, qdd_, bias_, tau_;
-  Eigen::MatrixXd mass_, A_;
+  Eigen::VectorXd q_, qd_, qdd_, tau_;
 };
 
 // For Problem::closed_loop: one simulation a call, reference by the log's `source`. InputError for a log without one.

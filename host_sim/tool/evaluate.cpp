@@ -1,0 +1,63 @@
+// tool - armcal evaluate: the torque error of a given model on logs; nothing is fitted.
+#include <fmt/core.h>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/tool/given.hpp"
+#include "host_sim/tool/logs.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+namespace {
+
+struct EvaluateOptions {
+  GivenOptions given;
+  std::vector<std::string> logs;
+  std::string channels, json;
+  double band_Hz = 0, cutoff_Hz = 0;
+};
+
+int RunEvaluate(const EvaluateOptions& o) {
+  const codegen::Model model = GivenModel(o.given);
+  const calibration::Given given = ReadGiven(o.given, model);
+  const LogReader read(model, o.channels, o.cutoff_Hz);
+  const std::vector<calibration::Dataset> logs = read.All(o.logs);
+  nlohmann::ordered_json json = ToJson(o.given, model);
+  std::vector<verdict::Predicted> all;
+  for (const calibration::Dataset& log : logs) {
+    all.push_back({&log, calibration::Predict(model, log, given.x, given.eta)});
+    const verdict::HeldOutError e = verdict::CompareHeldOut({all.back()}, o.band_Hz);
+    verdict::PrintHeldOut(e, log.source);
+    nlohmann::ordered_json row{{"log", log.source}};
+    row.update(verdict::ToJson(e));
+    json["logs"].push_back(row);
+  }
+  if (logs.size() > 1) {
+    const verdict::HeldOutError e = verdict::CompareHeldOut(all, o.band_Hz);
+    verdict::PrintHeldOut(e, fmt::format("all {} logs as one record", logs.size()));
+    json["together"] = verdict::ToJson(e);
+  }
+  WriteJson(o.json, json);
+  return kOk;
+}
+
+}  // namespace
+
+void AddEvaluate(CLI::App& app, Action& action) {
+  auto* verb = app.add_subcommand(
+      "evaluate",
+      "the torque error of a given model on logs; nothing is fitted\nexample: armcal evaluate --robot er20_like "
+      "--table table.toml test.csv.gz --band 20\nexample: armcal evaluate --model new.toml test.csv.gz");
+  auto o = std::make_shared<EvaluateOptions>();
+  AddGivenOptions(*verb, o->given);
+  verb->add_option("logs", o->logs, "log(s) to predict")->required();
+  verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  verb->add_option("--band", o->band_Hz,
+                   "also compare in the band below this frequency (Hz): torque and prediction through the same "
+                   "zero-phase filter");
+  AddCutoff(*verb, o->cutoff_Hz);
+  verb->add_option("--json", o->json, "write everything here");
+  verb->callback([o, &action] { action = [o] { return RunEvaluate(*o); }; });
+}
+
+}  // namespace armcal::tool

@@ -71,7 +71,9 @@ replay::Record ReadRecord(const LogReader& read, const codegen::Model& model, co
   if (log.joints != model.joints())
     throw io::InputError(fmt::format("{}: {} joints, expected {} (robot {})", log.source, log.joints, model.joints(),
                                      model.robot().name));
-  for (const std::string& note : calibration::CheckSignals(model.robot(), log)) fmt::print(stderr, "{}\n", note);
+  const calibration::SignalCheck check = calibration::CheckSignals(model.robot(), log);
+  if (!check.lack.empty()) throw io::InputError(log.source + ": " + check.lack);
+  for (const std::string& note : check.notes) fmt::print(stderr, "{}: {}\n", log.source, note);
   return replay::MakeRecord(log);
 }
 

@@ -46,7 +46,7 @@ double RootMean(const std::vector<Predicted>& logs, const std::vector<Eigen::Mat
 }
 
 // Population standard deviation over every sample.
-double Spread(const std::vector<Eigen::MatrixXd>& value, int joint) {
+double DeviationOf(const std::vector<Eigen::MatrixXd>& value, int joint) {
   double sum = 0, square = 0, count = 0;
   for (const Eigen::MatrixXd& v : value) sum += v.col(joint).sum(), count += static_cast<double>(v.rows());
   for (const Eigen::MatrixXd& v : value) square += (v.col(joint).array() - sum / count).square().sum();
@@ -65,7 +65,7 @@ ErrorFigures FiguresOf(const std::vector<Predicted>& logs, const std::vector<Eig
     f.rms_moving[j] = RootMean(logs, error, j, moving);
     f.relative[j] = f.rms_moving[j] / std::max(RootMean(logs, torque, j, moving), 1e-300);
     f.nrmse[j] = RootMean(logs, error, j, [](const calibration::Dataset&, int) { return true; }) /
-                 std::max(Spread(torque, j), 1e-300);
+                 std::max(DeviationOf(torque, j), 1e-300);
   }
   return f;
 }

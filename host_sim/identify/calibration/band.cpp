@@ -22,10 +22,10 @@ constexpr int kFewSegments = 5;   // fewer tell nothing
 // Of the gain: where it is below the first in two bands, the prediction has half as much noise as torque; the band ends
 // where it has a tenth.
 constexpr double kMuchNoise = 0.8, kSomeNoise = 0.9;
-constexpr double kNoLag = 0.9;  // of the inverse gain: noise in the prediction does not lower it
-constexpr double kSureOfGain = 2;     // standard deviations
-constexpr double kReach = 3;    // of a Gaussian's standard deviation, over which an average goes
-constexpr double kSeen = 0.6;   // of an average's weight: the used samples have so much of it at least
+constexpr double kNoLag = 0.9;     // of the inverse gain: noise in the prediction does not lower it
+constexpr double kSureOfGain = 2;  // standard deviations
+constexpr double kReach = 3;       // of a Gaussian's standard deviation, over which an average goes
+constexpr double kSeen = 0.6;      // of an average's weight: the used samples have so much of it at least
 
 // y with the samples in between drawn over as a straight line where the row is not used.
 VectorXd Bridged(VectorXd y, const Eigen::VectorXi& used) {
@@ -100,7 +100,9 @@ std::vector<TransferBand> Transfer(const Dataset& data, int joint, const VectorX
 
 double AgreedBand_Hz(const std::vector<TransferBand>& transfer) {
   const auto below = [](const TransferBand& b, double gain) {
-    return b.gain + kSureOfGain * b.gain_sd < gain && b.inverse_gain > kNoLag;
+    // Both gains have the same relative deviation.
+    return b.gain + kSureOfGain * b.gain_sd < gain &&
+           b.inverse_gain * (b.gain + kSureOfGain * b.gain_sd) > kNoLag * b.gain;
   };
   for (std::size_t k = 0; k + 1 < transfer.size(); ++k) {
     if (!below(transfer[k], kMuchNoise) || !below(transfer[k + 1], kMuchNoise)) continue;

@@ -22,8 +22,11 @@ constexpr int kScreenRows = 300, kFullRows = 1200, kRounds = 3, kTried = 3;
 constexpr int kRowsPerColumn = 2;  // fewer rows fit anything
 // A change must cut the sum of log variances by this much. Healthy measured logs stay below a half of it.
 constexpr double kClearGain = 2;
+// Two joints of a redundant arm exchanged, q and tau, may fit a little better than the truth: the bodies are free.
+constexpr const char* kWholeJoints = "joints ";
+constexpr double kWholeGain = 4;
 constexpr double kWorse = 1.1;     // no torque may fit worse by more than this under a change that is right
-constexpr double kForeign = 3;     // a log whose sum of log variances is this much above that of all is looked at alone
+constexpr double kForeign = 1;     // a log whose sum of log variances is this much above that of all is looked at alone
 constexpr double kNothing = 0.95;  // of the spread left: the model explains nothing
 constexpr double kWhite = 0.75;    // mean square of steps over twice the variance; noise has 1
 constexpr double kOverNoise = 3;   // times the declared noise: a spread that is more than noise
@@ -31,6 +34,7 @@ constexpr double kSure = 9;        // standard deviations of independent rows; r
 constexpr double kFedShare = 0.1;  // of the torque's spread
 // A joint at rest: RMS of its torque that the pose does not explain, of the torque limit and of the torque's spread.
 // Stiction of measured arms leaves 2 % of the limit; joints that move behind a stuck encoder leave 7 % and more.
+constexpr double kRounding = 1e-9;  // rad (m): what the filter makes of a constant
 constexpr double kResting = 0.04, kUnexplained = 0.7;
 
 std::string Names(const std::vector<const Dataset*>& data) {
@@ -68,7 +72,7 @@ std::vector<Named> Neighbours(const ColumnChange& from, int n) {
     for (int j = i + 1; j < n; ++j) {
       add(fmt::format("columns q{} and q{} seem to be exchanged", i + 1, j + 1),
           [&](ColumnChange& c) { Exchange(c.q, i, j); });
-      add(fmt::format("joints {} and {} seem to be exchanged (q and tau)", i + 1, j + 1),
+      add(fmt::format("{}{} and {} seem to be exchanged (q and tau)", kWholeJoints, i + 1, j + 1),
           [&](ColumnChange& c) { Exchange(c.q, i, j), Exchange(c.tau, i, j); });
     }
     add(fmt::format("q{} seems to have the wrong sign", i + 1), [&](ColumnChange& c) { c.q_sign[at] *= -1; });
@@ -288,7 +292,7 @@ VectorXd LeftOn(const codegen::Model& model, const Dataset& log, const ColumnFit
 // A joint whose position rests has a torque that its pose, the other joints and stiction explain.
 void CheckResting(const codegen::Model& model, const Dataset& log, const VectorXd& left) {
   for (int j = 0; j < model.joints(); ++j) {
-    if (log.s.q.col(j).minCoeff() < log.s.q.col(j).maxCoeff()) continue;
+    if (log.s.q.col(j).maxCoeff() - log.s.q.col(j).minCoeff() > kRounding) continue;
     const double spread = std::sqrt((log.tau.col(j).array() - log.tau.col(j).mean()).square().mean());
     if (left[j] > kResting * model.robot().joint[j].torque_limit_Nm && left[j] > kUnexplained * spread)
       throw io::InputError(
@@ -300,7 +304,7 @@ void CheckResting(const codegen::Model& model, const Dataset& log, const VectorX
 
 void RefuseChange(const codegen::Model& model, const std::vector<const Dataset*>& data) {
   const ColumnGain best = BestColumnChange(model, data);
-  if (best.gain < kClearGain) return;
+  if (best.gain < (best.what.starts_with(kWholeJoints) ? kWholeGain : kClearGain)) return;
   throw io::InputError(fmt::format("{}: {}: a fit leaves {:.1f} % of the torques' spread as given, {:.1f} % so",
                                    Names(data), best.what, 100 * best.as_given, 100 * best.changed));
 }

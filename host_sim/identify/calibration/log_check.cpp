@@ -243,12 +243,12 @@ SignalCheck CheckSignals(const codegen::Robot& robot, const logs::Log& log) {
   if (seconds < kShortest_s)
     check.lack = fmt::format("{:.2g} s of log, expected at least {:.0f} s", seconds, kShortest_s);
   for (int j = 0; j < log.joints; ++j) CheckRange(robot, log, j);
-  const std::vector<std::string> speeds = CheckSpeedColumns(robot, log);  // they know the unit of time better than limits
+  const std::vector<std::string> speeds =
+      CheckSpeedColumns(robot, log);  // they know the unit of time better than limits
   CheckPace(robot, log);
   for (int j = 0; j < log.joints; ++j) CheckTorque(robot, log, j);
   CheckClock(log);
-  for (const auto& notes : {CheckGaps(log), speeds})
-    check.notes.insert(check.notes.end(), notes.begin(), notes.end());
+  for (const auto& notes : {CheckGaps(log), speeds}) check.notes.insert(check.notes.end(), notes.begin(), notes.end());
   for (int j = 0; j < log.joints; ++j) {
     CheckPosition(robot, log, j);
     if (log.q.col(j).minCoeff() == log.q.col(j).maxCoeff()) check.resting.push_back(j);

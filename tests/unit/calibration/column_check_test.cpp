@@ -58,7 +58,7 @@ class ColumnCheck : public testing::Test {
 };
 
 // The torque of KDL at one motion, read at another: what untold.hpp says cannot be seen leaves the fit unchanged.
-TEST_F(ColumnCheck, AnOffsetOfTheFirstJoint_LeavesTheFitAsItIs_OfTheThirdDoesNot) {
+TEST_F(ColumnCheck, AnOffsetOfTheFirstJoint_LeavesTheFitAsItIs) {
   Dataset d = arm_.Run(15, 1);
   const auto left = [&] {
     const ColumnFit fit(free_, {&d}, 600);
@@ -68,8 +68,6 @@ TEST_F(ColumnCheck, AnOffsetOfTheFirstJoint_LeavesTheFitAsItIs_OfTheThirdDoesNot
   const double before = left();
   d.s.q.col(0).array() += 0.3;
   EXPECT_NEAR(left(), before, 0.05);  // the ridge alone differs
-  d.s.q.col(2).array() += 0.3;
-  EXPECT_GT(left(), before + 2);
 }
 
 TEST_F(ColumnCheck, GoodLogs_GainNothing) {
@@ -86,21 +84,6 @@ TEST_F(ColumnCheck, AModelThatExplainsNothingOfAJoint_IsSaid) {
   const std::vector<std::string> notes = CheckColumns(free_, {&d});
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_NE(notes[0].find("joint 5: the model explains nothing"), std::string::npos) << notes[0];
-}
-
-// Joint 6 is braked by its own friction and driven by joint 5's, which turns the other way most of the time.
-TEST_F(ColumnCheck, FrictionThatFollowsAnotherJoint_IsCalledCoupling) {
-  Dataset d = arm_.Run(20, 2);
-  const auto sign = [&d](Eigen::Index k, int j) { return d.s.qd(k, j) > 0 ? 1 : -1; };
-  for (Eigen::Index k = 0; k < d.tau.rows(); ++k) {
-    d.tau(k, 5) += 4 * arm_.Friction("Fc", 5) * sign(k, 4);
-    if (sign(k, 4) == sign(k, 5) && k % 6) d.used.row(k).setZero();
-  }
-  const std::vector<std::string> notes = CheckColumns(free_, {&d});
-  ASSERT_EQ(notes.size(), 1u);
-  EXPECT_NE(notes[0].find("joint 6: its friction follows the speed of joint 5"), std::string::npos) << notes[0];
-  d.tau.col(5) *= -1;  // and a wrong sign is no coupling
-  EXPECT_THROW(CheckColumns(free_, {&d}), io::InputError);
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 #include <cstdlib>
 #include <iterator>
 #include <map>
-#include <sstream>
 
 #include "tests/e2e/tool.hpp"
 
@@ -52,15 +51,17 @@ TEST(Measured, Ur10e_WithDefaultOptions_NamesLoadFrictionBeforeBeltAndDelay) {
   ASSERT_EQ(o.code, 0) << o.err;
   bool below_linear = false;
   std::map<std::string, double> mu;
-  for (const auto& term : ReadJson(json).at("terms")) {
-    const std::string kind = term.at("kind"), joint = term.at("joint");
+  const nlohmann::json verdict = ReadJson(json);
+  for (const auto& term : verdict.at("terms")) {
+    const std::string kind = term.at("kind");
+    const nlohmann::json& where = term.at("joint");
+    const std::string joint = where.is_string() ? where.get<std::string>() : std::to_string(where.get<int>());
     const bool complete = mu.size() == 2 && below_linear;
     if (kind == "load_friction" && term.at("confirmed")) mu[joint] = term.at("parameters").begin()->get<double>();
     below_linear |=
         joint == "1" && (kind.starts_with("viscous_") || kind == "stribeck" || kind.starts_with("friction_"));
-    if (!complete)
-      EXPECT_TRUE(kind != "belt_elasticity" && kind != "time_delay" && kind != "external_contact")
-          << kind << " " << joint;
+    const bool imitates = kind == "belt_elasticity" || kind == "time_delay" || kind == "external_contact";
+    EXPECT_FALSE(imitates && !complete) << kind << " " << joint;
   }
   EXPECT_TRUE(below_linear);
   for (const char* joint : {"2", "3"}) {
@@ -130,52 +131,35 @@ TEST(Measured, Kr300_DiagnosisWritesTheWholeVerdict) {
   EXPECT_EQ(again.code, 0) << again.err;  // the new robot file is one that the tool itself can read
 }
 
-// Joint errors that host_sim/findings.sh prints of a model: "run 3, kuka_lwr4: 0.73 0.27 ..."; empty if there are none.
-std::vector<double> PrintedErrors(const std::string& text, const std::string& run_and_model) {
-  const auto at = text.find(run_and_model + ":");
-  if (at == std::string::npos) return {};
-  const auto begin = at + run_and_model.size() + 1;
-  std::istringstream line(text.substr(begin, text.find('\n', begin) - begin));
-  return {std::istream_iterator<double>(line), {}};
-}
-
-// host_sim/findings.sh: every run held out once. docs/findings.md claims nothing; what it says of the LWR4+ holds, too.
+// host_sim/findings.sh: every run held out once. docs/findings.md claims one term, on the LWR4+.
 TEST(Measured, Findings_AreWhatThePageSays) {
   for (const char* set : {"emps", "kuka_kr300", "kuka_lwr4"}) SKIP_WITHOUT(Measured(set), set);
   const fs::path out = FreshFolder("findings");
   const Outcome o =
       RunProgram({"env", std::string("ARMCAL=") + ARMCAL_TOOL, "bash", "host_sim/findings.sh", out.string()});
   ASSERT_EQ(o.code, 0) << o.err << o.out;
-  for (const char* model : {"emps", "kuka_kr300", "kuka_lwr4_free"})
+  for (const char* model : {"emps", "kuka_kr300"})
     EXPECT_TRUE(ReadJson(out / (std::string(model) + ".json")).at("holds").empty()) << model;
-  // Link data: joint 7's torque over posture holds, and no joint gets much worse.
-  const nlohmann::json found = ReadJson(out / "kuka_lwr4.json");
-  ASSERT_EQ(found.at("holds").size(), 1u);
-  const nlohmann::json& term = found.at("holds")[0];
-  EXPECT_EQ(term.at("joint"), "7");
-  EXPECT_NE(term.at("kinds").dump().find("position_torque"), std::string::npos) << term.at("kinds");
-  ASSERT_EQ(term.at("splits").size(), 3u);
-  for (const auto& [run, split] : term.at("splits").items()) {
-    std::printf("%s held out: joint 7 %.3f -> %.3f N m\n", run.c_str(), split.at("before").get<double>(),
-                split.at("after").get<double>());
-    // The page: 0.14 to 0.41.
-    EXPECT_LT(split.at("after").get<double>(), 0.6 * split.at("before").get<double>()) << run;
-    EXPECT_LT(split.at("other_change").get<double>(), 0.1) << run;  // 0.06 at most
+  // Joint 6's torque over posture holds with link data and with free bodies.
+  const nlohmann::json found = ReadJson(out / "kuka_lwr4.json"), free = ReadJson(out / "kuka_lwr4_free.json");
+  for (const nlohmann::json* model : {&found, &free}) {
+    ASSERT_EQ(model->at("holds").size(), 1u);
+    const nlohmann::json& term = model->at("holds")[0];
+    EXPECT_EQ(term.at("joint"), "1-6");
+    EXPECT_EQ(term.at("kinds"), nlohmann::json({"cross_ripple"}));
+    ASSERT_EQ(term.at("splits").size(), 3u);
+    for (const auto& [run, split] : term.at("splits").items()) {
+      std::printf("%s held out: joint 6 %.3f -> %.3f N m\n", run.c_str(), split.at("before").get<double>(),
+                  split.at("after").get<double>());
+      const bool weakest = model == &free && run == "measurements_3";  // the page: 0.50 to 0.67, and once 0.91
+      EXPECT_LT(split.at("after").get<double>(), (weakest ? 0.95 : 0.7) * split.at("before").get<double>()) << run;
+    }
   }
   // Runs 1 and 2 are one trajectory: neither is trained on when the other is held out.
   EXPECT_EQ(found.at("splits").at("measurements_1").at("train"), nlohmann::json({"measurements_3"}));
   EXPECT_EQ(found.at("splits").at("measurements_2").at("train"), nlohmann::json({"measurements_3"}));
-  // Link data: the same torque, declared, is better for joint 7 alone.
-  for (const char* run : {"run 1", "run 2", "run 3"}) {
-    const std::vector<double> without = PrintedErrors(o.out, std::string(run) + ", kuka_lwr4"),
-                              with = PrintedErrors(o.out, std::string(run) + ", kuka_lwr4_q7");
-    ASSERT_EQ(without.size(), 7u) << o.out;
-    ASSERT_EQ(with.size(), 7u) << o.out;
-    EXPECT_LT(with[6], 0.2 * without[6]) << run;   // the page: 0.11 to 0.14
-    EXPECT_GT(with[5], 1.02 * without[5]) << run;  // 1.03 to 1.15
-  }
-  for (const char* picture : {"emps_errors.svg", "kuka_kr300_errors.svg", "kuka_lwr4_errors.svg",
-                              "kuka_lwr4_free_errors.svg", "kuka_lwr4_term_1.svg"})
+  for (const char* picture :
+       {"emps_errors.svg", "kuka_kr300_errors.svg", "kuka_lwr4_errors.svg", "kuka_lwr4_free_errors.svg"})
     EXPECT_LT(fs::file_size(out / picture), 150000u) << picture;
 }
 

@@ -4,8 +4,8 @@
 #include <thread>
 
 #include "host_sim/client/drive_client.hpp"
-#include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/client/vendor_registers.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
 #include "tests/e2e/tool.hpp"
 
 namespace armcal::tests {
@@ -21,7 +21,8 @@ std::string LogText(int rows, const std::function<void(Cells&)>& change = {}) {
     for (int j = 1; j <= 6; ++j) cells[0].push_back(name + std::to_string(j));
   for (int k = 0; k < rows; ++k) {
     cells.push_back({std::to_string(0.008 * k)});
-    for (int j = 0; j < 12; ++j) cells.back().push_back(std::to_string(std::sin(0.05 * k + j)));
+    for (int j = 0; j < 12; ++j)  // 1.9 rad/s at most: within the arm's limits
+      cells.back().push_back(std::to_string((j < 6 ? 0.3 : 1) * std::sin(0.05 * k + j)));
   }
   if (change) change(cells);
   std::string text;
@@ -99,8 +100,9 @@ TEST_F(BadFiles, DiagnoseAndEstimate_RefuseLikeIdentify) {
 
 TEST_F(BadFiles, ACutoffThatIsNone_IsRefused) {
   const std::string good = Write("good.csv", LogText(400)).string();  // 125 Hz, 3.2 s
+  const std::string held_out = Write("held_out.csv", LogText(420)).string();
   const auto expect = [&](const std::string& cutoff, const std::string& named) {
-    ExpectOneLine(Tool({"diagnose", "--robot", "er20_like", "--train", good, "--test", good, "--cutoff", cutoff}),
+    ExpectOneLine(Tool({"diagnose", "--robot", "er20_like", "--train", good, "--test", held_out, "--cutoff", cutoff}),
                   kBadInput, named);
     ExpectOneLine(Tool({"identify", "--robot", "er20_like", "--train", good, "--cutoff", cutoff}), kBadInput, named);
   };

@@ -197,26 +197,6 @@ std::vector<std::vector<int>> JointSets(const EffectRecord& record, int n) {
   return sets;
 }
 
-namespace {
-
-// Units of a record are those of revolute joints. On a prismatic one N m reads N, and rad reads m. A pair's torque acts
-// on its first joint, and what a pair depends on is its last joint's.
-std::string UnitOn(std::string unit, const Robot& robot, const std::vector<int>& joints) {
-  if (joints.empty()) return unit;
-  const auto slides = [&robot](int j) {
-    return robot.joint[static_cast<std::size_t>(j)].kinematics.type == JointType::kPrismatic;
-  };
-  const auto read = [&unit](const std::string& from, const std::string& as) {
-    for (auto at = unit.find(from); at != unit.npos; at = unit.find(from, at + as.size()))
-      unit.replace(at, from.size(), as);
-  };
-  if (slides(joints.front())) read("N*m", "N");
-  if (slides(joints.back())) read("rad", "m");
-  return unit;
-}
-
-}  // namespace
-
 EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& robot, const std::vector<int>& joints,
                            const QuantitySource& quantities, int ordinal) {
   const std::size_t expected = record.scope == EffectScope::kJoint ? 1 : (record.scope == EffectScope::kPair ? 2 : 0);
@@ -234,7 +214,7 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
   for (const NonlinearParameter& p : record.nonlinear) {
     const std::string where = record.path + ": nonlinear " + p.name;
     EffectUnknown u{prefix + p.name + suffix,
-                    UnitOn(p.unit, robot, joints),
+                    p.unit,
                     p.name,
                     ConstantValue(g, p.lower, robot, joints, where),
                     ConstantValue(g, p.upper, robot, joints, where),
@@ -252,7 +232,7 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
       EffectColumn c;
       c.name = prefix + p.name + (index.empty() ? "" : index) + (index.empty() || suffix.empty() ? "" : "_") + suffix;
       c.key = p.name + index;
-      c.unit = UnitOn(p.unit, robot, joints);
+      c.unit = p.unit;
       c.sd = ConstantValue(g, p.sd, robot, joints, record.path + ": sd of " + p.name);
       c.lower = p.lower;
       c.upper = p.upper;

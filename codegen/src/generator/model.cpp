@@ -222,14 +222,6 @@ const char* const kBodyUnit[] = {"kg",     "kg*m",   "kg*m",   "kg*m",   "kg*m^2
                                  "kg*m^2", "kg*m^2", "kg*m^2", "kg*m^2", "kg*m^2"};
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// The rotor of a prismatic joint is a mass on the joint's side.
-const char* BodyUnit(const Robot& robot, int parameter) {
-  const int kind = parameter % kBodyBlock;
-  const bool slides =
-      robot.joint[static_cast<std::size_t>(parameter / kBodyBlock)].kinematics.type == JointType::kPrismatic;
-  return kind == kBodyBlock - 1 && slides ? "kg" : kBodyUnit[kind];
-}
-
 // m, m c, I about the link origin from mass, centre and I about the centre.
 std::array<double, 10> AboutOrigin(const Link& l) {
   const auto& c = l.center_m;
@@ -273,9 +265,8 @@ void Model::MakeTable() {
       table_.push_back({kBodyParameterName[p] + number, kBodyUnit[p], mean[p], sd[p], p == 0 ? 0 : -kInfinity,
                         kInfinity, 0, "estimated", 0, j, ""});
     const double rotor = joint.motor.gear_ratio * joint.motor.gear_ratio * joint.motor.rotor_inertia_kgm2;
-    table_.push_back({"Ia" + number, BodyUnit(robot_, kBodyBlock * j + kBodyBlock - 1), rotor,
-                      robot_.has_prior ? robot_.link_relative_sd * rotor : 1e3, 0, kInfinity, 0, "estimated", 0, j,
-                      ""});
+    table_.push_back({"Ia" + number, "kg*m^2", rotor, robot_.has_prior ? robot_.link_relative_sd * rotor : 1e3, 0,
+                      kInfinity, 0, "estimated", 0, j, ""});
   }
   for (std::size_t k = 0; k < effect_column_.size(); ++k) {
     const EffectColumn& c = effect_column(static_cast<int>(k));
@@ -315,7 +306,7 @@ std::string Model::column_name(int column) const {
 }
 
 std::string Model::column_unit(int column) const {
-  return is_rigid(column) ? BodyUnit(robot_, base_.column[column - front_]) : table_[table_index(column)].unit;
+  return is_rigid(column) ? kBodyUnit[base_.column[column - front_] % kBodyBlock] : table_[table_index(column)].unit;
 }
 
 }  // namespace armcal::codegen

@@ -101,7 +101,6 @@ void Diagnosis::Work::IndexRows() {
     for (std::size_t log = 0; log < train.size(); ++log) {
       const calibration::Dataset& data = *train[log];
       index.average.push_back(data.averaged(j) ? &data.average[static_cast<std::size_t>(j)] : nullptr);
-      double apart_s = 0.5 / data.band_Hz[j];
       int previous = -2;
       const auto add = [&](int sample, bool follows) {
         index.dataset.push_back(static_cast<int>(log));
@@ -110,6 +109,7 @@ void Diagnosis::Work::IndexRows() {
         previous = sample;
       };
       if (const RowIndex::Average* average = index.average.back()) {
+        const double apart_s = 0.5 / data.band_Hz[j];
         for (int row = 0; row < average->rows(); ++row) {
           const int middle = MiddleSample(*average, row);
           add(middle, previous >= 0 && data.s.t[middle] - data.s.t[previous] < 1.5 * apart_s);

@@ -67,6 +67,7 @@ logs::Sensitivity SensitivityOf(const codegen::Model& model, const Eigen::Matrix
 
 void LimitBands(Dataset& d, const Eigen::VectorXd& band_Hz) {
   d.band_Hz = band_Hz;
+  if (band_Hz.size() == 0) return;  // a log that nobody has asked
   d.average.assign(static_cast<std::size_t>(d.joints()), {});
   for (int j = 0; j < d.joints(); ++j)
     if (std::isfinite(band_Hz[j])) d.average[static_cast<std::size_t>(j)] = AverageRows(d, j);

@@ -46,6 +46,25 @@ void Print(const DiagnosisRun& run, const DiagnoseOptions& o) {
 
 }  // namespace
 
+namespace {
+
+// What the terms leave at the samples of the training logs: [n] RMS where the joint moves.
+Eigen::VectorXd LeftAtSamples(const codegen::Model& model, const diagnosis::Diagnosis& diagnosis,
+                              const std::vector<calibration::Dataset>& train) {
+  const diagnosis::Finding& finding = diagnosis.finding();
+  Eigen::VectorXd square = Eigen::VectorXd::Zero(model.joints());
+  double samples = 0;
+  for (const calibration::Dataset& log : train) {
+    Eigen::MatrixXd left = log.tau - calibration::Predict(model, log, finding.x, finding.declared.eta);
+    for (const Eigen::MatrixXd& torque : diagnosis.TermTorque(log)) left -= torque;
+    square += log.samples() * calibration::Rms(log, left, true).cwiseAbs2();
+    samples += log.samples();
+  }
+  return (square / samples).cwiseSqrt();
+}
+
+}  // namespace
+
 std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   auto run = std::make_unique<DiagnosisRun>();
   run->catalogue = LoadCatalogue();
@@ -97,6 +116,11 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   nlohmann::ordered_json& json = run->json;
   json = verdict::DiagnosisJson(run->view);
   json["provenance"] = provenance;
+  // Averages of a limited band have less noise than the samples that `before` and `after` are about.
+  const Eigen::VectorXd left = LeftAtSamples(model, *run->diagnosis, train);
+  for (int j = 0; j < model.joints(); ++j)
+    if (std::any_of(train.begin(), train.end(), [j](const auto& log) { return log.averaged(j); }))
+      json["noise_floor"][static_cast<std::size_t>(j)] = left[j];
   for (const calibration::Dataset& log : run->train) {
     json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
     nlohmann::ordered_json& bands = json["band_Hz"].emplace_back(nlohmann::ordered_json::array());

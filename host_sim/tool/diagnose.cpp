@@ -44,10 +44,6 @@ void Print(const DiagnosisRun& run, const DiagnoseOptions& o) {
   }
 }
 
-}  // namespace
-
-namespace {
-
 // What the terms leave at the samples of the training logs: [n] RMS where the joint moves.
 Eigen::VectorXd LeftAtSamples(const codegen::Model& model, const diagnosis::Diagnosis& diagnosis,
                               const std::vector<calibration::Dataset>& train) {
@@ -117,10 +113,15 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   json = verdict::DiagnosisJson(run->view);
   json["provenance"] = provenance;
   // Averages of a limited band have less noise than the samples that `before` and `after` are about.
-  const Eigen::VectorXd left = LeftAtSamples(model, *run->diagnosis, train);
-  for (int j = 0; j < model.joints(); ++j)
-    if (std::any_of(train.begin(), train.end(), [j](const auto& log) { return log.averaged(j); }))
-      json["noise_floor"][static_cast<std::size_t>(j)] = left[j];
+  const auto limited = [&train](int j) {
+    return std::any_of(train.begin(), train.end(), [j](const auto& log) { return log.averaged(j); });
+  };
+  Eigen::VectorXd left;
+  for (int j = 0; j < model.joints(); ++j) {
+    if (!limited(j)) continue;
+    if (left.size() == 0) left = LeftAtSamples(model, *run->diagnosis, train);
+    json["noise_floor"][static_cast<std::size_t>(j)] = left[j];
+  }
   for (const calibration::Dataset& log : run->train) {
     json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
     nlohmann::ordered_json& bands = json["band_Hz"].emplace_back(nlohmann::ordered_json::array());

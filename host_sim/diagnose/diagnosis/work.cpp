@@ -345,13 +345,9 @@ void Diagnosis::Work::Bend(int j, const VectorXd& slope) {
 // Coordinates z in which the prior is unit.
 void Diagnosis::Work::MakeCoordinates(int size) {
   const int active = static_cast<int>(declared.active.size());
-  const MatrixXd P0 = prior.covariance(declared.active, declared.active);
-  const VectorXd sd = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
-      MatrixXd(sd.cwiseInverse().asDiagonal() * P0 * sd.cwiseInverse().asDiagonal()));
   rows.L = MatrixXd::Zero(size, size);
   rows.L.topLeftCorner(active, active) =
-      sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+      calibration::CovarianceRoot(prior.covariance(declared.active, declared.active));
   // A term has no prior worth the name: a thousand times what one whitened unit in every row of it would need.
   VectorXd seen = VectorXd::Zero(size);
   for (int j = 0; j < model.joints(); ++j)

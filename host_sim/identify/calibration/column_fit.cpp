@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "host_sim/identify/calibration/prior.hpp"
+
 namespace armcal::calibration {
 
 using Eigen::MatrixXd;
@@ -32,6 +34,17 @@ bool ColumnChange::same_motion(const ColumnChange& other) const {
   return q == other.q && q_sign == other.q_sign && pace == other.pace;
 }
 
+codegen::Signals ColumnChange::Moved(const codegen::Signals& signals) const {
+  codegen::Signals out = signals;
+  for (std::size_t j = 0; j < q.size(); ++j) {
+    const auto to = static_cast<Eigen::Index>(j);
+    out.q.col(to) = q_sign[j] * signals.q.col(q[j]);
+    out.qd.col(to) = q_sign[j] * pace * signals.qd.col(q[j]);
+    out.qdd.col(to) = q_sign[j] * pace * pace * signals.qdd.col(q[j]);
+  }
+  return out;
+}
+
 ColumnFit::ColumnFit(const codegen::Model& model, const std::vector<const Dataset*>& data, int rows) : model_(model) {
   std::vector<std::pair<const Dataset*, int>> usable;
   for (const Dataset* d : data)
@@ -53,20 +66,9 @@ ColumnFit::ColumnFit(const codegen::Model& model, const std::vector<const Datase
 }
 
 ColumnFit::Motion ColumnFit::Move(const ColumnChange& change) const {
-  codegen::Signals s = signals_;
-  for (int j = 0; j < joints(); ++j) {
-    const int from = change.q[static_cast<std::size_t>(j)];
-    const double sign = change.q_sign[static_cast<std::size_t>(j)];
-    s.q.col(j) = sign * signals_.q.col(from);
-    s.qd.col(j) = sign * change.pace * signals_.qd.col(from);
-    s.qdd.col(j) = sign * change.pace * change.pace * signals_.qdd.col(from);
-  }
-  std::vector<double> eta;
-  for (int k = 0; k < model_.nonlinear(); ++k)
-    eta.push_back(model_.table()[static_cast<std::size_t>(model_.parameters() - model_.nonlinear() + k)].mean);
   const std::vector<double> committed(static_cast<std::size_t>(model_.columns()), 0);
   std::vector<MatrixXd> row;
-  model_.Regressor(s, committed, eta, row);
+  model_.Regressor(change.Moved(signals_), committed, MeanUnknowns(model_), row);
   Motion motion;
   for (int j = 0; j < joints(); ++j) {
     std::vector<int> column;

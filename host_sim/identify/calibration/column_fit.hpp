@@ -15,6 +15,8 @@ struct ColumnChange {
 
   explicit ColumnChange(int joints);
   bool same_motion(const ColumnChange& other) const;
+  // Positions, speeds and accelerations as they read under this change.
+  codegen::Signals Moved(const codegen::Signals& signals) const;
 };
 
 // Least squares of all joints together, each weighted by what it leaves.

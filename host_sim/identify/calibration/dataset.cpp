@@ -144,9 +144,10 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
   const logs::Sensitivity sensitivity = SensitivityOf(model, inertia);
   if (bandwidth.cutoff_Hz > 0) return Derive(model, log, sensitivity, bandwidth);
   const Eigen::VectorXd chosen_Hz = logs::ChooseCutoffs_Hz(log, sensitivity);
-  const Eigen::VectorXd band_Hz = SeenBands_Hz(model, Derive(model, log, sensitivity, {0, 1, chosen_Hz}));
-  const Eigen::VectorXd each_Hz = chosen_Hz.cwiseMin(kAboveBand * band_Hz);
-  Dataset out = Derive(model, log, sensitivity, {0, bandwidth.scale, each_Hz});
+  Dataset out = Derive(model, log, sensitivity, {0, 1, chosen_Hz});
+  const Eigen::VectorXd band_Hz = SeenBands_Hz(model, out), each_Hz = chosen_Hz.cwiseMin(kAboveBand * band_Hz);
+  if (bandwidth.scale != 1 || each_Hz != chosen_Hz)
+    out = Derive(model, log, sensitivity, {0, bandwidth.scale, each_Hz});
   LimitBands(out, band_Hz);
   return out;
 }

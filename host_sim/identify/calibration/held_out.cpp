@@ -177,30 +177,12 @@ std::vector<HeldOutMotion::InPhase> FindInPhase(const std::vector<const Dataset*
 }
 
 // The mean variance of each joint's torque, in units of its noise, on rows with these sums.
-VectorXd Leverage(const Information& rows, const MatrixXd& inverse, const std::vector<int>& active) {
+VectorXd Leverage(const Information& rows, const MatrixXd& covariance) {
   VectorXd out = VectorXd::Zero(static_cast<Index>(rows.gram.size()));
   for (std::size_t j = 0; j < rows.gram.size(); ++j)
     if (rows.rows[static_cast<Index>(j)] > 0)
-      out[static_cast<Index>(j)] =
-          MatrixXd(rows.gram[j](active, active)).cwiseProduct(inverse).sum() / rows.rows[static_cast<Index>(j)];
+      out[static_cast<Index>(j)] = rows.gram[j].cwiseProduct(covariance).sum() / rows.rows[static_cast<Index>(j)];
   return out;
-}
-
-// The covariance of the fit's active coordinates under its weights. A direction that no training row sees keeps a large
-// variance here: a log that moves along it leaves what training has shown.
-MatrixXd Covariance(const Information& train, const VectorXd& sigma, const Prior& prior,
-                    const std::vector<int>& active) {
-  const auto size = static_cast<Index>(active.size());
-  MatrixXd H = MatrixXd::Zero(size, size);
-  for (std::size_t j = 0; j < train.gram.size(); ++j)
-    H += MatrixXd(train.gram[j](active, active)) / (sigma[static_cast<Index>(j)] * sigma[static_cast<Index>(j)]);
-  const MatrixXd P = prior.covariance(active, active);
-  const VectorXd sd = P.diagonal().cwiseSqrt().cwiseMax(1e-300);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
-      MatrixXd(sd.cwiseInverse().asDiagonal() * P * sd.cwiseInverse().asDiagonal()));
-  const MatrixXd L = sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-  const MatrixXd M = L.transpose() * H * L + MatrixXd::Identity(size, size);
-  return L * M.ldlt().solve(MatrixXd(L.transpose()));
 }
 
 std::vector<Outside> FindOutside(const codegen::Model& model, const Fit& fit, const std::vector<const Dataset*>& train,
@@ -225,8 +207,11 @@ std::vector<Outside> FindOutside(const codegen::Model& model, const Fit& fit, co
     if (moving > 0) out[j].position /= moving, out[j].speed /= moving;
   }
   const Information there = Accumulate(model, test, fit.x.head(model.columns()), fit.eta);
-  const MatrixXd inverse = Covariance(fit.information, fit.sigma, MakePrior(model), fit.active);
-  const VectorXd own = Leverage(fit.information, inverse, fit.active), on_test = Leverage(there, inverse, fit.active);
+  // A direction that no training row sees keeps its prior's variance: a log that moves along it leaves what training
+  // has shown.
+  MatrixXd covariance;
+  SolveWithPrior(fit.information, fit.sigma.cwiseAbs2().cwiseInverse(), MakePrior(model), fit.active, &covariance);
+  const VectorXd own = Leverage(fit.information, covariance), on_test = Leverage(there, covariance);
   for (int j = 0; j < n; ++j)
     if (own[j] > 0) out[j].leverage = on_test[j] / own[j];
   return out;

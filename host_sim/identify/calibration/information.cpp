@@ -122,8 +122,9 @@ Information Accumulate(const codegen::Model& model, const Dataset& data, const E
   for (int j = 0; j < n; ++j) sums.emplace_back(model, j, p);
   const auto add = [&](int begin, int count, std::span<const double* const> root) {
     for (int j = 0; j < n; ++j)
-      info.rows[j] += sums[j].Add(count, root.subspan(static_cast<std::size_t>(j) * columns, columns),
-                                  data.used.col(j).data() + begin, data.tau.col(j).data() + begin);
+      if (!data.averaged(j))
+        info.rows[j] += sums[j].Add(count, root.subspan(static_cast<std::size_t>(j) * columns, columns),
+                                    data.used.col(j).data() + begin, data.tau.col(j).data() + begin);
   };
   model.ForEachBlock(data.s, {p.data(), static_cast<std::size_t>(columns)}, eta, add);
   for (int j = 0; j < n; ++j) sums[j].Finish(columns + j, info.gram[j], info.right[j], info.square[j]);

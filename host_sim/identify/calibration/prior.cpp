@@ -62,6 +62,20 @@ MatrixXd BodyCovariance(const codegen::Model& model) {
   return P;
 }
 
+std::vector<double> MeanUnknowns(const codegen::Model& model) {
+  std::vector<double> eta;
+  for (int k = 0; k < model.nonlinear(); ++k)
+    eta.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
+  return eta;
+}
+
+MatrixXd CovarianceRoot(const MatrixXd& covariance) {
+  const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseMax(1e-300);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
+      MatrixXd(scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal()));
+  return scale.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
 namespace {
 
 constexpr int kDrawnStates = 256;
@@ -87,12 +101,9 @@ VectorXd WideDeviations(const codegen::Model& model) {
       s.qdd(k, j) = (2 * share(k, 3 * j + 2) - 1) * joint.acceleration_limit_radps2;
     }
   }
-  std::vector<double> eta;
-  for (int k = 0; k < model.nonlinear(); ++k)
-    eta.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
   const VectorXd none = VectorXd::Zero(model.columns());
   std::vector<MatrixXd> row;
-  model.Regressor(s, {none.data(), static_cast<std::size_t>(none.size())}, eta, row);
+  model.Regressor(s, {none.data(), static_cast<std::size_t>(none.size())}, MeanUnknowns(model), row);
   VectorXd largest = VectorXd::Zero(model.columns());
   for (int j = 0; j < n; ++j)
     largest = largest.cwiseMax(row[static_cast<std::size_t>(j)].colwise().norm().transpose() / std::sqrt(kDrawnStates) /

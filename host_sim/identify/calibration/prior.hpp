@@ -28,6 +28,12 @@ Eigen::MatrixXd OriginJacobian(const Eigen::VectorXd& centre);
 // From the model's table: means, deviations and states.
 Prior MakePrior(const codegen::Model& model);
 
+// Means of the model's nonlinear parameters, as the table has them.
+std::vector<double> MeanUnknowns(const codegen::Model& model);
+
+// R with R R' = covariance, which may be singular; found in units of its deviations.
+Eigen::MatrixXd CovarianceRoot(const Eigen::MatrixXd& covariance);
+
 // Covariance of the body parameters (about origins), 11n x 11n, at the table's means.
 Eigen::MatrixXd BodyCovariance(const codegen::Model& model);
 Eigen::VectorXd BodyMean(const codegen::Model& model);

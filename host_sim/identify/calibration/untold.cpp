@@ -10,6 +10,7 @@
 #include <random>
 
 #include "host_sim/identify/calibration/column_fit.hpp"
+#include "host_sim/identify/calibration/prior.hpp"
 
 namespace armcal::calibration {
 
@@ -62,17 +63,7 @@ class Faults {
       if (left.col(c).tail(left.rows() - qr.rank()).norm() > kSame * given.col(c).norm()) return false;
     return true;
   }
-  bool Unseen(const ColumnChange& change) const {
-    codegen::Signals read = s_;
-    for (int j = 0; j < n_; ++j) {
-      const auto at = static_cast<std::size_t>(j);
-      const double sign = change.q_sign[at];
-      read.q.col(j) = sign * s_.q.col(change.q[at]);
-      read.qd.col(j) = sign * change.pace * s_.qd.col(change.q[at]);
-      read.qdd.col(j) = sign * change.pace * change.pace * s_.qdd.col(change.q[at]);
-    }
-    return Unseen(read, change, VectorXd::Ones(n_));
-  }
+  bool Unseen(const ColumnChange& change) const { return Unseen(change.Moved(s_), change, VectorXd::Ones(n_)); }
   bool UnseenOffset(int j) const {
     codegen::Signals read = s_;
     read.q.col(j).array() += kOffset;
@@ -87,12 +78,9 @@ class Faults {
  private:
   // [n x states] rows, joint after joint.
   MatrixXd Stack(const codegen::Signals& s) const {
-    std::vector<double> eta;
-    for (int k = 0; k < model_.nonlinear(); ++k)
-      eta.push_back(model_.table()[static_cast<std::size_t>(model_.parameters() - model_.nonlinear() + k)].mean);
     const std::vector<double> committed(static_cast<std::size_t>(model_.columns()), 0);
     std::vector<MatrixXd> row;
-    model_.Regressor(s, committed, eta, row);
+    model_.Regressor(s, committed, MeanUnknowns(model_), row);
     MatrixXd out(n_ * s.samples(), model_.columns());
     for (int j = 0; j < n_; ++j) out.middleRows(j * s.samples(), s.samples()) = row[static_cast<std::size_t>(j)];
     return out;

@@ -51,12 +51,7 @@ VectorXd SolveWithPrior(const Information& info, const VectorXd& weight, const P
   if (prior.covariance.size() > 0) {
     // x = S z with P0 = S C S: (S H S + C^-1) z = S g. It is solved with C^(1/2), so that a singular prior does no
     // harm.
-    const MatrixXd P0 = Pick(prior.covariance, active);
-    const VectorXd scale = P0.diagonal().cwiseSqrt().cwiseMax(1e-300);
-    const MatrixXd C = scale.cwiseInverse().asDiagonal() * P0 * scale.cwiseInverse().asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C);
-    const MatrixXd L =
-        scale.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+    const MatrixXd L = CovarianceRoot(Pick(prior.covariance, active));
     const MatrixXd M = L.transpose() * Ha * L + MatrixXd::Identity(a, a);
     const Eigen::LLT<MatrixXd> factor(M);
     step = L * factor.solve(L.transpose() * ga);
@@ -103,8 +98,7 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
   Fit fit;
   for (const int c : prior.active)
     if (std::find(held.begin(), held.end(), c) == held.end()) fit.active.push_back(c);
-  for (int k = 0; k < model.nonlinear(); ++k)
-    fit.eta.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
+  fit.eta = MeanUnknowns(model);
   fit.x = prior.mean;
   fit.sigma.resize(n);
   for (int j = 0; j < n; ++j) fit.sigma[j] = model.robot().joint[j].torque_noise_Nm;

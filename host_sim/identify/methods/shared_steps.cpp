@@ -63,11 +63,7 @@ MatrixXd PriorFactor(const Problem& problem) {
   MatrixXd P(count, count);
   for (int i = 0; i < count; ++i)
     for (int k = 0; k < count; ++k) P(i, k) = problem.covariance(free[i], free[k]);
-  const VectorXd scale = P.diagonal().cwiseSqrt().cwiseMax(1e-300);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
-      MatrixXd(scale.cwiseInverse().asDiagonal() * P * scale.cwiseInverse().asDiagonal()));
-  const MatrixXd root =
-      scale.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const MatrixXd root = CovarianceRoot(P);
   MatrixXd L = MatrixXd::Zero(problem.start.size(), count);
   for (int i = 0; i < count; ++i) L.row(free[i]) = root.row(i);
   return L;

@@ -27,6 +27,7 @@ int Main(int argc, char** argv) {
   AddEvaluate(app, action);
   AddReplay(app, action);
   AddDiagnose(app, action);
+  AddImport(app, action);
   AddGenerate(app, action);
   AddFlash(app, action);
   AddVerify(app, action);

@@ -19,6 +19,7 @@ enum ExitCode : int { kOk = 0, kBadInput = 2, kLink = 3, kRefused = 4, kMismatch
 // The verb's work; its return value is the exit code. Set by the parsed subcommand, run by main.
 using Action = std::function<int()>;
 
+void AddImport(CLI::App& app, Action& action);
 void AddGenerate(CLI::App& app, Action& action);
 void AddSimulate(CLI::App& app, Action& action);
 void AddExcite(CLI::App& app, Action& action);

@@ -135,8 +135,9 @@ class UrdfArm {
       EXPECT_GE(solver.CartToJnt(q, v, a, {}, tau), 0);
       for (int j = 0; j < n; ++j) {
         const TrueDrive& d = drive_[static_cast<std::size_t>(j)];
-        log.tau(k, j) = tau(j) + d.rotor_kgm2 * a(j) + d.coulomb_Nm * (v(j) > 0 ? 1 : -1) + d.viscous_Nmsprad * v(j) +
-                        d.noise_Nm * normal(random);
+        const unsigned at = order_[static_cast<std::size_t>(j)];
+        log.tau(k, j) = tau(at) + d.rotor_kgm2 * a(at) + d.coulomb_Nm * (v(at) > 0 ? 1 : -1) +
+                        d.viscous_Nmsprad * v(at) + d.noise_Nm * normal(random);
       }
     }
     return log;

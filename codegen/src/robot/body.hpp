@@ -45,8 +45,12 @@ inline void Merge(Body& into, const Body& other) {
   into.mass = mass, into.center = center;
 }
 
-// Empty, or what a body that can exist has and this one has not. kg, m, kg m^2 as a person reads them.
-inline std::string Impossible(const Body& body) {
+// Published figures are rounded and measured: a moment of inertia may pass the sum of the others by this much of it.
+inline constexpr double kPublished = 0.2;
+
+// Empty, or what a body that can exist has and this one has not, in kg and kg m^2. slack: how far the largest moment of
+// inertia may pass the sum of the others, as a share of it.
+inline std::string Impossible(const Body& body, double slack = 0) {
   const auto number = [](double v) {
     char text[32];
     std::snprintf(text, sizeof text, "%.4g", v);
@@ -59,7 +63,7 @@ inline std::string Impossible(const Body& body) {
   const std::string found =
       ", not " + number(moment[0]) + ", " + number(moment[1]) + " and " + number(moment[2]) + " kg m^2";
   if (!(moment[0] > 0)) return "principal moments of inertia above zero" + found;
-  if (!(moment[0] + moment[1] - moment[2] > kRounding * moment[2]))
+  if (!((1 + slack) * (moment[0] + moment[1]) - moment[2] > kRounding * moment[2]))
     return "principal moments of inertia of which none is as large as the sum of the other two" + found;
   return "";
 }

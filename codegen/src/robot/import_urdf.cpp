@@ -18,6 +18,7 @@ constexpr double kGravity = 9.81;
 // Guesses. A joint reaches its speed limit in a quarter of a second; a reading of torque is good to half a per cent of
 // the limit; a two-hundredth of the speed limit is standstill.
 constexpr double kSpeedUp_s = 0.25, kNoiseShare = 0.005, kStandstillShare = 0.005;
+constexpr double kFastest_radps = 100, kFastest_mps = 20;  // a limit above stands for none
 constexpr double kTurn_deg = 180, kTravel_m = 0.5, kSpeed_degps = 90, kSpeed_mps = 0.5;
 constexpr double kStrength = 2, kLeastTorque_Nm = 1;  // times what gravity asks for at most
 
@@ -71,10 +72,13 @@ class Writer {
     const double unit = slide ? 1 : kDegPerRad;
     Position(j, slide);
     double speed = joint.speed_limit_radps;
-    if (speed > 0) Comment(slide ? "speed_limit_mps" : "speed_limit_degps", Short(speed * unit));
+    const bool told = speed > 0 && speed <= (slide ? kFastest_mps : kFastest_radps);
+    if (told) Comment(slide ? "speed_limit_mps" : "speed_limit_degps", Short(speed * unit));
     else {
+      const std::string why =
+          speed > 0 ? "the URDF has " + Short(speed) + (slide ? " m/s" : " rad/s") : "the URDF has none";
       speed = (slide ? kSpeed_mps : kSpeed_degps) / unit;
-      Key(slide ? "speed_limit_mps" : "speed_limit_degps", Short(speed * unit), "the URDF has none");
+      Key(slide ? "speed_limit_mps" : "speed_limit_degps", Short(speed * unit), why);
     }
     double torque = joint.torque_limit_Nm;
     if (torque > 0) Comment(slide ? "torque_limit_N" : "torque_limit_Nm", Short(torque));

@@ -123,7 +123,7 @@ Joint ReadJoint(const io::TomlReader& in, bool has_prior) {
   const Body all{j.link.mass_kg, Eigen::Vector3d(center.data()), Symmetric(j.link.inertia_kgm2)};
   if (all.center.norm() > kLongest) link.Report("center_m", "metres (millimetres?)");
   if (all.inertia.allFinite() && all.mass > 0)
-    if (const std::string missing = Impossible(all); !missing.empty()) in.Report("link", missing);
+    if (const std::string missing = Impossible(all, kPublished); !missing.empty()) in.Report("link", missing);
   return j;
 }
 
@@ -155,7 +155,7 @@ void CheckUrdfBodies(const io::TomlReader& in, const UrdfChain& chain, io::Fault
     const Body body{link.mass_kg, Eigen::Vector3d::Zero(), Symmetric(link.inertia_kgm2)};
     const std::string who = file + ": joint \"" + chain.joint[j].name + "\": expected ";
     if (!(link.mass_kg > 0)) faults.Add(who + "a link with mass after it; or write prior = \"none\" in " + in.file());
-    else if (const std::string missing = Impossible(body); !missing.empty())
+    else if (const std::string missing = Impossible(body, kPublished); !missing.empty())
       faults.Add(who + "to move a body with " + missing + "; or write prior = \"none\" in " + in.file());
   }
   std::string names;

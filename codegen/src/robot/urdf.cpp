@@ -242,7 +242,7 @@ void CheckBodies(const std::string& file, const urdf::ModelInterface& model, io:
     if (square > kLongest * kLongest)
       faults.Add(who + "an inertia in kg m^2: this one would be " + Number(std::sqrt(square)) + " m wide (kg mm^2?)");
     if (body.inertia.isZero() && body.mass > 0) continue;  // a mass point; what it is fixed to may have the inertia
-    if (const std::string missing = Impossible(body); !missing.empty()) faults.Add(who + missing);
+    if (const std::string missing = Impossible(body, kPublished); !missing.empty()) faults.Add(who + missing);
   }
 }
 

@@ -29,6 +29,7 @@ int Main(int argc, char** argv) {
   AddDiagnose(app, action);
   AddImport(app, action);
   AddGenerate(app, action);
+  AddExport(app, action);
   AddFlash(app, action);
   AddVerify(app, action);
   AddHealth(app, action);

@@ -29,6 +29,7 @@ void AddIdentify(CLI::App& app, Action& action);
 void AddEvaluate(CLI::App& app, Action& action);
 void AddReplay(CLI::App& app, Action& action);
 void AddDiagnose(CLI::App& app, Action& action);
+void AddExport(CLI::App& app, Action& action);
 void AddFlash(CLI::App& app, Action& action);
 void AddVerify(CLI::App& app, Action& action);
 void AddHealth(CLI::App& app, Action& action);

@@ -91,6 +91,10 @@ const char* const kInertiaName[] = {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"};
 std::vector<std::string> NotInUrdf(const DescribedArm& arm) {
   std::vector<std::string> out = Rotors(arm);
   for (const std::string& line : Effects(arm)) out.push_back(line);
+  const auto& g = arm.robot.gravity_mps2;
+  if (g[0] != 0 || g[1] != 0 || g[2] > 0)
+    out.push_back(
+        fmt::format("the mounting: gravity is [{:.6g}, {:.6g}, {:.6g}] m/s^2 in the base frame", g[0], g[1], g[2]));
   return out;
 }
 

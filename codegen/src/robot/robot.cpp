@@ -100,8 +100,9 @@ void ReadDrive(const io::TomlReader& in, Joint& j, const std::string& unlimited)
 Joint ReadJoint(const io::TomlReader& in, bool has_prior) {
   Joint j;
   const std::string type = in.Text("type");
-  if (type != "revolute" && type != "prismatic") in.Report("type", "\"revolute\" or \"prismatic\"");
-  const bool prismatic = type == "prismatic";
+  if (!type.empty() && type != "revolute" && type != "prismatic") in.Report("type", "\"revolute\" or \"prismatic\"");
+  // A wrong word makes one fault, not one for each key of the other kind.
+  const bool prismatic = type == "prismatic" || (type != "revolute" && in.Has("position_limit_m"));
   j.kinematics.type = prismatic ? JointType::kPrismatic : JointType::kRevolute;
   const std::string_view body[] = {"type", "alpha_deg", "a_m", "d_m", "offset_deg", "offset_m", "link"};
   AllowDriveKeys(in, j.kinematics.type, body);
@@ -311,6 +312,7 @@ void ReadPayloadOf(const io::TomlReader& in, Robot& r, const Eigen::Isometry3d& 
 Robot ReadRobot(const std::filesystem::path& path) {
   if (std::filesystem::is_regular_file(path)) RefuseOtherFiles(path);
   const toml::table table = io::ParseToml(path);
+  if (table.empty()) throw io::InputError(path.string() + ": nothing in it, expected a robot file");
   io::Faults faults;
   const io::TomlReader in(table, path.string(), "", &faults);
   if (in.Has("schema") && in.Has("parameter"))
@@ -326,7 +328,7 @@ Robot ReadRobot(const std::filesystem::path& path) {
     chain_known = !r.joint.empty();
   } else {
     const std::string dh = in.Text("dh");
-    if (dh != "modified" && dh != "standard") in.Report("dh", "\"modified\" or \"standard\"");
+    if (!dh.empty() && dh != "modified" && dh != "standard") in.Report("dh", "\"modified\" or \"standard\"");
     for (const io::TomlReader& joint : in.Tables("joint")) r.joint.push_back(ReadJoint(joint, r.has_prior));
     if (dh == "standard") flange = ConvertStandardDh(r.joint);
   }

@@ -152,6 +152,8 @@ TEST_F(RobotFile, OfDhRows_SaysAllFaultsAtOnce) {
        {"joint[1].motor.gear_ratio: expected a ratio, not zero", "joint[1].motor.rotor: expected no such key here",
         "joint[1].motor.torque_constant_NmpA: missing, expected a number above zero"}},
       {{{"dh = \"modified\"\n", "dh = \"craig\"\n"}}, {"dh: expected \"modified\" or \"standard\""}},
+      {{{"dh = \"modified\"\n", ""}, {"type = \"prismatic\"\n", "type = 3\n"}},
+       {": dh: missing, expected a string", "joint[2].type: expected a string"}},
       {{{"dh = \"modified\"\n", "dh = \"modified\"\ntip = \"hand\"\n"}}, {"tip: expected urdf beside it"}},
       {{{"link = { mass_kg = 2.0,", "# link = { mass_kg = 2.0,"}}, {"joint[2].link: missing, expected a table"}},
       {{{"[[joint]]\nname = \"slide\"",

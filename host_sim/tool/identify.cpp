@@ -7,6 +7,7 @@
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 #include "host_sim/identify/calibration/payload.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
@@ -319,6 +320,7 @@ int RunIdentify(const IdentifyOptions& o) {
   MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, o.cutoff_Hz, {}};
   if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
+  if (model.robot().has_prior) calibration::RequirePhysicalPrior(model);  // before the fit, not after it
   const LogReader read(model, o.channels, o.cutoff_Hz);
   std::vector<calibration::Dataset> train = read.All(o.train);
   read.PrintUntold(train);

@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,7 @@ struct Joint {
   double torque_noise_Nm = 0;  // standard deviation of one tick's reading
   double v_min_radps = 0;
   std::map<std::string, double> nominal;  // parameter name -> value: "Fc", "Fv", ...
+  std::set<std::string> wide;             // of "Fc", "Fv", "Ia": those that nobody stated; a URDF's values do not count
   Motor motor;
   Link link;
   bool has_motor = false;
@@ -72,8 +74,16 @@ struct ParameterSet {
   std::vector<int> prefer, omit;  // tried first; left out (taken as zero)
 };
 
+// A URDF, and which chain of it is the arm.
+struct UrdfChoice {
+  std::filesystem::path path;
+  std::string tip;                      // the chain ends at this link; empty: the only chain there is
+  std::map<std::string, double> fixed;  // joints that are held at a position, rad or m
+};
+
 struct Robot {
   std::string name, title, source, path;
+  UrdfChoice urdf;                       // no path: DH rows
   std::array<double, 3> gravity_mps2{};  // base frame
   std::string sign_law = "sgn";          // "sgn" | "tanh"
   double sign_width_radps = 0;
@@ -96,7 +106,7 @@ struct Robot {
   int joints() const { return static_cast<int>(joint.size()); }
 };
 
-// Throws io::InputError: file, key, what was expected.
+// Throws io::InputError with all faults of the file, a line for each: file, key or joint, what was expected.
 Robot ReadRobot(const std::filesystem::path& path);
 
 }  // namespace armcal::codegen

@@ -15,7 +15,7 @@ namespace armcal::estimator {
 template <class Model>
 struct Row {
   float front[Model::kFront > 0 ? Model::kFront : 1] = {};  // from the joint's first column on
-  float dense[Model::kDense] = {};
+  float dense[Model::kDense] = {};  // from kRowBegin[joint] on; what is before is not of this row
   float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // extended filter only
   float y = 0.0f;
   float load_Nm = 0.0f, model_Nm = 0.0f;  // committed torque of the dense columns alone, and of all columns
@@ -33,7 +33,7 @@ ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows
     return math::Masked(value * (table.scale[column] * whiten), table.prior.active[column]);
   };
   for (int k = first; k < end; ++k) row.front[k - first] = scaled(seen.front[k], k);
-  for (int k = 0; k < Model::kDense; ++k)
+  for (int k = Model::kRowBegin[joint]; k < Model::kDense; ++k)
     row.dense[k] = scaled(seen.dense[joint * Model::kDense + k], Model::kFront + k);
   row.load_Nm = model::LoadTorque(table.committed.p, committed, joint);
   row.model_Nm = model::RowTorque(table.committed.p, committed, joint, row.load_Nm);

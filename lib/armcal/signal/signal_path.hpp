@@ -78,7 +78,7 @@ class SignalPath {
   struct Window {
     std::uint32_t tick;
     std::uint32_t first[n];  // counts of the first tick
-    std::int32_t rest[n];    // sum of (counts - first)
+    std::uint32_t rest[n];   // sum of (counts - first); unsigned, because a jump of an encoder may make it wrap
     std::int32_t current[n];
     float temperature[n];
     std::uint8_t spoilt[n];  // not enabled or saturated
@@ -100,7 +100,7 @@ class SignalPath {
       for (int i = 0; i < n; ++i) w.first[i] = static_cast<std::uint32_t>(raw.counts[i]);
     }
     for (int i = 0; i < n; ++i) {
-      w.rest[i] += static_cast<std::int32_t>(static_cast<std::uint32_t>(raw.counts[i]) - w.first[i]);
+      w.rest[i] += static_cast<std::uint32_t>(raw.counts[i]) - w.first[i];
       w.current[i] += raw.current[i];
       w.temperature[i] += raw.temperature_degC[i];
       const std::uint8_t usable = static_cast<std::uint8_t>(raw.flags[i] & (model::kEnabled | model::kSaturated));
@@ -112,7 +112,7 @@ class SignalPath {
   // kSampleTicks x (average of window a - average of window b), exact.
   static float Difference(const Window& a, const Window& b, int axis) {
     const std::uint32_t first = (a.first[axis] - b.first[axis]) * static_cast<std::uint32_t>(kSampleTicks);
-    const std::uint32_t rest = static_cast<std::uint32_t>(a.rest[axis]) - static_cast<std::uint32_t>(b.rest[axis]);
+    const std::uint32_t rest = a.rest[axis] - b.rest[axis];
     return static_cast<float>(static_cast<std::int32_t>(first + rest));
   }
 
@@ -128,8 +128,8 @@ class SignalPath {
     for (int i = 0; i < n; ++i) {
       const float scale = axes_.counts_to_rad[i], share = scale * kShare;
       const std::uint32_t from_zero = centre.first[i] - static_cast<std::uint32_t>(axes_.zero_counts[i]);
-      q[i] =
-          scale * static_cast<float>(static_cast<std::int32_t>(from_zero)) + share * static_cast<float>(centre.rest[i]);
+      q[i] = scale * static_cast<float>(static_cast<std::int32_t>(from_zero)) +
+             share * static_cast<float>(static_cast<std::int32_t>(centre.rest[i]));
       for (int k = 0; k < 4; ++k) step[k][i] = share * Difference(*w[k + 1], *w[k], i);
       const float inner = Difference(*w[3], *w[1], i), outer = Difference(*w[4], *w[0], i);
       qd[i] = (8.0f * inner - outer) * (share / 12.0f) * step_rate_Hz;

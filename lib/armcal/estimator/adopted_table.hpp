@@ -2,6 +2,7 @@
 #pragma once
 
 #include "armcal/estimator/rigid_prior.hpp"
+#include "armcal/estimator/row_gate.hpp"
 #include "armcal/filter/prior.hpp"
 #include "armcal/model/evaluate.hpp"
 #include "armcal/model/parameters.hpp"
@@ -30,6 +31,7 @@ struct AdoptedTable {
   float eta_low[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // bounds of x
   float eta_high[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
   float sigma_Nm[Model::kJoints] = {};
+  float gate_sigma[Model::kJoints] = {};  // of RowGate; 0: open
 };
 
 // A nonlinear parameter whose range excludes zero is positive, and is estimated as its logarithm.
@@ -169,7 +171,7 @@ core::Status BuildAdoptedTable(const Table<Model>& table, std::uint32_t generati
   }
   internal::PriorOfEta<Model>(table, adopted);
   prior.link_floor = kLinkFloor;
-  prior.gate_sigma = 0.0f;
+  prior.gate_sigma = 0.0f;  // RowGate decides, for every filter
   internal::ScaleCorrelation(rigid, adopted);
 
   c.valid = true;
@@ -183,6 +185,7 @@ core::Status BuildAdoptedTable(const Table<Model>& table, std::uint32_t generati
     c.v_min_radps[i] = table.joint[i].v_min_radps;
     c.torque_scale[i] = table.joint[i].torque_scale;
     adopted.sigma_Nm[i] = table.joint[i].sigma_Nm;
+    adopted.gate_sigma[i] = kGateSigma;
   }
   return Status::kOk;
 }

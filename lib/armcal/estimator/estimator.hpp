@@ -148,8 +148,8 @@ class Estimator {
  private:
   enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReset, kReadOut };
   // Credit of a sample's regressor, and of a row's whitening and statistics: from counts of six-axis models.
-  static constexpr int kSampleCost = Intake<Model>::kEvaluationCost, kRowCost = 3 * Model::kDense;
-  static constexpr int kGateCost = n * Model::kDense;
+  static constexpr int kSampleCost = Intake<Model>::kEvaluationCost, kRowCost = 5 * Model::kDense / 2;
+  static constexpr int kGateCost = 5 * n * Model::kDense / 2;  // of both torques of all rows, and of the gate
 
   struct Nothing {};
 

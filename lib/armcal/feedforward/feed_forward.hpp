@@ -58,7 +58,8 @@ class FeedForward {
       const bool usable = active_.valid && math::IsFinite(tau);
       if (active_.valid && !usable) status = core::Status::kNotFinite;
       const float rising = first_limit_Nm_[i] + share * (active_.limit_Nm[i] - first_limit_Nm_[i]);
-      limit_Nm_[i] = math::Min(active_.limit_Nm[i], math::Select(fading != 0u, rising, active_.limit_Nm[i]));
+      const float present = math::Select(fading != 0u, rising, active_.limit_Nm[i]);
+      limit_Nm_[i] = math::Min(active_.limit_Nm[i], present);
       tau_Nm[i] = Clamp(math::Masked(tau, math::MaskOf(usable)), limit_Nm_[i], status);
       unlimited_Nm_[i] = math::Masked(tau, math::MaskOf(usable));
     }

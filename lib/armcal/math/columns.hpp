@@ -117,8 +117,10 @@ ARMCAL_NOINLINE void Fold(T* __restrict x, T* __restrict r1, T* __restrict r2, T
     x[k] = x_a, x[k + 1] = x_b, x[k + 2] = x_c, x[k + 3] = x_d;
   }
   for (; k < length; ++k) {
-    internal::FoldElement(x[k], r1[k], x1, s1);
-    internal::FoldElement(x[k], r2[k], x2, s2);
+    T rest = x[k];
+    internal::FoldElement(rest, r1[k], x1, s1);
+    internal::FoldElement(rest, r2[k], x2, s2);
+    x[k] = rest;
   }
 }
 

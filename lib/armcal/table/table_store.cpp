@@ -120,7 +120,7 @@ Status TableStore::LoadOlder(std::uint16_t* out) {
   if (busy()) return Status::kBusy;
   if (current_ >= 0) {
     state_[current_] = SlotState::kRefused;
-    ++fallbacks_;
+    fallbacks_ += 1u;
   }
   return TakeBest(out);
 }

@@ -163,20 +163,23 @@ class CountCheck {
 // torque that really steps does so once. A reading at the end of its 16 bits says nothing. Context: tick.
 class CurrentCheck {
  public:
-  void Restart() { stuck_ = 0, rough_ = 0.0f, running_ = false; }
+  void Restart() { stuck_ = 0, rough_ = 0.0f, change_ = 0, running_ = false; }
 
   // moves: the axis's count has moved. True: the reading can be believed.
   bool Check(std::int16_t current, bool moves) {
     const std::int32_t change = running_ ? current - last_ : 0;
     const float size = math::Abs(static_cast<float>(change)), wide = 6.0f * usual_ + 8.0f;
     stuck_ = change == 0 && moves && running_ ? math::Min(stuck_ + 1u, kStuck) : 0u;
-    const bool stuck = stuck_ == kStuck && usual_ > kNoisy;
+    const bool stuck = stuck_ == kStuck && noise_ > kNoisy;
+    const float bend = math::Abs(static_cast<float>(change - change_));
     const bool known = count_ >= kFirst;
     rough_ += math::Select(known && size > wide, 1.0f, 0.0f) - rough_ / 8.0f;
     count_ += running_ && !stuck && count_ < kMemory ? 1.0f : 0.0f;
     const float counted = math::Select(known, math::Min(size, wide), size);
     usual_ += math::Select(running_ && !stuck, (counted - usual_) / math::Max(count_, 1.0f), 0.0f);
+    noise_ += math::Select(running_ && !stuck, (math::Min(bend, 2.0f * wide) - noise_) / math::Max(count_, 1.0f), 0.0f);
     last_ = current;
+    change_ = change;
     running_ = true;
     return !stuck && rough_ < kRough && current < 32767 && current > -32767;
   }
@@ -188,9 +191,10 @@ class CurrentCheck {
   static constexpr float kFirst = 64.0f, kMemory = 16384.0f;  // changes that the mean is made of
 
   float usual_ = 0.0f, count_ = 0.0f;  // mean size of a change, and of how many
+  float noise_ = 0.0f;                 // mean difference of two changes: a slow torque has none
   float rough_ = 0.0f;
   std::uint32_t stuck_ = 0;
-  std::int32_t last_ = 0;
+  std::int32_t last_ = 0, change_ = 0;
   bool running_ = false;
 };
 

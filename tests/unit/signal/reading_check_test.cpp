@@ -158,6 +158,13 @@ TEST(CurrentCheck, StandingAxisOrQuietSensor_MayRepeatItsCurrent) {
   EXPECT_TRUE(RefusedCurrents(std::vector<int>(3000, 500)).empty());
 }
 
+// At the top of a slow swing a current without noise stays for many ticks.
+TEST(CurrentCheck, SlowCurrentWithoutNoise_MayStandAtItsTop) {
+  std::vector<int> currents;
+  for (int k = 0; k < 20000; ++k) currents.push_back(static_cast<int>(std::lround(10000 * std::sin(1e-3 * k))));
+  EXPECT_TRUE(RefusedCurrents(currents).empty());
+}
+
 TEST(CurrentCheck, EndOfTheRange_IsRefused) {
   auto currents = Currents(1000, 50);
   currents[500] = 32767;

@@ -51,7 +51,7 @@ class RowGate {
  private:
   static constexpr float kMemory = 1024.0f;  // rows
   static constexpr float kFew = 16.0f;       // rows
-  static constexpr float kPatience = 32.0f;  // rows in turn: a quarter of a second
+  static constexpr float kPatience = 16.0f;  // rows in turn: an eighth of a second
   static constexpr float kClip = 9.0f;
 
   struct Joint {

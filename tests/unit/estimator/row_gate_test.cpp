@@ -62,11 +62,11 @@ TEST_F(GateTest, WrongRowsEverySecond_AreRefusedForEver) {
 }
 
 // A changed arm: rows are off by the same from now on, until the read-out has followed.
-TEST_F(GateTest, ChangedArm_IsLetInAfterAQuarterOfASecond) {
+TEST_F(GateTest, ChangedArm_IsLetInAfterAnEighthOfASecond) {
   Warm(2000);
   int row = 0;
   while (!Row(0, 20.0f) && row < 1000) ++row;
-  EXPECT_EQ(row, 32);
+  EXPECT_EQ(row, 16);
   int refused = 0;
   for (int i = 0; i < 500; ++i) refused += !Row(0, 20.0f);
   EXPECT_EQ(refused, 0);

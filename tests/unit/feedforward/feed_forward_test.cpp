@@ -150,9 +150,12 @@ TEST_F(FeedForwardTest, FadeOfZeroMs_TakesTheShortestFade) {
 // The tables differ in everything: amplitudes, and an eta that a column depends on. The oracle knows only that nothing
 // may move by more than a tick's share of what is left.
 TEST_F(FeedForwardTest, FadeInsideAFade_StartsFromThePresentTorque) {
-  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  Set first = Example(1);
+  first.p[6] = 6.0f;  // the column that depends on eta
+  ASSERT_EQ(ff->Offer(first, false), Status::kOk);
   ASSERT_EQ(Evaluate(), Status::kOk);
-  Set second = Example(2), third = Example(3);
+  Set second = first, third = first;
+  second.generation = 2, third.generation = 3;
   for (float& p : second.p) p *= 4;
   for (float& p : third.p) p *= -2;
   second.eta[0] = 2.0f, third.eta[0] = 0.7f;
@@ -161,7 +164,7 @@ TEST_F(FeedForwardTest, FadeInsideAFade_StartsFromThePresentTorque) {
   ASSERT_EQ(ff->Offer(second, true), Status::kOk);
   for (int tick = 0; tick < 40; ++tick) ASSERT_EQ(Evaluate(), Status::kOk);
   const float present[2] = {tau[0], tau[1]};
-  for (int i = 0; i < 2; ++i) ASSERT_NEAR(present[i], 0.6 * Exact(Example(1), i) + 0.4 * Exact(second, i), 1e-3);
+  for (int i = 0; i < 2; ++i) ASSERT_NEAR(present[i], 0.6 * Exact(first, i) + 0.4 * Exact(second, i), 1e-3);
   ASSERT_EQ(ff->Offer(third, true), Status::kOk);
   for (int tick = 1; tick <= 110; ++tick) {
     ASSERT_EQ(Evaluate(), Status::kOk);

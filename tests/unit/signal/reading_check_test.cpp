@@ -68,6 +68,14 @@ TEST(CountCheck, FrozenEncoder_IsRefusedUntilItMovesOnSmoothly) {
   EXPECT_EQ(Refused(counts), Range(1600, 2303));
 }
 
+// Slower than the step that an acceleration could stop within a tick: what tells is that the axis was not slowing down.
+TEST(CountCheck, FrozenEncoderOfASlowAxis_IsRefused) {
+  std::vector<std::int32_t> counts;
+  for (int k = 0; k < 3000; ++k) counts.push_back(60 * k);
+  for (int k = 1600; k < 2300; ++k) counts[k] = counts[1599];
+  EXPECT_EQ(Refused(counts), Range(1600, 2303));
+}
+
 TEST(CountCheck, EncoderThatIsOffForAWhile_IsRefusedUntilItIsBack) {
   auto counts = Swing(4000);
   for (int k = 1600; k < 2600; ++k) counts[k] += 1 << 14;

@@ -173,16 +173,18 @@ class Controller {
     live_.enabled_axes = enabled_axes_.load(std::memory_order_relaxed);
     live_.clamp_count = clamp_count_.load(std::memory_order_relaxed);
     live_.sample_gaps = intake_.refused();
+    live_.implausible_ticks = intake_.implausible();
     (Show(k, estimator<k>()), ...);
   }
   template <class Estimator>
   void Show(std::size_t k, Estimator& estimator) {
     estimator::Estimates<Model>& e = estimates_[k];
     if (!estimator.Take(e)) return;
-    live_.rows_used[k] = live_.rows_gated[k] = 0;
+    live_.rows_used[k] = live_.rows_gated[k] = live_.rows_outside[k] = 0;
     for (int i = 0; i < n; ++i) {
       live_.rows_used[k] += e.rows_used[i];
       live_.rows_gated[k] += e.rows_gated[i];
+      live_.rows_outside[k] += e.rows_outside[i];
     }
     const auto bit = static_cast<std::uint16_t>(1u << k);
     live_.health = static_cast<std::uint16_t>(e.inconsistent ? live_.health | bit : live_.health & ~bit);

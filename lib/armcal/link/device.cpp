@@ -19,6 +19,7 @@ Status Device::ServeOwn() {
   const Block blocks[] = {
       FilledBlock<reg::kIdentityBlock, &Device::FillIdentity>(this),
       FilledBlock<reg::kStatusBlock, &Device::FillStatus>(this),
+      FilledBlock<reg::kDoubtBlock, &Device::FillDoubt>(this),
       FilledBlock<reg::kResidualHeaderBlock, &Device::FillResidualHeader>(this),
       DirectBlock<&FloatList::Read>(reg::kResidualValuesBlock, &residual_values_),
       FilledBlock<reg::kCommandBlock, &Device::FillCommand, &Device::TakeCommand>(this),
@@ -100,6 +101,13 @@ void Device::FillStatus(Words<reg::kStatusBlock>& w) {
   w.Set<reg::kRowsGatedA>(live_.rows_gated[0]);
   w.Set<reg::kRowsUsedB>(live_.rows_used[1]);
   w.Set<reg::kRowsGatedB>(live_.rows_gated[1]);
+}
+
+void Device::FillDoubt(Words<reg::kDoubtBlock>& w) {
+  w.Set<reg::kRowsOutsideA>(live_.rows_outside[0]);
+  w.Set<reg::kRowsOutsideB>(live_.rows_outside[1]);
+  w.Set<reg::kImplausibleTicks>(live_.implausible_ticks);
+  w.Set<reg::kTableFallbacks>(transaction_.store().fallbacks());
 }
 
 // Lock and tables ----------------------------------------------------------------------------------------------------

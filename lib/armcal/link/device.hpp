@@ -33,6 +33,8 @@ struct LiveStatus {
   std::uint16_t health = 0;         // bit k: filter k's deviations are smaller than its innovations
   std::uint32_t rows_used[2] = {};  // filter A, B
   std::uint32_t rows_gated[2] = {};
+  std::uint32_t rows_outside[2] = {};
+  std::uint32_t implausible_ticks = 0;
 };
 
 // The residual statistics of one joint at one instant. SPEC.md lists the values.
@@ -101,6 +103,7 @@ class Device {
 
   void FillIdentity(Words<reg::kIdentityBlock>& w);
   void FillStatus(Words<reg::kStatusBlock>& w);
+  void FillDoubt(Words<reg::kDoubtBlock>& w);
   void FillUnlock(Words<reg::kUnlock>& w);
   core::Status TakeUnlock(const Words<reg::kUnlock>& w);
   void FillCommand(Words<reg::kCommandBlock>& w);

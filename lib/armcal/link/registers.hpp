@@ -114,7 +114,7 @@ inline constexpr std::uint16_t kVendor = 0x8000;
 
 // Values that never change.
 inline constexpr std::uint32_t kMagicValue = 0x41524D43;  // "ARMC"
-inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 2;
+inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 3;
 inline constexpr float kProbeFloatValue = 123456.789f;  // reads 123456.79 only with the right word order
 inline constexpr std::uint32_t kProbeU32Value = 0x12345678;
 
@@ -161,7 +161,7 @@ inline constexpr Register kTick = In(0x0046, 1, kU32, "tick", "", "control ticks
 inline constexpr Register kActiveCrc = In(0x0048, 1, kU32, "active_crc", "", "CRC-32 over the active table's registers");
 inline constexpr Register kCommandSequence = In(0x004A, 1, kU32, "command_sequence", "", "of the last command accepted");
 inline constexpr Register kStoreSequence = In(0x004C, 1, kU32, "store_sequence", "", "of the stored table in force, 0: none");
-inline constexpr Register kSlotState = In(0x004E, 2, kU16, "slot_state", "", "storage slots: 0 blank, 1 good, 2 other schema, 3 corrupt");
+inline constexpr Register kSlotState = In(0x004E, 2, kU16, "slot_state", "", "storage slots: 0 blank, 1 good, 2 other schema, 3 corrupt, 4 refused at boot");
 inline constexpr Register kEnabledAxes = In(0x0050, 1, kU32, "enabled_axes", "", "bit i: axis i is enabled");
 inline constexpr Register kClampCount = In(0x0052, 1, kU32, "clamp_count", "", "feed-forward values cut to their limit");
 inline constexpr Register kSampleGaps = In(0x0054, 1, kU32, "sample_gaps", "", "samples refused because the estimator was behind");
@@ -178,6 +178,11 @@ inline constexpr Register kRowsGatedA = In(0x0062, 1, kU32, "rows_gated_a", "", 
 inline constexpr Register kRowsUsedB = In(0x0064, 1, kU32, "rows_used_b", "", "as above, filter B");
 inline constexpr Register kRowsGatedB = In(0x0066, 1, kU32, "rows_gated_b", "", "as above, filter B");
 inline constexpr Span kStatusBlock = Between(kTransactionState, kRowsGatedB);
+inline constexpr Register kRowsOutsideA = In(0x0068, 1, kU32, "rows_outside_a", "", "rows in motion that the innovation gate kept from filter A since the adoption");
+inline constexpr Register kRowsOutsideB = In(0x006A, 1, kU32, "rows_outside_b", "", "as above, filter B");
+inline constexpr Register kImplausibleTicks = In(0x006C, 1, kU32, "implausible_ticks", "", "ticks with a count or current that the arm cannot have made");
+inline constexpr Register kTableFallbacks = In(0x006E, 1, kU32, "table_fallbacks", "", "stored tables passed over since power-up: not readable any more, or refused at boot");
+inline constexpr Span kDoubtBlock = Between(kRowsOutsideA, kTableFallbacks);
 inline constexpr Span kErrorBlock = Between(kErrorException, kErrorStatus);
 
 // Estimates: lists of floats, one a joint or one a column.
@@ -255,6 +260,7 @@ inline constexpr const Register* kDeclared[] = {
   &kTransactionState, &kTransactionStatus, &kTableStatus, &kFeedForwardState, &kGeneration, &kTick, &kActiveCrc, &kCommandSequence,
   &kStoreSequence, &kSlotState, &kEnabledAxes, &kClampCount, &kSampleGaps, &kRequestCount, &kErrorException, &kErrorFunction,
   &kErrorAddress, &kErrorStatus, &kErrorRequest, &kUnlocked, &kHealth, &kRowsUsedA, &kRowsGatedA, &kRowsUsedB, &kRowsGatedB,
+  &kRowsOutsideA, &kRowsOutsideB, &kImplausibleTicks, &kTableFallbacks,
   &kResidualRms, &kConsistency, &kEstimateA, &kDeviationA, &kEstimateB, &kDeviationB,
   &kResidualJoint, &kResidualSnapshot, &kResidualGeneration, &kResidualElapsed, &kResidualSigma, &kResidualReference, &kResidualRecent,
   &kResidualHistory,

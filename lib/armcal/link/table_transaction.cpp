@@ -25,7 +25,12 @@ TableTransaction::TableTransaction(const TableApplication& application, table::T
 Status TableTransaction::Boot() {
   table_status_ = store_.Load(staged_);
   if (!core::IsOk(table_status_)) return table_status_;
+  // A record that the application refuses is as good as none: the older one has its turn.
   table_status_ = application_.check(application_.context, staged_);
+  for (int slot = 0; slot < table::TableStore::kSlots && !core::IsOk(table_status_); ++slot) {
+    if (!core::IsOk(store_.LoadOlder(staged_))) return table_status_;
+    table_status_ = application_.check(application_.context, staged_);
+  }
   if (!core::IsOk(table_status_)) return table_status_;
   state_ = TransactionState::kCommitting;
   phase_ = Phase::kBooting;

@@ -47,8 +47,9 @@ class TableTransaction {
                    std::uint16_t* staged, std::uint16_t* active, std::uint16_t words);
 
   // At power-up: loads the stored table, checks it and adopts it. The answer is kept as table_status(): kOk; what the
-  // store answers (kBlank, kCorrupt, kWrongSchema, kWrongSize); or why the application refused. kBusy: the application
-  // is still adopting, and Step() finishes it.
+  // store answers (kBlank, kCorrupt, kWrongSchema, kWrongSize); or why the application refused the last stored table
+  // that reads well: the newest is tried first, then the older one. kBusy: the application is still adopting, and
+  // Step() finishes it.
   core::Status Boot();
 
   // kWrongOrder: not in this state, or the sequence is 0 or was used with other content. kOutOfRange: no such command.

@@ -123,6 +123,33 @@ TEST(Controller, WithoutAStoredTable_LearnsFromTheDefaultsAndFeedsNothingForward
   EXPECT_GT(bench->Value<reg::kRowsUsedA>(), 0u);
 }
 
+// One tick with a count that is far off, and later ten ticks with a wrong torque: a register counts each.
+TEST(Controller, WhatIsRefused_IsServedInRegisters) {
+  const auto bench = std::make_unique<Bench<Forgetting, Block>>();
+  bench->Run(4000);
+  EXPECT_EQ((bench->Read<reg::kDoubtBlock>().template Get<reg::kImplausibleTicks>()), 0u);
+  const auto push = [&](auto change) {
+    model::RawSample<n> raw;
+    controller::SetPoint<n> set;
+    (void)bench->axes.Read(bench->now, raw, set);
+    change(raw);
+    ASSERT_EQ(bench->controller.Push(raw), Status::kOk);
+    ++bench->now;
+    bench->Idle();
+  };
+  push([](auto& raw) { raw.counts[1] ^= 1 << 20; });
+  bench->Run(999);
+  for (int k = 0; k < 10; ++k)
+    push([](auto& raw) { raw.current[1] = static_cast<std::int16_t>(raw.current[1] + 4000); });
+  bench->Run(2000);
+  const auto doubt = bench->Read<reg::kDoubtBlock>();
+  EXPECT_EQ(doubt.template Get<reg::kImplausibleTicks>(), 1u);
+  EXPECT_GT(doubt.template Get<reg::kRowsOutsideA>(), 0u);
+  EXPECT_LE(doubt.template Get<reg::kRowsOutsideA>(), 6u);
+  EXPECT_EQ(doubt.template Get<reg::kRowsOutsideB>(), doubt.template Get<reg::kRowsOutsideA>());
+  EXPECT_EQ(doubt.template Get<reg::kTableFallbacks>(), 0u);
+}
+
 TEST(Controller, ATableFlashed_IsInForceAndStaysSoAfterPowerUp) {
   const auto bench = std::make_unique<Bench<Forgetting>>();
   ASSERT_EQ(bench->Flash(estimator::DefaultTable<Model>()), Status::kOk);

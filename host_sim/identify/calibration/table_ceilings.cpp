@@ -58,7 +58,7 @@ core::Refusal JudgeGrid(const codegen::Model& m, const Ceilings& c, const model:
   codegen::Signals s;
   s.q = s.qd = s.temp = Eigen::MatrixXd(points * each, n);
   s.qdd = Eigen::MatrixXd::Zero(points * each, n);
-  s.t = Eigen::VectorXd::LinSpaced(points * each, 0, model::kGridStep_s * (points * each - 1));
+  s.t = Eigen::VectorXd::LinSpaced(points * each, 0, double{model::kGridStep_s} * (points * each - 1));
   for (int p = 0; p < points; ++p) {
     Eigen::VectorXd q(n), qd(n), temp(n);
     model::GridState(view, c.friction_reads, p, q.data(), qd.data(), temp.data());

@@ -57,7 +57,7 @@ TEST(TableCeilings, FrictionThatPushes_IsNamedByTheColumnThatDoes) {
   Fc.mean = 4, Fv.mean = -1.4;
   EXPECT_EQ(BeyondCeiling(model, t), "") << "4 - 1.4 * 3.49 = -0.9";
   Fv.mean = -1.6;
-  EXPECT_EQ(BeyondCeiling(model, t).substr(0, Fv.name.size() + 47),
+  EXPECT_EQ(BeyondCeiling(model, t).substr(0, Fv.name.size() + 48),
             Fv.name + ": mean: the joint's friction would push by 1.585");
 }
 
@@ -92,8 +92,8 @@ TEST(TableCeilings, NegativeCoefficientsWhoseSumBrakes_AreAccepted) {
   EXPECT_EQ(judged("viscous_asymmetry.dFv1", -2), "") << "10 + 3.5 - 2 * 3.5 forward";
   EXPECT_NE(judged("viscous_asymmetry.dFv1", -5), "");
   EXPECT_NE(judged("viscous_asymmetry.dFv1", 5), "");
-  EXPECT_EQ(judged("load_friction.f11", -0.2), "");
-  EXPECT_NE(judged("load_friction.f11", -0.9), "");
+  EXPECT_EQ(judged("load_friction.mu1", -0.2), "");
+  EXPECT_NE(judged("load_friction.mu1", -0.9), "");
   EXPECT_EQ(judged("torque_offset.To1", -50), "") << "no friction, and less than ten times its scale";
   EXPECT_NE(judged("torque_offset.To1", -61), "");
   EXPECT_NE(judged("presliding_dahl.Fc2", -5), "");

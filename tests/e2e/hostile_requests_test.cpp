@@ -95,7 +95,7 @@ TEST_F(HostileTables, AreRefused_AndTheTableInForceStays) {
   }
   for (const float friction : {-1e6f, 5000.0f})
     EXPECT_EQ(FlashWith(kFrictionOfJoint1, friction), Status::kBeyondCeiling) << friction;
-  for (const float friction : {-1000.0f, -40.0f})
+  for (const float friction : {-1000.0f, -80.0f})
     EXPECT_EQ(FlashWith(kFrictionOfJoint1, friction), Status::kFeedsEnergy) << friction;
   EXPECT_EQ(FlashWith(64, 1e30f), Status::kBeyondCeiling) << "mass of link 1";
   EXPECT_EQ(FlashWith(8, 1e-30f), Status::kBeyondCeiling) << "forgetting";

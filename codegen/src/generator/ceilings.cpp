@@ -14,6 +14,7 @@ constexpr double kPriorSpreads = 20;     // a body's mass, centre and inertia ma
 constexpr double kColumnSpreads = 10;    // a column: ten times its scale, which is a share of the joint's torque limit
 constexpr double kWiderSd = 10;          // a prior may be so many times wider than the default
 constexpr double kSmallestShare = 1e-6;  // of the torque ceiling: the least torque noise
+constexpr double kFrictionToTorque = 3;  // a law that fits warm oil is extrapolated to cold oil at full speed
 constexpr double kWiderStandstill = 10;  // friction is not fed forward below v_min
 constexpr unsigned kReadsPose = 1, kReadsTemperature = 2, kReadsHistory = 4;
 
@@ -26,7 +27,7 @@ Ceilings::OfJoint OfJoint(const Robot& r, int i) {
   const CeilingSettings& s = r.ceilings;
   const double torque = Own(s.torque_Nm, i, j.torque_limit_Nm);
   return {torque,
-          Own(s.friction_Nm, i, torque),
+          Own(s.friction_Nm, i, kFrictionToTorque * torque),
           s.feed_share * torque,
           s.torque_scale[0],
           s.torque_scale[1],

@@ -78,7 +78,7 @@ struct CeilingSettings {
   std::vector<double> torque_Nm, friction_Nm, noise_Nm;  // one a joint
   std::array<double, 2> torque_scale{0.5, 2.0};
   std::array<double, 2> temperature_degC{15.0, 60.0};  // where friction is tried
-  double feed_share = 0.02;  // of the torque ceiling: by so much may a joint's friction push where it should brake
+  double feed_share = 0.05;  // of the torque ceiling: by so much may a joint's friction push where it should brake
   double least_fade_ms = 500.0, longest_fade_ms = 1e6, least_forgetting = 0.9;
   std::map<std::string, std::array<double, 2>> parameter;  // name -> lowest and highest mean
 };

@@ -122,9 +122,13 @@ std::string BeyondCeiling(const codegen::Model& m, const TableFile& t) {
   const Compiled compiled(ceilings);
   const std::vector<std::uint16_t> words = EncodeTable(t);
   // Only the board knows whether it allows a bumpless table, so the drive is left to say it.
-  core::Refusal refusal = model::CheckWords(compiled.View(), true, words.data());
-  if (core::IsOk(refusal.status)) refusal = JudgeGrid(m, ceilings, compiled.View(), t);
-  return core::IsOk(refusal.status) ? "" : Named(t, refusal);
+  const core::Refusal refusal = model::CheckWords(compiled.View(), true, words.data());
+  if (!core::IsOk(refusal.status)) return Named(t, refusal);
+  const core::Refusal friction = JudgeGrid(m, ceilings, compiled.View(), t);
+  if (friction.status == core::Status::kBeyondCeiling)
+    return fmt::format("{}: the joint's friction would reach {:.6g} N m (N), expected at most {:.6g}",
+                       WordName(t, friction.word), friction.value, friction.bound);
+  return core::IsOk(friction.status) ? "" : Named(t, friction);
 }
 
 }  // namespace armcal::calibration

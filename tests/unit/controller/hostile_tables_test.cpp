@@ -125,8 +125,8 @@ class Hostile {
     if (k >= Model::kBodyParameters && Draw() % 2) {
       const int j = static_cast<int>(Draw() % n), Fc = Model::kBodyParameters + Model::kFrontBegin[j];
       const float push = Around(c.joint[j].feed_Nm), speed = c.joint[j].speed_radps;
-      Put(words, ParameterWord(Fc, 0), Draw() % 2 ? -push : Around(c.joint[j].friction_Nm) * 0.5f);
-      Put(words, ParameterWord(Fc + 1, 0), (Draw() % 2 ? -1.0f : 1.0f) * Around(c.joint[j].friction_Nm) * 0.5f / speed);
+      Put(words, ParameterWord(Fc, 0), Draw() % 2 ? -push : Around(c.joint[j].torque_Nm) * 0.5f);
+      Put(words, ParameterWord(Fc + 1, 0), (Draw() % 2 ? -1.0f : 1.0f) * Around(c.joint[j].torque_Nm) * 0.5f / speed);
     }
   }
 
@@ -174,8 +174,8 @@ void ExpectHarmless(const Words& words, const codegen::Robot& robot) {
     const double Fc = amplitude(3 * j), Fv = amplitude(3 * j + 1);
     for (int k = 3; k <= 1000; ++k) {
       const double braking = Fc + Fv * joint.speed_limit_radps * k / 1000;
-      ASSERT_GE(braking, -0.02001 * X) << "joint " << j + 1;
-      ASSERT_LE(braking, X * 1.00001) << "joint " << j + 1;
+      ASSERT_GE(braking, -0.05001 * X) << "joint " << j + 1;
+      ASSERT_LE(braking, 3 * X * 1.00001) << "joint " << j + 1;
     }
     EXPECT_LE(std::abs(amplitude(3 * j + 2)), X) << "offset of joint " << j + 1;
   }
@@ -383,12 +383,12 @@ TEST(Ceilings, ANegativeCoefficient_IsAcceptedAsLongAsTheSumBrakes) {
   };
   EXPECT_EQ(judged(60, 20).status, Status::kOk);
   EXPECT_EQ(judged(60, 0).status, Status::kOk);
-  EXPECT_EQ(judged(60, -29.9).status, Status::kOk) << "2 % of 1500 N m is the tolerance";
-  EXPECT_EQ(judged(60, -30.1).status, Status::kFeedsEnergy);
-  EXPECT_EQ(judged(-31, 300).status, Status::kFeedsEnergy) << "it pushes at low speed";
-  EXPECT_EQ(judged(10, 1510).status, Status::kBeyondCeiling) << "more than the joint's hardest torque";
-  EXPECT_NEAR(judged(60, -40).value, -40, 0.01);
-  EXPECT_EQ(judged(60, -40).word, ParameterWord(Model::kBodyParameters + 1, 0));
+  EXPECT_EQ(judged(60, -74.9).status, Status::kOk) << "5 % of 1500 N m is the tolerance";
+  EXPECT_EQ(judged(60, -75.1).status, Status::kFeedsEnergy);
+  EXPECT_EQ(judged(-78, 300).status, Status::kFeedsEnergy) << "it pushes at low speed";
+  EXPECT_EQ(judged(1400, 4600).status, Status::kBeyondCeiling) << "more than three times the joint's torque";
+  EXPECT_NEAR(judged(60, -90).value, -90, 0.01);
+  EXPECT_EQ(judged(60, -90).word, ParameterWord(Model::kBodyParameters + 1, 0));
 }
 
 }  // namespace

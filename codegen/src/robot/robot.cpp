@@ -97,6 +97,41 @@ void ReadDrive(const io::TomlReader& in, Joint& j, const std::string& unlimited)
   if (in.Table("motor").Has("rotor_inertia_kgm2")) j.wide.erase("Ia");
 }
 
+CeilingSettings ReadCeilings(const io::TomlReader& in, int joints) {
+  CeilingSettings c;
+  in.AllowOnly({"torque_Nm", "friction_Nm", "noise_Nm", "torque_scale", "temperature_degC", "feed_share",
+                "least_fade_ms", "longest_fade_ms", "least_forgetting", "parameter"});
+  const auto each = [&](std::string_view key, std::vector<double>& values) {
+    if (!in.Has(key)) return;
+    values = in.Numbers(key, static_cast<std::size_t>(joints));
+    for (const double v : values)
+      if (!(v > 0)) in.Fail(key, "numbers above zero, one a joint");
+  };
+  const auto range = [](const io::TomlReader& from, std::string_view key, std::array<double, 2>& values) {
+    if (!from.Has(key)) return;
+    const auto given = from.Numbers(key, 2);
+    if (!(given[0] <= given[1])) from.Fail(key, "[lowest, highest]");
+    values = {given[0], given[1]};
+  };
+  each("torque_Nm", c.torque_Nm);
+  each("friction_Nm", c.friction_Nm);
+  each("noise_Nm", c.noise_Nm);
+  range(in, "torque_scale", c.torque_scale);
+  if (!(c.torque_scale[0] > 0)) in.Fail("torque_scale", "[lowest, highest] above zero");
+  range(in, "temperature_degC", c.temperature_degC);
+  c.feed_share = in.NotNegative("feed_share", c.feed_share);
+  c.least_fade_ms = in.Positive("least_fade_ms", c.least_fade_ms);
+  c.longest_fade_ms = in.Positive("longest_fade_ms", c.longest_fade_ms);
+  if (c.longest_fade_ms < c.least_fade_ms || c.longest_fade_ms > 1e6)
+    in.Fail("longest_fade_ms", "least_fade_ms to 1000000");
+  c.least_forgetting = in.Positive("least_forgetting", c.least_forgetting);
+  if (c.least_forgetting > 1) in.Fail("least_forgetting", "a number above 0 and not above 1");
+  if (!in.Has("parameter")) return c;
+  const io::TomlReader parameter = in.Table("parameter");
+  for (const auto& [key, value] : parameter.table()) range(parameter, key.str(), c.parameter[std::string(key.str())]);
+  return c;
+}
+
 Joint ReadJoint(const io::TomlReader& in, bool has_prior) {
   Joint j;
   const std::string type = in.Text("type");
@@ -264,7 +299,7 @@ void ReadHead(const io::TomlReader& in, Robot& r) {
       {"name",           "title",        "source",       "gravity_mps2", "dh",      "sign_law", "sign_width_radps",
        "sign_width_mps", "tick_rate_Hz", "sample_ticks", "prior",        "control", "joint",    "effect",
        "coupling",       "base_frame",   "tool_frame",   "identified",   "urdf",    "tip",      "fixed",
-       "parameters",     "payload"});
+       "parameters",     "payload",      "ceilings"});
   r.name = in.Text("name");
   if (in.Has("name") &&
       (r.name.empty() || r.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos))
@@ -347,6 +382,7 @@ Robot ReadRobot(const std::filesystem::path& path) {
     if (kind != "base" && kind != "standard") set.Report("set", "\"base\" or \"standard\"");
     r.parameters = {kind == "standard", ReadBodyParameters(set, "prefer", n), ReadBodyParameters(set, "omit", n)};
   }
+  if (chain_known && in.Has("ceilings")) r.ceilings = ReadCeilings(in.Table("ceilings"), n);
   if (chain_known)
     for (const io::TomlReader& use : in.Tables("effect")) r.effect.push_back(ReadEffectUse(use, n));
   if (chain_known && in.Has("control")) {

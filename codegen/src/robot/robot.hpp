@@ -81,6 +81,17 @@ struct UrdfChoice {
   std::map<std::string, double> fixed;  // joints that are held at a position, rad or m
 };
 
+// What [ceilings] says about the hardest values that a table of this robot may hold. What is empty or absent follows
+// from the robot's limits and prior.
+struct CeilingSettings {
+  std::vector<double> torque_Nm, friction_Nm, noise_Nm;  // one a joint
+  std::array<double, 2> torque_scale{0.5, 2.0};
+  std::array<double, 2> temperature_degC{15.0, 60.0};  // where friction is tried
+  double feed_share = 0.05;  // of the torque ceiling: by so much may a joint's friction push where it should brake
+  double least_fade_ms = 500.0, longest_fade_ms = 1e6, least_forgetting = 0.9;
+  std::map<std::string, std::array<double, 2>> parameter;  // name -> lowest and highest mean
+};
+
 struct Robot {
   std::string name, title, source, path;
   UrdfChoice urdf;                       // no path: DH rows
@@ -95,6 +106,7 @@ struct Robot {
   std::vector<double> coupling;  // row-major C of q_motor = C q; empty: unit
   std::vector<EffectUse> effect;
   ParameterSet parameters;
+  CeilingSettings ceilings;
   Control control;
   // Frame 0 seen from the base frame, in which gravity is given; the translation is seen in no torque. Rows of R.
   std::array<double, 3> base_xyz_m{};

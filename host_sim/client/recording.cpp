@@ -129,8 +129,14 @@ Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot&
   Player player;
   {
     report::Progress progress("record");
+    // A drive in virtual time stands still soon after the motion, and then there are no more records. The tick of a
+    // real drive goes on: what comes half a second later belongs to no motion.
     int quiet = 0;  // looks in a row that found nothing after the motion
-    for (bool moved = false; quiet < 10;) {
+    const auto rest_ticks = static_cast<std::int32_t>(0.5 * robot.tick_rate_Hz);
+    const auto over = [&](const TraceRecords& r) {
+      return !r.ticks.empty() && static_cast<std::int32_t>(r.ticks.back() - player.last_tick) > rest_ticks;
+    };
+    for (bool moved = false, done = false; !done;) {
       const std::size_t got = traces.Take(recording);
       player = ReadPlayer(drive);
       moved =
@@ -139,7 +145,10 @@ Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot&
         progress.Set(std::max(
             0.0, static_cast<double>(static_cast<std::int32_t>(recording.raw.ticks.back() - player.first_tick)) /
                      robot.tick_rate_Hz / trajectory.duration_s() * o.speed_percent / 100));
-      quiet = moved && !player.moving() && got == 0 ? quiet + 1 : 0;
+      const bool ended = moved && !player.moving();
+      quiet = ended && got == 0 ? quiet + 1 : 0;
+      const bool all_came = over(recording.raw) && (o.samples.empty() || over(recording.samples));
+      done = ended && (quiet == 10 || all_came || player.state == PlayerState::kStopped);
     }
   }
   traces.Stop();

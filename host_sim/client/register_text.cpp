@@ -56,6 +56,16 @@ StatusText TextOf(Status status) {
       return {"ReadOnly", "this register cannot be written"};
     case Status::kBusy:
       return {"Busy", "an earlier command is still running"};
+    case Status::kBeyondCeiling:
+      return {"BeyondCeiling", "a number lies beyond the hardest value that the firmware allows"};
+    case Status::kFeedsEnergy:
+      return {"FeedsEnergy", "a joint's friction would push instead of brake"};
+    case Status::kForbidden:
+      return {"Forbidden", "the board does not allow it"};
+    case Status::kSeatTaken:
+      return {"SeatTaken", "another connection is writing"};
+    case Status::kTooSoon:
+      return {"TooSoon", "the board allows no further save yet"};
     case Status::kStorageFault:
       return {"StorageFault", "the storage refused, or returned what was not written"};
     case Status::kBlank:

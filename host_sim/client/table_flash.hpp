@@ -19,7 +19,8 @@ struct FlashReport {
 // Called with 0 to 1 while the table is on its way.
 using FlashProgress = std::function<void(double share)>;
 
-// Unlocks, opens, stages the words, checks, saves, waits and reads back. `words`: the layout of model/parameters.hpp,
+// Unlocks, opens, stages the words, checks, saves, waits and reads back. If another client is writing, it waits for the
+// seat. If the connection breaks or a word is damaged on the way, it begins anew. `words`: the layout of model/parameters.hpp,
 // whose first two words are the schema. Throws RefusedError (the table before it stays in force and stored),
 // VerifyError (the drive says that the table is active, but it reads back otherwise) and LinkError.
 FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress = {});

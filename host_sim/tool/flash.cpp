@@ -7,6 +7,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/data/report/progress.hpp"
+#include "host_sim/identify/calibration/table_ceilings.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -46,6 +47,8 @@ int Flash(const FlashOptions& o) {
   calibration::TableFile sent;
   std::vector<std::string> missing;
   const auto words = WordsFor(drive, o, sent, missing);
+  if (const std::string beyond = calibration::BeyondCeiling(LoadModel(o.robot), sent); !beyond.empty())
+    throw io::InputError(fmt::format("{}: {}, by [ceilings] of {}", o.table, beyond, o.robot));
   for (const std::string& name : missing) fmt::print("not in {}, kept as in the drive: {}\n", o.table, name);
   int kept = 0;
   for (const auto& row : sent.row) kept += row.from_prior;
@@ -95,6 +98,29 @@ int Verify(const FlashOptions& o) {
   return same ? kOk : kMismatch;
 }
 
+// Runs a verb. If it fails, the JSON says so: what went wrong, and the exit code that main() makes of it.
+int Reported(const FlashOptions& o, int (*verb)(const FlashOptions&)) {
+  const auto failed = [&](const std::exception& e, int code, const char* what) {
+    WriteJson(o.json, {{what, false}, {"error", e.what()}, {"exit_code", code}});
+  };
+  const char* const what = verb == Flash ? "readback_ok" : "same";
+  try {
+    return verb(o);
+  } catch (const client::LinkError& e) {
+    failed(e, kLink, what);
+    throw;
+  } catch (const client::RefusedError& e) {
+    failed(e, kRefused, what);
+    throw;
+  } catch (const client::VerifyError& e) {
+    failed(e, kMismatch, what);
+    throw;
+  } catch (const std::exception& e) {
+    failed(e, kBadInput, what);
+    throw;
+  }
+}
+
 CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std::shared_ptr<FlashOptions>& o) {
   auto* verb = app.add_subcommand(name, help);
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
@@ -114,7 +140,7 @@ void AddFlash(CLI::App& app, Action& action) {
                          "--connect 127.0.0.1:1502 --robot er20_like --table build/table.toml",
                          o);
   verb->add_flag("--dry-run", o->dry_run, "check and say what would be sent");
-  verb->callback([o, &action] { action = [o] { return Flash(*o); }; });
+  verb->callback([o, &action] { action = [o] { return Reported(*o, Flash); }; });
 }
 
 void AddVerify(CLI::App& app, Action& action) {
@@ -123,7 +149,7 @@ void AddVerify(CLI::App& app, Action& action) {
                          "compare the table in force with a file\nexample: armcal verify --connect 127.0.0.1:1502 "
                          "--robot er20_like --table build/table.toml",
                          o);
-  verb->callback([o, &action] { action = [o] { return Verify(*o); }; });
+  verb->callback([o, &action] { action = [o] { return Reported(*o, Verify); }; });
 }
 
 }  // namespace armcal::tool

@@ -7,8 +7,10 @@
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 #include "host_sim/identify/calibration/payload.hpp"
+#include "host_sim/identify/calibration/table_ceilings.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/identify/methods/closed_loop.hpp"
 #include "host_sim/identify/methods/method.hpp"
@@ -137,6 +139,14 @@ void Check(const PayloadOptions& o) {
     throw io::InputError("--table-out: expected --payload FILE; a load at the flange has no place in a table");
 }
 
+// A table that a drive would refuse is written all the same: a robot file with other ceilings may be what is wrong.
+void SaveTable(const std::string& path, const codegen::Model& model, const calibration::TableFile& table) {
+  calibration::WriteTable(path, table);
+  fmt::print("written: {}\n", path);
+  if (const std::string beyond = calibration::BeyondCeiling(model, table); !beyond.empty())
+    fmt::print(stderr, "armcal: {}: a drive would refuse this table: {}\n", path, beyond);
+}
+
 // The declared model fitted to the runs without payload in true torque; the gains become the table's torque scales.
 void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vector<calibration::Dataset> without,
                 const std::vector<DriveGain>& gains) {
@@ -157,8 +167,7 @@ void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vecto
   calibration::TableFile table = calibration::IdentifiedTable(
       known, all, held, calibration::ReadOutPhysical(known, held), without[0].s.t[1] - without[0].s.t[0]);
   for (std::size_t j = 0; j < scale.size(); ++j) table.joint[j].torque_scale *= scale[j];
-  calibration::WriteTable(o.table, table);
-  fmt::print("written: {}\n", o.table);
+  SaveTable(o.table, model, table);
 }
 
 int RunGains(const PayloadOptions& o, const codegen::Model& model, const LogReader& read) {
@@ -319,6 +328,7 @@ int RunIdentify(const IdentifyOptions& o) {
   MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, o.cutoff_Hz, {}};
   if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
+  if (model.robot().has_prior) calibration::RequirePhysicalPrior(model);  // before the fit, not after it
   const LogReader read(model, o.channels, o.cutoff_Hz);
   std::vector<calibration::Dataset> train = read.All(o.train);
   read.PrintUntold(train);
@@ -361,10 +371,7 @@ int RunIdentify(const IdentifyOptions& o) {
         from_prior, table.row.size(), calibration::kFromPrior, calibration::IsPhysical(bodies.bodies) ? "yes" : "no");
     json["physical"] = calibration::IsPhysical(bodies.bodies);
     json["from_prior"] = from_prior;
-    if (!o.table.empty()) {
-      calibration::WriteTable(o.table, table);
-      fmt::print("written: {}\n", o.table);
-    }
+    if (!o.table.empty()) SaveTable(o.table, model, table);
   } else if (!o.table.empty()) {
     throw io::InputError(o.robot + ": prior = \"none\": a table needs standard parameters, and those need a prior");
   }

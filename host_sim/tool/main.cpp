@@ -27,7 +27,9 @@ int Main(int argc, char** argv) {
   AddEvaluate(app, action);
   AddReplay(app, action);
   AddDiagnose(app, action);
+  AddImport(app, action);
   AddGenerate(app, action);
+  AddExport(app, action);
   AddFlash(app, action);
   AddVerify(app, action);
   AddHealth(app, action);

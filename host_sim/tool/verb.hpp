@@ -19,6 +19,7 @@ enum ExitCode : int { kOk = 0, kBadInput = 2, kLink = 3, kRefused = 4, kMismatch
 // The verb's work; its return value is the exit code. Set by the parsed subcommand, run by main.
 using Action = std::function<int()>;
 
+void AddImport(CLI::App& app, Action& action);
 void AddGenerate(CLI::App& app, Action& action);
 void AddSimulate(CLI::App& app, Action& action);
 void AddExcite(CLI::App& app, Action& action);
@@ -28,6 +29,7 @@ void AddIdentify(CLI::App& app, Action& action);
 void AddEvaluate(CLI::App& app, Action& action);
 void AddReplay(CLI::App& app, Action& action);
 void AddDiagnose(CLI::App& app, Action& action);
+void AddExport(CLI::App& app, Action& action);
 void AddFlash(CLI::App& app, Action& action);
 void AddVerify(CLI::App& app, Action& action);
 void AddHealth(CLI::App& app, Action& action);

@@ -28,7 +28,8 @@ TcpServer::TcpServer(const ByteService& service, const hardware::Clock& clock, c
     : service_(service), clock_(clock), limits_(limits) {}
 
 TcpServer::~TcpServer() {
-  for (Slot& slot : slots_) Close(slot);
+  for (const Slot& slot : slots_)
+    if (slot.socket >= 0) ::close(slot.socket);
   if (listener_ >= 0) ::close(listener_);
 }
 
@@ -86,19 +87,53 @@ Status TcpServer::Poll(int timeout_ms) {
 }
 
 void TcpServer::Accept() {
-  const int socket = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  sockaddr_in from{};
+  socklen_t size = sizeof from;
+  const int socket = ::accept4(listener_, reinterpret_cast<sockaddr*>(&from), &size, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (socket < 0) return;
-  for (int i = 0; i < kSlots; ++i) {
-    if (slots_[i].socket >= 0) continue;
-    const int on = 1;
-    ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    slots_[i] = Slot{};
-    slots_[i].socket = socket;
-    slots_[i].active_ms = clock_.Ms();
-    service_.open(service_.context, i);
+  const std::uint32_t address = from.sin_addr.s_addr;
+  const int i = FreeSlot(address);
+  if (i < 0) {
+    ::close(socket);
     return;
   }
-  ::close(socket);
+  const int on = 1;
+  ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  slots_[i] = Slot{};
+  slots_[i].socket = socket;
+  slots_[i].address = address;
+  slots_[i].active_ms = clock_.Ms();
+  service_.open(service_.context, i);
+}
+
+// -1: there is none for this address.
+int TcpServer::FreeSlot(std::uint32_t address) {
+  for (int i = 0; i < kSlots; ++i)
+    if (slots_[i].socket < 0) return i;
+  return MakeRoom(address);
+}
+
+// All slots are taken. Closes the connection that has to go, and returns its slot.
+int TcpServer::MakeRoom(std::uint32_t address) {
+  const auto held = [&](std::uint32_t by) {
+    int count = 0;
+    for (const Slot& slot : slots_) count += slot.address == by;
+    return count;
+  };
+  const bool has_some = held(address) > 0;
+  int most = 2;  // an address with one connection keeps it
+  for (const Slot& slot : slots_) most = held(slot.address) > most ? held(slot.address) : most;
+  const std::uint32_t now = clock_.Ms();
+  int goes = -1;
+  for (int i = 0; i < kSlots; ++i) {
+    const Slot& slot = slots_[i];
+    const bool may_go =
+        has_some ? slot.address == address && now - slot.active_ms >= limits_.unused_ms : held(slot.address) >= most;
+    if (!may_go || (service_.keep != nullptr && service_.keep(service_.context, i))) continue;
+    if (goes < 0 || now - slot.active_ms > now - slots_[goes].active_ms) goes = i;
+  }
+  if (goes >= 0) Close(slots_[goes]);
+  return goes;
 }
 
 // Sends what waits. Then receives and answers until no request is there, or the socket takes no more of a reply.
@@ -162,7 +197,10 @@ void TcpServer::CloseLate(Slot& slot) {
 }
 
 void TcpServer::Close(Slot& slot) {
-  if (slot.socket >= 0) ::close(slot.socket);
+  if (slot.socket >= 0) {
+    ::close(slot.socket);
+    if (service_.close != nullptr) service_.close(service_.context, static_cast<int>(&slot - slots_));
+  }
   slot = Slot{};
 }
 

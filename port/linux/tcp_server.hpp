@@ -12,7 +12,8 @@
 namespace armcal::port_linux {
 
 // The service. `receive` takes at most one request out of `bytes`, says in `used` how many bytes it took, and puts the
-// reply into `reply` [max_reply]. It answers false if the connection should be closed.
+// reply into `reply` [max_reply]. It answers false if the connection should be closed. `close`: the slot's connection
+// is gone. `keep`: the slot's connection should not make room for another one.
 struct ByteService {
   void* context;
   std::size_t max_reply;
@@ -20,15 +21,21 @@ struct ByteService {
   bool (*receive)(void* context, int slot, const std::uint8_t* bytes, std::size_t count, std::size_t* used,
                   std::uint8_t* reply, std::size_t* reply_bytes);
   bool (*mid_frame)(void* context, int slot);
+  void (*close)(void* context, int slot) = nullptr;
+  bool (*keep)(void* context, int slot) = nullptr;
 };
 
 struct TcpLimits {
   std::uint32_t idle_ms = 60000;          // a connection without any byte is closed; 0: never
   std::uint32_t partial_frame_ms = 2000;  // and one whose frame is not complete after this time
+  std::uint32_t unused_ms = 10000;        // one without a byte for so long makes room for the next of its address
 };
 
 // It has fixed slots and one thread, and it never waits for a client. From a client that does not read its replies it
-// reads no requests. A connection for which there is no slot is accepted and closed. Context of every call: background.
+// reads no requests. While slots are free, any address gets one. When all are taken, one is kept for an address that
+// has none: the address with the most connections then loses the one that has been silent longest. An address that has
+// some may replace an unused one of its own. A connection that the service keeps is never closed for another one. A
+// connection for which there is no slot is accepted and closed. Context of every call: background.
 class TcpServer {
  public:
   static constexpr int kSlots = 4;
@@ -52,6 +59,7 @@ class TcpServer {
  private:
   struct Slot {
     int socket = -1;
+    std::uint32_t address = 0;          // the client's
     std::vector<std::uint8_t> in, out;  // bytes received and not yet taken; bytes of replies not yet sent
     std::uint32_t active_ms = 0;        // time of the last byte in either direction
     std::uint32_t frame_ms = 0;         // time when the incomplete frame began
@@ -61,6 +69,8 @@ class TcpServer {
 
   core::Status Fail(core::Status status, const std::string& what);
   void Accept();
+  int FreeSlot(std::uint32_t address);
+  int MakeRoom(std::uint32_t address);
   void Serve(int slot);
   void Receive(Slot& slot);
   bool Answer(int index);

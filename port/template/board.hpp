@@ -16,6 +16,9 @@ inline armcal::hardware::Storage Storage() { return target::TargetStorage(); }
 inline armcal::hardware::Clock Clock() { return target::TargetClock(); }
 inline armcal::hardware::Serial Serial() { return target::TargetSerial(); }
 
+// What a client may do. The defaults: a table is adopted only while all axes are disabled; five saves, then one a minute.
+inline armcal::controller::BoardRules Rules() { return {}; }
+
 // Answers which axes are under control, one bit for each.
 template <int n>
 std::uint32_t Measure(armcal::model::RawSample<n>& raw, armcal::controller::SetPoint<n>& set) {

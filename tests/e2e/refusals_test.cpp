@@ -135,11 +135,14 @@ class Flashing : public testing::Test {
     return Tool({verb, "--connect", drive_.address(), "--robot", robot, "--table", table, "--json",
                  (folder_ / "out.json").string()});
   }
-  // Refused with this code, nothing reported as done, and the table before it is still in force.
+  // Refused with this code, reported as not done, and the table before it is still in force.
   void ExpectFlashRefused(const std::string& table, int code, const std::string& named,
                           const std::string& robot = "er20_like") {
     ExpectOneLine(Verb("flash", table, robot), code, named);
-    EXPECT_FALSE(fs::exists(folder_ / "out.json"));
+    const nlohmann::json report = ReadJson(folder_ / "out.json");
+    EXPECT_FALSE(report.at("readback_ok").get<bool>());
+    EXPECT_EQ(report.at("exit_code"), code);
+    EXPECT_NE(report.at("error").get<std::string>().find(named), std::string::npos) << report;
     EXPECT_EQ(Verb("verify", good_).code, 0);
   }
   void SetUp() override {
@@ -159,7 +162,7 @@ class Flashing : public testing::Test {
 
 TEST_F(Flashing, TablesThatCannotBe_AreRefusedAndTheOldOneStays) {
   calibration::TableFile t = table_;
-  t.row[22 + 4].mean = -5;  // Ixx of link 3
+  t.row[22 + 4].mean = 1e-6;  // Ixx of link 3, whose Iyy and Izz are not alike
   ExpectFlashRefused(File("unphysical.toml", t), kRefused, "nphysical");
   t = table_;
   t.joint.pop_back();
@@ -168,6 +171,23 @@ TEST_F(Flashing, TablesThatCannotBe_AreRefusedAndTheOldOneStays) {
   t.row[70].state = "guessed";
   ExpectFlashRefused(File("state.toml", t), kBadInput, "state");
   ExpectFlashRefused((folder_ / "absent.toml").string(), kBadInput, "absent.toml");
+}
+
+// The tool refuses them before anything is sent, by the name of the number and with its bound.
+TEST_F(Flashing, TablesBeyondTheCeilings_AreRefusedByTheTool) {
+  calibration::TableFile t = table_;
+  t.joint[1].torque_limit_Nm = 1e30;
+  ExpectFlashRefused(File("limit.toml", t), kBadInput,
+                     "limit.toml: joint 2: torque_limit_Nm is 1.00000002e+30, expected at most 2200");
+  t = table_;
+  t.row[66].mean = -99999;
+  ExpectFlashRefused(File("friction.toml", t), kBadInput, "friction.toml: " + t.row[66].name + ": mean is -99999");
+  t = table_;
+  t.row[66].mean = 60, t.row[67].mean = -60;
+  ExpectFlashRefused(File("pushes.toml", t), kBadInput, t.row[67].name + ": mean: the joint's friction would push by");
+  t = table_;
+  t.row[66].mean = 60, t.row[67].mean = -10;  // rises less than in proportion to speed
+  EXPECT_EQ(Verb("flash", File("sublinear.toml", t)).code, 0);
 }
 
 TEST_F(Flashing, AnotherSchema_IsRefused) {

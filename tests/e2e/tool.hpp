@@ -90,12 +90,14 @@ inline void ExpectOneLine(const Outcome& o, int code, const std::string& named) 
 // A simulated drive on a free port, ended with the object.
 class RunningDrive {
  public:
-  explicit RunningDrive(const fs::path& folder, const std::string& scenario = "none") {
+  explicit RunningDrive(const fs::path& folder, const std::string& scenario = "none",
+                        const std::vector<std::string>& more = {}) {
     int pipe_ends[2];
     if (pipe2(pipe_ends, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
-    child_ = Start(
-        {ARMCAL_TOOL, "simulate", "--scenario", scenario, "--port", "0", "--storage", (folder / "drive.nor").string()},
-        pipe_ends[1], STDERR_FILENO);
+    std::vector<std::string> words = {ARMCAL_TOOL, "simulate", "--scenario", scenario,
+                                      "--port",    "0",        "--storage",  (folder / "drive.nor").string()};
+    words.insert(words.end(), more.begin(), more.end());
+    child_ = Start(words, pipe_ends[1], STDERR_FILENO);
     close(pipe_ends[1]);
     std::string line;
     for (char c = 0; read(pipe_ends[0], &c, 1) == 1 && c != '\n';) line += c;

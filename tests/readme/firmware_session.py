@@ -125,9 +125,10 @@ def session(line):
     assert all(map(math.isfinite, values)) and min(values[columns:]) >= 0.0, values
     assert line.read(4, 0x0043, 1) == [0], "feed-forward without a table"
 
-    # A table, as SPEC.md says: unlock, open, words, check, save. All axes are enabled: it must be bumpless.
+    # A table, as SPEC.md says: unlock, open, words, check, save. All axes are enabled: it must be bumpless, and fade.
     table = line.read(3, 0x2000, size)
     table[5] |= 1
+    table[7] = 500
     data = struct.pack(f">{size}H", *table)
     crc, opened, check, save = zlib.crc32(data), 0x6E65706F, 0x6B656863, 0x65766173
     try:

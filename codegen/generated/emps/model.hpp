@@ -10,6 +10,7 @@
 
 #include "armcal/math/elementary.hpp"
 #include "armcal/math/mul_add.hpp"
+#include "armcal/model/ceilings.hpp"
 #include "armcal/model/contract.hpp"
 
 namespace armcal::generated {
@@ -70,6 +71,27 @@ struct Emps {
       {"Fv1", "N*m*s/rad", 0.0f, 210.89999389648438f, 0.0f, kInfinity, 0.004447881132364273f, ParameterState::kEstimated, 1},
       {"torque_offset.To1", "N*m", 0.0f, 35.150001525878906f, -kInfinity, kInfinity, 0.0f, ParameterState::kEstimated, 2},
   };
+  // The hardest values that a table may hold: model/ceilings.hpp. They are no part of the schema.
+  static constexpr model::Ceilings<kJoints, kParameters> kCeilings = {
+      {500u, 1000000u, 0.8999999761581421f, 15.0f, 60.0f},
+      {{351.5f, 1054.5f, 17.575000762939453f, 0.5f, 2.0f, 0.00035149999894201756f, 351.5f, 4.999999873689376e-05f, 0.05000000074505806f, 0.5f, -0.10000000149011612f, 0.5f}},
+      {{0.0f, 20001.0f, 10000.0f, 0.0f},
+       {-20000.0f, 20000.0f, 10000.0f, 0.0f},
+       {-20000.0f, 20000.0f, 10000.0f, 0.0f},
+       {-20000.0f, 20000.0f, 10000.0f, 0.0f},
+       {0.0f, 20000.009765625f, 10000.0f, 0.0f},
+       {-20000.0f, 20000.0f, 10000.0f, 0.0f},
+       {-20000.0f, 20000.0f, 10000.0f, 0.0f},
+       {0.0f, 20000.009765625f, 10000.0f, 0.0f},
+       {-20000.0f, 20000.0f, 10000.0f, 0.0f},
+       {0.0f, 20000.009765625f, 10000.0f, 0.0f},
+       {0.0f, 10000.0f, 10000.0f, 0.0f},
+       {-351.5f, 351.5f, 351.5f, 123.55225372314453f},
+       {-2109.0f, 2109.0f, 2109.0f, 4447.880859375f},
+       {-351.5f, 351.5f, 351.5f, 123.55225372314453f}}};
+  static constexpr bool kFriction[kFront > 0 ? kFront : 1] = {
+      true, true, false};
+  static constexpr unsigned kFrictionReads = 0u;
 
   // What each function needs and gives: armcal/model/contract.hpp. Context: any; straight-line.
   template <class T>

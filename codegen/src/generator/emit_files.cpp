@@ -1,8 +1,11 @@
 // generator - the text of each generated file: model.hpp, dynamics.hpp, registers.hpp, model.json, COLUMNS.md.
+#include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "codegen/src/generator/ceilings.hpp"
 #include "codegen/src/generator/dynamics.hpp"
 #include "codegen/src/generator/emit_text.hpp"
 
@@ -18,6 +21,37 @@ std::string Hex(std::uint32_t v) {
 
 std::string State(const std::string& s) {
   return "ParameterState::k" + std::string(1, static_cast<char>(std::toupper(s[0]))) + s.substr(1);
+}
+
+}  // namespace
+
+namespace {
+
+std::string FloatList(std::initializer_list<double> values) {
+  std::string out;
+  for (const double v : values) out += (out.empty() ? "" : ", ") + Float(v);
+  return "{" + out + "}";
+}
+
+// kCeilings, kFriction and kFrictionReads.
+std::string CeilingText(const Model& m) {
+  const Ceilings c = MakeCeilings(m);
+  std::ostringstream o;
+  o << "  // The hardest values that a table may hold: model/ceilings.hpp. They are no part of the schema.\n"
+    << "  static constexpr model::Ceilings<kJoints, kParameters> kCeilings = {\n      {"
+    << static_cast<std::uint32_t>(c.least_fade_ms) << "u, " << static_cast<std::uint32_t>(c.longest_fade_ms) << "u, "
+    << Float(c.least_forgetting) << ", " << Float(c.coldest_degC) << ", " << Float(c.warmest_degC) << "},\n      {";
+  for (const Ceilings::OfJoint& j : c.joint)
+    o << (&j == c.joint.data() ? "" : ",\n       ")
+      << FloatList({j.torque_Nm, j.friction_Nm, j.feed_Nm, j.scale_low, j.scale_high, j.sigma_low_Nm, j.sigma_high_Nm,
+                    j.v_min_low_radps, j.v_min_high_radps, j.speed_radps, j.position_low_rad, j.position_high_rad});
+  o << "},\n      {";
+  for (const Ceilings::OfParameter& p : c.parameter)
+    o << (&p == c.parameter.data() ? "" : ",\n       ") << FloatList({p.low, p.high, p.sd, p.process_noise});
+  o << "}};\n  static constexpr bool kFriction[kFront > 0 ? kFront : 1] = "
+    << Indexed(std::max(m.front(), 1), [&](int k) { return k < m.front() && c.friction[k] ? "true" : "false"; })
+    << ";\n  static constexpr unsigned kFrictionReads = " << c.friction_reads << "u;\n";
+  return o.str();
 }
 
 }  // namespace
@@ -41,7 +75,8 @@ std::string ModelHeader(const Model& m, const Functions& f, std::uint32_t schema
     << "// Operations of Regressor: " << CountText(f.count) << ".\n"
     << "// Operations of Jacobian: " << CountText(f.jacobian_count) << ".\n"
     << "#pragma once\n\n#include <cstdint>\n#include <limits>\n\n#include \"armcal/math/elementary.hpp\"\n#include "
-       "\"armcal/math/mul_add.hpp\"\n#include \"armcal/model/contract.hpp\"\n\nnamespace armcal::generated {\n\n"
+       "\"armcal/math/mul_add.hpp\"\n#include \"armcal/model/ceilings.hpp\"\n#include "
+       "\"armcal/model/contract.hpp\"\n\nnamespace armcal::generated {\n\n"
     << "struct " << type << " {\n"
     << "  static constexpr const char* kName = \"" << r.name << "\";\n"
     << "  static constexpr int kJoints = " << n << ";\n  static constexpr int kFront = " << m.front()
@@ -84,7 +119,9 @@ std::string ModelHeader(const Model& m, const Functions& f, std::uint32_t schema
   const std::string arguments =
       "const model::ModelInput<T, kJoints>& x,\n      [[maybe_unused]] const T* committed, [[maybe_unused]] const T* "
       "eta";
-  o << "  };\n\n  // What each function needs and gives: armcal/model/contract.hpp. Context: any; straight-line.\n"
+  o << "  };\n"
+    << CeilingText(m)
+    << "\n  // What each function needs and gives: armcal/model/contract.hpp. Context: any; straight-line.\n"
     << "  template <class T>\n  static void InitialState([[maybe_unused]] " << arguments
     << ", [[maybe_unused]] T* state) {\n"
     << f.initial_state << "  }\n\n"

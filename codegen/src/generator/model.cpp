@@ -250,6 +250,21 @@ std::array<double, 10> LinkDeviation(const Robot& r, const Link& l) {
   return sd;
 }
 
+// A URDF's friction is a placeholder more often than not, and it has no word for a rotor. So these priors come from
+// what the joint can give. A speed limit that is a placeholder, too, must not make them narrow.
+constexpr double kFastest = 20, kFastestSlide = 5;          // rad/s, m/s; a limit above counts as this
+constexpr double kCoulombShare = 0.1, kViscousShare = 0.3;  // of the torque limit: at rest, at the speed limit
+constexpr double kRunUp_s = 0.2;  // in which the torque limit brings a rotor of one deviation to the speed limit
+constexpr double kRotorMeanShare = 1e-3;  // of its deviation: above zero, as the barrier needs, and next to nothing
+
+double SpeedFor(const Joint& j) {
+  return std::min(j.speed_limit_radps, j.kinematics.type == JointType::kRevolute ? kFastest : kFastestSlide);
+}
+double WideFriction(const Joint& j, const std::string& name) {
+  return name == "Fv" ? kViscousShare * j.torque_limit_Nm / SpeedFor(j) : kCoulombShare * j.torque_limit_Nm;
+}
+double WideRotor(const Joint& j) { return kRunUp_s * j.torque_limit_Nm / SpeedFor(j); }
+
 }  // namespace
 
 void Model::MakeTable() {
@@ -264,9 +279,10 @@ void Model::MakeTable() {
     for (int p = 0; p < 10; ++p)
       table_.push_back({kBodyParameterName[p] + number, kBodyUnit[p], mean[p], sd[p], p == 0 ? 0 : -kInfinity,
                         kInfinity, 0, "estimated", 0, j, ""});
-    const double rotor = joint.motor.gear_ratio * joint.motor.gear_ratio * joint.motor.rotor_inertia_kgm2;
-    table_.push_back({"Ia" + number, "kg*m^2", rotor, robot_.has_prior ? robot_.link_relative_sd * rotor : 1e3, 0,
-                      kInfinity, 0, "estimated", 0, j, ""});
+    double rotor = joint.motor.gear_ratio * joint.motor.gear_ratio * joint.motor.rotor_inertia_kgm2;
+    double rotor_sd = robot_.has_prior ? robot_.link_relative_sd * rotor : 1e3;
+    if (robot_.has_prior && joint.wide.contains("Ia")) rotor_sd = WideRotor(joint), rotor = kRotorMeanShare * rotor_sd;
+    table_.push_back({"Ia" + number, "kg*m^2", rotor, rotor_sd, 0, kInfinity, 0, "estimated", 0, j, ""});
   }
   for (std::size_t k = 0; k < effect_column_.size(); ++k) {
     const EffectColumn& c = effect_column(static_cast<int>(k));
@@ -281,6 +297,7 @@ void Model::MakeTable() {
       const auto it = robot_.joint[joint].nominal.find(c.key);
       if (it != robot_.joint[joint].nominal.end() && it->second > 0)
         p.mean = it->second, p.sd = robot_.friction_relative_sd * it->second;
+      if (robot_.joint[joint].wide.contains(c.key)) p.sd = std::max(p.mean, WideFriction(robot_.joint[joint], c.key));
     }
     if (const auto it = use.mean.find(c.key); it != use.mean.end()) p.mean = it->second;
     if (c.fixed_amplitude) p.state = "fixed";

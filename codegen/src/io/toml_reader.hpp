@@ -8,61 +8,68 @@
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
+#include <limits>
 #include <set>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "codegen/src/io/faults.hpp"
 #include "codegen/src/io/input_error.hpp"
 
 namespace armcal::io {
 
 // A table together with the words needed for an error: "file: key: expected ...". The table must outlive this object.
 // A reader remembers which keys it was asked for, so that Finish can refuse all others.
+// With `faults` a problem is kept there and reading goes on: a bad number reads as NaN, a bad text as "", a bad array
+// as NaNs or as empty, a missing table as an empty one that complains no more. Without, the first problem throws.
 class TomlReader {
  public:
-  TomlReader(const toml::table& table, std::string file, std::string prefix = "")
-      : table_(table), file_(std::move(file)), prefix_(std::move(prefix)) {}
+  TomlReader(const toml::table& table, std::string file, std::string prefix = "", Faults* faults = nullptr)
+      : table_(table), file_(std::move(file)), prefix_(std::move(prefix)), faults_(faults) {}
 
   [[noreturn]] void Fail(std::string_view key, const std::string& expected) const {
-    throw InputError(file_ + ": " + prefix_ + std::string(key) + ": expected " + expected);
+    throw InputError(Line(key, expected));
+  }
+  // What Fail says; thrown only where nobody collects.
+  void Report(std::string_view key, const std::string& expected) const {
+    if (mute_ || (!Has(key) && misspelt_.contains(key))) return;
+    if (!faults_) Fail(key, expected);
+    faults_->Add(Line(key, expected));
   }
   bool Has(std::string_view key) const { return !!Node(key); }
 
   double Number(std::string_view key) const {
     const auto node = Node(key);
     const auto v = node.value<double>();
-    if (!v || !std::isfinite(*v) || node.is_boolean()) Fail(key, "a finite number");
-    return *v;
+    if (v && std::isfinite(*v) && !node.is_boolean()) return *v;
+    Report(key, "a finite number");
+    return kNaN;
   }
   double Number(std::string_view key, double otherwise) const { return Has(key) ? Number(key) : otherwise; }
   double Positive(std::string_view key) const {
-    const double v = Number(key);
-    if (!(v > 0)) Fail(key, "a number above zero");
-    return v;
+    return Checked(key, "a number above zero", [](double v) { return v > 0; });
   }
   double Positive(std::string_view key, double otherwise) const { return Has(key) ? Positive(key) : otherwise; }
   double NotNegative(std::string_view key) const {
-    const double v = Number(key);
-    if (!(v >= 0)) Fail(key, "a number not below zero");
-    return v;
+    return Checked(key, "a number not below zero", [](double v) { return v >= 0; });
   }
   double NotNegative(std::string_view key, double otherwise) const { return Has(key) ? NotNegative(key) : otherwise; }
   // In [lowest, highest].
   std::int64_t Integer(std::string_view key, std::int64_t lowest, std::int64_t highest) const {
     const auto v = Node(key).value_exact<std::int64_t>();
-    if (!v || *v < lowest || *v > highest)
-      Fail(key, "an integer from " + std::to_string(lowest) + " to " + std::to_string(highest));
-    return *v;
+    if (v && *v >= lowest && *v <= highest) return *v;
+    Report(key, "an integer from " + std::to_string(lowest) + " to " + std::to_string(highest));
+    return lowest;
   }
   std::int64_t Integer(std::string_view key, std::int64_t lowest, std::int64_t highest, std::int64_t otherwise) const {
     return Has(key) ? Integer(key, lowest, highest) : otherwise;
   }
   std::string Text(std::string_view key) const {
     const auto v = Node(key).value<std::string>();
-    if (!v) Fail(key, "a string");
-    return *v;
+    if (!v) Report(key, "a string");
+    return v.value_or("");
   }
   std::string Text(std::string_view key, const std::string& otherwise) const {
     return Has(key) ? Text(key) : otherwise;
@@ -70,18 +77,22 @@ class TomlReader {
   bool Flag(std::string_view key, bool otherwise) const {
     if (!Has(key)) return otherwise;
     const auto v = Node(key).value<bool>();
-    if (!v) Fail(key, "true or false");
-    return *v;
+    if (!v) Report(key, "true or false");
+    return v.value_or(otherwise);
   }
   // size 0: any length.
   std::vector<double> Numbers(std::string_view key, std::size_t size = 0) const {
     const auto* array = Node(key).as_array();
     const std::string expected = size ? std::to_string(size) + " numbers" : "an array of numbers";
-    if (!array || (size && array->size() != size)) Fail(key, expected);
+    const auto bad = [&] {
+      Report(key, expected);
+      return std::vector<double>(size, kNaN);
+    };
+    if (!array || (size && array->size() != size)) return bad();
     std::vector<double> out;
     for (const auto& item : *array) {
       const auto v = item.value<double>();
-      if (!v || !std::isfinite(*v)) Fail(key, expected);
+      if (!v || !std::isfinite(*v)) return bad();
       out.push_back(*v);
     }
     return out;
@@ -95,38 +106,50 @@ class TomlReader {
     std::vector<std::string> out;
     if (!Has(key)) return out;
     const auto* array = Node(key).as_array();
-    if (!array) Fail(key, "an array of strings");
-    for (const auto& item : *array) {
-      const auto v = item.value<std::string>();
-      if (!v) Fail(key, "an array of strings");
-      out.push_back(*v);
+    if (!array) Report(key, "an array of strings");
+    for (std::size_t k = 0; array && k < array->size(); ++k) {
+      const auto v = (*array)[k].value<std::string>();
+      if (!v) Report(key, "an array of strings");
+      else out.push_back(*v);
     }
     return out;
   }
   TomlReader Table(std::string_view key) const {
     const auto* t = Node(key).as_table();
-    if (!t) Fail(key, "a table");
-    return {*t, file_, prefix_ + std::string(key) + "."};
+    if (t) return {*t, file_, prefix_ + std::string(key) + ".", faults_};
+    Report(key, "a table");
+    static const toml::table kNothing;
+    TomlReader nothing(kNothing, file_, prefix_ + std::string(key) + ".", faults_);
+    nothing.mute_ = true;
+    return nothing;
   }
   std::vector<TomlReader> Tables(std::string_view key) const {
     std::vector<TomlReader> out;
     if (!Has(key)) return out;
     const auto* array = Node(key).as_array();
-    if (!array) Fail(key, "an array of tables ([[" + std::string(key) + "]])");
+    if (!array) Report(key, "an array of tables ([[" + std::string(key) + "]])");
     int i = 0;
-    for (const auto& item : *array) {
-      const auto* t = item.as_table();
-      if (!t) Fail(key, "an array of tables ([[" + std::string(key) + "]])");
-      out.emplace_back(*t, file_, prefix_ + std::string(key) + "[" + std::to_string(++i) + "].");
+    for (std::size_t k = 0; array && k < array->size(); ++k) {
+      const auto* t = (*array)[k].as_table();
+      if (!t) Report(key, "an array of tables ([[" + std::string(key) + "]])");
+      else out.emplace_back(*t, file_, prefix_ + std::string(key) + "[" + std::to_string(++i) + "].", faults_);
     }
     return out;
   }
-  // A misspelt key is an error, not a silence.
+  // A misspelt key is an error, not a silence. The line names the nearest key that is not there yet; that one is then
+  // not called missing besides.
   void AllowOnly(std::span<const std::string_view> keys, std::span<const std::string_view> more = {}) const {
+    std::vector<std::string_view> absent;
+    for (const auto list : {keys, more})
+      for (const std::string_view key : list)
+        if (!table_.contains(key)) absent.push_back(key);
     for (const auto& [k, v] : table_) {
       const std::string_view key = k.str();
       const auto known = [key](auto list) { return std::find(list.begin(), list.end(), key) != list.end(); };
-      if (!known(keys) && !known(more)) Fail(key, "no such key here");
+      if (known(keys) || known(more)) continue;
+      const std::string nearest = Nearest(key, absent);
+      Report(key, "no such key here" + (nearest.empty() ? "" : "; the nearest is " + nearest));
+      if (!nearest.empty()) misspelt_.insert(nearest);
     }
   }
   void AllowOnly(std::initializer_list<std::string_view> keys) const {
@@ -144,6 +167,19 @@ class TomlReader {
   const std::string& file() const { return file_; }
 
  private:
+  static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+  std::string Line(std::string_view key, const std::string& expected) const {
+    return file_ + ": " + prefix_ + std::string(key) + ": " + (Has(key) ? "" : "missing, ") + "expected " + expected;
+  }
+  template <class Holds>
+  double Checked(std::string_view key, const char* expected, Holds holds) const {
+    const auto node = Node(key);
+    const auto v = node.value<double>();
+    if (v && std::isfinite(*v) && !node.is_boolean() && holds(*v)) return *v;
+    Report(key, expected);
+    return kNaN;
+  }
   toml::node_view<const toml::node> Node(std::string_view key) const {
     asked_.emplace(key);
     return table_[key];
@@ -151,7 +187,9 @@ class TomlReader {
 
   const toml::table& table_;
   std::string file_, prefix_;
-  mutable std::set<std::string, std::less<>> asked_;
+  Faults* faults_ = nullptr;
+  bool mute_ = false;
+  mutable std::set<std::string, std::less<>> asked_, misspelt_;  // misspelt_: the keys that were probably meant
 };
 
 inline toml::table ParseToml(const std::filesystem::path& path) {

@@ -1,11 +1,17 @@
 // robot - a rigid body in any frame, and two bodies as one.
 #pragma once
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <cstdio>
+#include <string>
 
 #include "codegen/src/robot/frames.hpp"
 
 namespace armcal::codegen {
+
+// Longer ones are in millimetres: of a link or a centre of mass, and of a slide's travel.
+inline constexpr double kLongest = 20, kLongestTravel = 100;  // m
 
 struct Body {
   double mass = 0;
@@ -37,6 +43,29 @@ inline void Merge(Body& into, const Body& other) {
   };
   into.inertia += other.inertia + steiner(into) + steiner(other);
   into.mass = mass, into.center = center;
+}
+
+// Published figures are rounded and measured: a moment of inertia may pass the sum of the others by this much of it.
+inline constexpr double kPublished = 0.2;
+
+// Empty, or what a body that can exist has and this one has not, in kg and kg m^2. slack: how far the largest moment of
+// inertia may pass the sum of the others, as a share of it.
+inline std::string Impossible(const Body& body, double slack = 0) {
+  const auto number = [](double v) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", v);
+    return std::string(text);
+  };
+  constexpr double kRounding = 1e-9;
+  if (!(body.mass > 0)) return "a mass above zero, not " + number(body.mass) + " kg";
+  const Eigen::Vector3d moment =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(body.inertia, Eigen::EigenvaluesOnly).eigenvalues();
+  const std::string found =
+      ", not " + number(moment[0]) + ", " + number(moment[1]) + " and " + number(moment[2]) + " kg m^2";
+  if (!(moment[0] > 0)) return "principal moments of inertia above zero" + found;
+  if (!((1 + slack) * (moment[0] + moment[1]) - moment[2] > kRounding * moment[2]))
+    return "principal moments of inertia of which none is as large as the sum of the other two" + found;
+  return "";
 }
 
 inline Link ToLink(const Body& body) {

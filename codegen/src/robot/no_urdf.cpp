@@ -4,9 +4,19 @@
 
 namespace armcal::codegen {
 
-UrdfChain ReadUrdf(const std::filesystem::path& path) {
+namespace {
+
+[[noreturn]] void Refuse(const std::filesystem::path& path) {
   throw io::InputError(path.string() +
                        ": this program was built without a URDF reader; install liburdfdom-dev, then build it again");
 }
+
+}  // namespace
+
+std::string UrdfText(const std::filesystem::path& path) { Refuse(path); }
+
+UrdfChain ReadUrdf(const UrdfChoice& choice, UrdfBodies) { Refuse(choice.path); }
+
+UrdfChoice ChooseChain(const UrdfChoice& asked, std::vector<std::string>&) { Refuse(asked.path); }
 
 }  // namespace armcal::codegen

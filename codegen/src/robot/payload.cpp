@@ -14,7 +14,7 @@ Payload ReadPayload(const io::TomlReader& in) {
     p.center_m = {c[0], c[1], c[2]};
   }
   if (in.Has("inertia_kgm2")) {
-    if (!p.center_m) in.Fail("center_m", "3 numbers, because the inertia is about the centre");
+    if (!p.center_m) in.Report("center_m", "3 numbers, because the inertia is about the centre");
     const auto i = in.Numbers("inertia_kgm2", 6);
     p.inertia_kgm2 = {i[0], i[1], i[2], i[3], i[4], i[5]};
   }

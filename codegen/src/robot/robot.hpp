@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,7 @@ struct Joint {
   double torque_noise_Nm = 0;  // standard deviation of one tick's reading
   double v_min_radps = 0;
   std::map<std::string, double> nominal;  // parameter name -> value: "Fc", "Fv", ...
+  std::set<std::string> wide;             // of "Fc", "Fv", "Ia": those that nobody stated; a URDF's values do not count
   Motor motor;
   Link link;
   bool has_motor = false;
@@ -72,8 +74,27 @@ struct ParameterSet {
   std::vector<int> prefer, omit;  // tried first; left out (taken as zero)
 };
 
+// A URDF, and which chain of it is the arm.
+struct UrdfChoice {
+  std::filesystem::path path;
+  std::string tip;                      // the chain ends at this link; empty: the only chain there is
+  std::map<std::string, double> fixed;  // joints that are held at a position, rad or m
+};
+
+// What [ceilings] says about the hardest values that a table of this robot may hold. What is empty or absent follows
+// from the robot's limits and prior.
+struct CeilingSettings {
+  std::vector<double> torque_Nm, friction_Nm, noise_Nm;  // one a joint
+  std::array<double, 2> torque_scale{0.5, 2.0};
+  std::array<double, 2> temperature_degC{15.0, 60.0};  // where friction is tried
+  double feed_share = 0.05;  // of the torque ceiling: by so much may a joint's friction push where it should brake
+  double least_fade_ms = 500.0, longest_fade_ms = 1e6, least_forgetting = 0.9;
+  std::map<std::string, std::array<double, 2>> parameter;  // name -> lowest and highest mean
+};
+
 struct Robot {
   std::string name, title, source, path;
+  UrdfChoice urdf;                       // no path: DH rows
   std::array<double, 3> gravity_mps2{};  // base frame
   std::string sign_law = "sgn";          // "sgn" | "tanh"
   double sign_width_radps = 0;
@@ -85,6 +106,7 @@ struct Robot {
   std::vector<double> coupling;  // row-major C of q_motor = C q; empty: unit
   std::vector<EffectUse> effect;
   ParameterSet parameters;
+  CeilingSettings ceilings;
   Control control;
   // Frame 0 seen from the base frame, in which gravity is given; the translation is seen in no torque. Rows of R.
   std::array<double, 3> base_xyz_m{};
@@ -96,7 +118,7 @@ struct Robot {
   int joints() const { return static_cast<int>(joint.size()); }
 };
 
-// Throws io::InputError: file, key, what was expected.
+// Throws io::InputError with all faults of the file, a line for each: file, key or joint, what was expected.
 Robot ReadRobot(const std::filesystem::path& path);
 
 }  // namespace armcal::codegen

@@ -4,12 +4,13 @@
 #include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>
 
+#include <array>
+#include <cstdio>
 #include <fstream>
+#include <set>
 #include <sstream>
 #include <utility>
 
-#include "codegen/src/io/input_error.hpp"
-#include "codegen/src/robot/body.hpp"
 #include "codegen/src/robot/frames.hpp"
 
 namespace armcal::codegen {
@@ -21,6 +22,8 @@ using Eigen::Vector3d;
 
 constexpr double kSameAngle = 1e-5;   // rad
 constexpr double kSameLength = 1e-5;  // m; no arm is built more exactly
+constexpr double kMostTurn = 20;      // rad; more are degrees, or stand for no limit
+constexpr int kSameBodies = 3;        // moving links with one and the same inertia: not one is computed
 
 // At joint positions zero, seen from the root link.
 struct Axis {
@@ -43,56 +46,205 @@ Isometry3d Pose(const urdf::Pose& p) {
   return T;
 }
 
+std::string Number(double v) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", v);
+  return text;
+}
+
+bool IsMovable(const urdf::Joint& joint) {
+  return joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::CONTINUOUS ||
+         joint.type == urdf::Joint::PRISMATIC;
+}
+
+// Names of two or more, as a person lists them.
+std::string List(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "\"" : ", \"") + name + "\"";
+  return text;
+}
+
+Body BodyOf(const urdf::Link& link) {
+  const auto& in = link.inertial;
+  if (!in) return {};
+  return Moved(Pose(in->origin),
+               {in->mass, Vector3d::Zero(), Symmetric(in->ixx, in->ixy, in->ixz, in->iyy, in->iyz, in->izz)});
+}
+
+// Which joints of a URDF move the arm, and at what positions all others are held.
+class Choice {
+ public:
+  Choice(const UrdfChoice& asked, const urdf::ModelInterface& model, io::Faults& faults)
+      : file_(asked.path.string()), model_(model), faults_(faults) {
+    for (const auto& [name, position] : asked.fixed) Hold(name, position);
+    if (!asked.tip.empty()) EndAt(asked.tip);
+    HoldMimics();
+  }
+
+  bool Moves(const urdf::Joint& joint) const { return joint.type != urdf::Joint::FIXED && !held_.contains(joint.name); }
+  const std::map<std::string, double>& held() const { return held_; }
+
+  // Faults of what is to move: a joint of another kind, a mimic joint.
+  void Check() const {
+    for (const auto& [name, joint] : model_.joints_) {
+      if (!Moves(*joint)) continue;
+      if (!IsMovable(*joint))
+        Say(name, "revolute, continuous, prismatic or fixed; or hold it: fixed = { " + name + " = 0.0 }");
+      else if (joint->mimic)
+        Say(name,
+            "no mimic: every joint of the arm has a drive of its own; hold the joint that it follows: fixed = { " +
+                joint->mimic->joint_name + " = 0.0 }");
+    }
+  }
+  // The nearest to zero that the limits allow.
+  static double Rest(const urdf::Joint& joint) {
+    const auto& limits = joint.limits;
+    if (!limits || joint.type == urdf::Joint::CONTINUOUS || limits->lower > limits->upper) return 0;
+    return std::clamp(0.0, limits->lower, limits->upper);
+  }
+
+ private:
+  void Say(const std::string& joint, const std::string& expected) const {
+    faults_.Add(file_ + ": joint \"" + joint + "\": expected " + expected);
+  }
+  void Hold(const std::string& name, double position) {
+    const auto it = model_.joints_.find(name);
+    if (it != model_.joints_.end()) {
+      held_[name] = position;
+      return;
+    }
+    std::vector<std::string> known;
+    for (const auto& [other, joint] : model_.joints_) known.push_back(other);
+    const std::string nearest = io::Nearest(name, known);
+    Say(name, "a joint of the URDF to hold" + (nearest.empty() ? "" : "; the nearest is " + nearest));
+  }
+  void EndAt(const std::string& tip) {
+    const auto end = model_.getLink(tip);
+    if (!end) {
+      std::vector<std::string> known;
+      for (const auto& [other, link] : model_.links_) known.push_back(other);
+      const std::string nearest = io::Nearest(tip, known);
+      faults_.Add(file_ + ": link \"" + tip + "\": expected a link of the URDF as the tip" +
+                  (nearest.empty() ? "" : "; the nearest is " + nearest));
+      return;
+    }
+    std::set<std::string> path;
+    for (auto link = end; link->parent_joint; link = link->getParent()) path.insert(link->parent_joint->name);
+    for (const auto& [name, joint] : model_.joints_)
+      if (joint->type != urdf::Joint::FIXED && !joint->mimic && !path.contains(name))
+        held_.try_emplace(name, Rest(*joint));
+  }
+  void HoldMimics() {
+    for (bool again = true; std::exchange(again, false);)
+      for (const auto& [name, joint] : model_.joints_) {
+        if (!joint->mimic || held_.contains(name)) continue;
+        const auto source = held_.find(joint->mimic->joint_name);
+        if (source == held_.end()) continue;
+        held_[name] = joint->mimic->multiplier * source->second + joint->mimic->offset;
+        again = true;
+      }
+  }
+
+  std::string file_;
+  const urdf::ModelInterface& model_;
+  io::Faults& faults_;
+  std::map<std::string, double> held_;
+};
+
 class Walk {
  public:
-  Walk(const std::string& file, const urdf::ModelInterface& model) : file_(file), model_(model) {
-    Body base;
+  Walk(const std::string& file, const urdf::ModelInterface& model, const Choice& choice, io::Faults& faults)
+      : file_(file), model_(model), choice_(choice), faults_(faults) {
+    std::vector<UrdfPart> base;
     Collect(*model.getRoot(), Isometry3d::Identity(), base);
     while (next_) {
       const auto joint = std::exchange(next_, nullptr);
-      const Vector3d direction(joint->axis.x, joint->axis.y, joint->axis.z);
-      if (direction.norm() < 1e-6) Fail("joint", joint->name, "an axis that is not zero");
+      Vector3d direction(joint->axis.x, joint->axis.y, joint->axis.z);
+      if (direction.norm() < 1e-6) {
+        if (IsMovable(*joint)) Say("joint", joint->name, "an axis that is not zero");
+        direction = Vector3d::UnitZ();
+      }
       axes.push_back(Axis{joint, at_.translation(), (at_.linear() * direction).normalized(), Body(), at_});
-      Collect(*model.getLink(joint->child_link_name), axes.back().link, axes.back().body);
+      parts.emplace_back();
+      Collect(*model.getLink(joint->child_link_name), axes.back().link, parts.back());
+      for (const UrdfPart& part : parts.back()) Merge(axes.back().body, Moved(part.pose, part.body));
     }
-    if (axes.empty()) Fail("link", model.getRoot()->name, "at least one movable joint after it");
+    if (axes.empty()) Say("link", model.getRoot()->name, "at least one movable joint after it");
   }
 
   std::vector<Axis> axes;
+  std::vector<std::vector<UrdfPart>> parts;  // of each axis; poses are seen from the root link
 
  private:
-  [[noreturn]] void Fail(const char* what, const std::string& name, const std::string& expected) const {
-    throw io::InputError(file_ + ": " + what + " \"" + name + "\": expected " + expected);
+  void Say(const char* what, const std::string& name, const std::string& expected) const {
+    faults_.Add(file_ + ": " + what + " \"" + name + "\": expected " + expected);
   }
 
-  // The body of a link and of all that is fixed to it; the movable joint that follows goes to next_, its pose to at_.
-  void Collect(const urdf::Link& link, const Isometry3d& pose, Body& body) {
-    if (const auto& inertial = link.inertial) {
-      const Body own{
-          inertial->mass, Vector3d::Zero(),
-          Symmetric(inertial->ixx, inertial->ixy, inertial->ixz, inertial->iyy, inertial->iyz, inertial->izz)};
-      Merge(body, Moved(pose * Pose(inertial->origin), own));
-    }
+  Isometry3d AtPosition(const urdf::Joint& joint) const {
+    Isometry3d T = Pose(joint.parent_to_joint_origin_transform);
+    const auto held = choice_.held().find(joint.name);
+    if (held == choice_.held().end() || !IsMovable(joint)) return T;
+    const Vector3d axis = Vector3d(joint.axis.x, joint.axis.y, joint.axis.z).normalized();
+    Isometry3d moved = Isometry3d::Identity();
+    if (joint.type == urdf::Joint::PRISMATIC) moved.translation() = held->second * axis;
+    else moved.linear() = Eigen::AngleAxisd(held->second, axis).toRotationMatrix();
+    return held->second == 0 ? T : T * moved;
+  }
+
+  // A link and all that is fixed to it; the movable joint that follows goes to next_, its pose to at_.
+  void Collect(const urdf::Link& link, const Isometry3d& pose, std::vector<UrdfPart>& parts_of) {
+    parts_of.push_back({link.name, pose, BodyOf(link)});
     for (const auto& joint : link.child_joints) {
-      const Isometry3d child = pose * Pose(joint->parent_to_joint_origin_transform);
-      const auto type = joint->type;
-      if (type == urdf::Joint::FIXED) {
-        Collect(*model_.getLink(joint->child_link_name), child, body);
-        continue;
+      if (!choice_.Moves(*joint)) {
+        Collect(*model_.getLink(joint->child_link_name), pose * AtPosition(*joint), parts_of);
+      } else if (next_) {
+        Say("joint", joint->name,
+            "one chain, but it branches from \"" + next_->name + "\"; name the link at which the arm ends: tip = \"" +
+                next_->child_link_name + "\" or \"" + joint->child_link_name + "\", or one beyond");
+      } else {
+        next_ = joint, at_ = pose * AtPosition(*joint);
       }
-      if (type != urdf::Joint::REVOLUTE && type != urdf::Joint::CONTINUOUS && type != urdf::Joint::PRISMATIC)
-        Fail("joint", joint->name, "revolute, continuous, prismatic or fixed");
-      if (joint->mimic) Fail("joint", joint->name, "no mimic: every joint of the arm has a drive of its own");
-      if (next_) Fail("joint", joint->name, "one chain, but it branches from \"" + next_->name + "\"");
-      next_ = joint, at_ = child;
     }
   }
 
   std::string file_;
   const urdf::ModelInterface& model_;
+  const Choice& choice_;
+  io::Faults& faults_;
   urdf::JointConstSharedPtr next_;
   Isometry3d at_;
 };
+
+void CheckLengths(const std::string& file, const urdf::ModelInterface& model, io::Faults& faults) {
+  for (const auto& [name, joint] : model.joints_) {
+    const std::string who = file + ": joint \"" + name + "\": expected ";
+    const auto& p = joint->parent_to_joint_origin_transform.position;
+    if (const double length = Vector3d(p.x, p.y, p.z).norm(); length > kLongest)
+      faults.Add(who + "an origin in metres, not " + Number(length) + " (millimetres?)");
+    const auto& limits = joint->limits;
+    if (joint->type == urdf::Joint::PRISMATIC && limits && limits->upper < 1e6 &&
+        limits->upper - limits->lower > kLongestTravel)
+      faults.Add(who + "limits in metres, not " + Number(limits->lower) + " to " + Number(limits->upper) +
+                 " (millimetres?)");
+  }
+}
+
+// Centres and inertias in millimetres, and bodies that cannot exist.
+void CheckBodies(const std::string& file, const urdf::ModelInterface& model, io::Faults& faults) {
+  for (const auto& [name, link] : model.links_) {
+    if (!link->inertial) continue;
+    const std::string who = file + ": link \"" + name + "\": expected ";
+    const Body body = BodyOf(*link);
+    if (body.mass == 0 && body.inertia.isZero()) continue;  // a frame that somebody gave an empty <inertial>
+    if (body.center.norm() > kLongest)
+      faults.Add(who + "a centre of mass in metres, not " + Number(body.center.norm()) + " (millimetres?)");
+    const double square = body.mass > 0 ? 0.5 * body.inertia.trace() / body.mass : 0;
+    if (square > kLongest * kLongest)
+      faults.Add(who + "an inertia in kg m^2: this one would be " + Number(std::sqrt(square)) + " m wide (kg mm^2?)");
+    if (body.inertia.isZero() && body.mass > 0) continue;  // a mass point; what it is fixed to may have the inertia
+    if (const std::string missing = Impossible(body, kPublished); !missing.empty()) faults.Add(who + missing);
+  }
+}
 
 // The axes of one frame at joint positions zero.
 struct Frame {
@@ -177,40 +329,174 @@ class Complaints : public console_bridge::OutputHandler {
   std::string first_;
 };
 
+urdf::ModelInterfaceSharedPtr Parse(const std::filesystem::path& path) {
+  const std::string text = UrdfText(path);
+  Complaints complaints;
+  urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text);
+  if (!model || !model->getRoot())
+    throw io::InputError(path.string() + ": expected a URDF robot" +
+                         (complaints.first().empty() ? "" : " (" + complaints.first() + ")"));
+  return model;
+}
+
+std::string WhyUnlimited(const urdf::Joint& joint) {
+  const auto& limits = joint.limits;
+  if (joint.type == urdf::Joint::CONTINUOUS) return "it is continuous";
+  if (!limits || (limits->lower == 0 && limits->upper == 0)) return "the URDF has none";
+  const std::string found = "the URDF has " + Number(limits->lower) + " to " + Number(limits->upper);
+  if (!(limits->lower < limits->upper)) return found;
+  if (joint.type == urdf::Joint::REVOLUTE && std::max(-limits->lower, limits->upper) > kMostTurn)
+    return found + " rad" + (limits->upper <= 1000 ? " (degrees?)" : "");
+  return "";
+}
+
+// The links that a joint moves and that share a body with two others.
+std::vector<std::string> SameInertia(const std::vector<std::vector<UrdfPart>>& parts) {
+  const auto same = [](const Body& a, const Body& b) {
+    return a.mass == b.mass && a.center == b.center && a.inertia == b.inertia;
+  };
+  for (const auto& one : parts) {
+    std::vector<std::string> names;
+    for (const auto& other : parts)
+      if (one.front().body.mass > 0 && same(one.front().body, other.front().body)) names.push_back(other.front().link);
+    if (static_cast<int>(names.size()) >= kSameBodies) return names;
+  }
+  return {};
+}
+
+// The links at which chains end, with the number of joints that move on the way. `tip`: the last link that a joint
+// moved. True: a joint moves below.
+bool FindEnds(const urdf::ModelInterface& model, const Choice& choice, const urdf::Link& link, const std::string& tip,
+              int joints, std::map<std::string, int>& ends) {
+  bool goes_on = false;
+  for (const auto& joint : link.child_joints) {
+    const urdf::Link& child = *model.getLink(joint->child_link_name);
+    const bool moves = choice.Moves(*joint);
+    const bool below = FindEnds(model, choice, child, moves ? child.name : tip, joints + (moves ? 1 : 0), ends);
+    goes_on |= moves || below;
+  }
+  if (!goes_on && joints > 0 && link.name == tip) ends[tip] = joints;
+  return goes_on;
+}
+
+std::string Quoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+// What the program xacro makes of a file; empty if it is not there or fails.
+std::string Expanded(const std::filesystem::path& path) {
+  std::string text;
+  FILE* pipe = popen(("xacro " + Quoted(path.string()) + " 2>/dev/null").c_str(), "r");
+  if (!pipe) return text;
+  std::array<char, 4096> block;
+  for (std::size_t n = 0; (n = std::fread(block.data(), 1, block.size(), pipe)) > 0;) text.append(block.data(), n);
+  return pclose(pipe) == 0 ? text : std::string();
+}
+
 }  // namespace
 
-UrdfChain ReadUrdf(const std::filesystem::path& path) {
+std::string UrdfText(const std::filesystem::path& path) {
   std::ifstream in(path);
   if (!in) throw io::InputError(path.string() + ": no such file");
   std::ostringstream text;
   text << in.rdbuf();
-  Complaints complaints;
-  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text.str());
-  if (!model || !model->getRoot())
-    throw io::InputError(path.string() + ": expected a URDF robot" +
-                         (complaints.first().empty() ? "" : " (" + complaints.first() + ")"));
-  const Walk walk(path.string(), *model);
+  const bool macros = path.extension() == ".xacro" || text.str().find("<xacro:") != std::string::npos;
+  if (!macros) return text.str();
+  const std::string expanded = Expanded(path);
+  if (!expanded.empty()) return expanded;
+  std::filesystem::path urdf = path;
+  if (path.extension() == ".xacro") urdf.replace_extension(path.stem().extension() == ".urdf" ? "" : ".urdf");
+  else urdf.replace_filename("expanded.urdf");
+  throw io::InputError(path.string() + ": a xacro file, expected a URDF; run this where ROS is: xacro " +
+                       path.filename().string() + " > " + urdf.filename().string());
+}
+
+UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
+  const std::string file = asked.path.string();
+  const urdf::ModelInterfaceSharedPtr model = Parse(asked.path);
+  io::Faults faults;
+  const Choice choice(asked, *model, faults);
+  choice.Check();
+  CheckLengths(file, *model, faults);
+  if (bodies == UrdfBodies::kChecked) CheckBodies(file, *model, faults);
+  const Walk walk(file, *model, choice, faults);
+  faults.ThrowIfAny();
   std::vector<JointKinematics> kinematics;
   const std::vector<Frame> frames = LayFrames(walk.axes, kinematics);
   UrdfChain chain;
+  chain.part = walk.parts;
+  chain.held = choice.held();
+  chain.same_inertia = SameInertia(walk.parts);
   for (std::size_t i = 0; i < walk.axes.size(); ++i) {
     const Axis& axis = walk.axes[i];
     Joint joint;
     joint.name = axis.joint->name;
     joint.kinematics = kinematics[i];
     const auto& limits = axis.joint->limits;
-    const bool limited = limits && axis.joint->type != urdf::Joint::CONTINUOUS;
-    if (limited) joint.position_limit_rad = {limits->lower, limits->upper};
+    chain.unlimited.push_back(WhyUnlimited(*axis.joint));
+    if (chain.unlimited.back().empty()) joint.position_limit_rad = {limits->lower, limits->upper};
     if (limits) joint.speed_limit_radps = limits->velocity, joint.torque_limit_Nm = limits->effort;
     if (const auto& d = axis.joint->dynamics) joint.nominal = {{"Fc", d->friction}, {"Fv", d->damping}};
+    joint.wide = {"Fc", "Fv", "Ia"};
     const Isometry3d frame = frames[i].Pose();
     joint.link = ToLink(Moved(frame.inverse(), axis.body));
+    for (UrdfPart& part : chain.part[i]) part.pose = frame.inverse() * part.pose;
     chain.joint.push_back(joint);
-    chain.limited.push_back(limited);
   }
   chain.base = frames.front().Pose();
-  chain.flange = frames.back().Pose().inverse() * walk.axes.back().link;
+  chain.flange = chain.part.back().front().pose;
+  for (const UrdfPart& part : chain.part.back())
+    if (part.link == asked.tip) chain.flange = part.pose;
   return chain;
+}
+
+UrdfChoice ChooseChain(const UrdfChoice& asked, std::vector<std::string>& said) {
+  const std::string file = asked.path.string();
+  const urdf::ModelInterfaceSharedPtr model = Parse(asked.path);
+  io::Faults faults;
+  UrdfChoice chosen = asked;
+  if (asked.tip.empty()) {
+    for (const auto& [name, joint] : model->joints_) {
+      if (!joint->mimic) continue;
+      const auto source = model->joints_.find(joint->mimic->joint_name);
+      if (source == model->joints_.end() || source->second->mimic) continue;
+      if (chosen.fixed.try_emplace(source->first, Choice::Rest(*source->second)).second)
+        said.push_back("joint \"" + source->first + "\" is held at " + Number(chosen.fixed[source->first]) +
+                       ", for \"" + name + "\" mimics it");
+    }
+    const Choice choice(chosen, *model, faults);
+    std::map<std::string, int> ends;
+    FindEnds(*model, choice, *model->getRoot(), model->getRoot()->name, 0, ends);
+    int most = 0;
+    for (const auto& [tip, joints] : ends) most = std::max(most, joints);
+    std::vector<std::string> longest, all;
+    for (const auto& [tip, joints] : ends) {
+      all.push_back(tip);
+      if (joints == most) longest.push_back(tip);
+    }
+    if (longest.size() > 1)
+      faults.Add(file +
+                 ": expected one chain, but it branches; name the link at which the arm ends, or one before the "
+                 "branch: --tip with one of " +
+                 List(longest));
+    faults.ThrowIfAny();
+    if (ends.size() > 1) {
+      chosen.tip = longest.front();
+      said.push_back("the arm ends at link \"" + chosen.tip + "\", the longest of the chains to " + List(all));
+    }
+  }
+  const Choice choice(chosen, *model, faults);
+  faults.ThrowIfAny();
+  for (const auto& [name, position] : choice.held()) {
+    const urdf::Joint& joint = *model->joints_.at(name);
+    if (joint.mimic || chosen.fixed.contains(name)) continue;
+    chosen.fixed[name] = position;
+    said.push_back("joint \"" + name + "\" is held at " + Number(position) + ": it does not lead to \"" + chosen.tip +
+                   "\"");
+  }
+  return chosen;
 }
 
 }  // namespace armcal::codegen

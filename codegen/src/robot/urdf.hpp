@@ -6,23 +6,49 @@
 #include <string>
 #include <vector>
 
+#include "codegen/src/io/faults.hpp"
+#include "codegen/src/robot/body.hpp"
 #include "codegen/src/robot/robot.hpp"
 
 namespace armcal::codegen {
 
+// A link of the URDF as a part of a moving body.
+struct UrdfPart {
+  std::string link;
+  Eigen::Isometry3d pose;  // the link's own frame, seen from the body's DH frame
+  Body body;               // in the link's own axes, centre from its frame; mass 0: the URDF has no inertia for it
+};
+
 struct UrdfChain {
   // Outward: name, kinematics, limits, friction ("Fc", "Fv") and the link with all that is fixed to it.
   std::vector<Joint> joint;
-  std::vector<bool> limited;  // false: a continuous joint, position_limit_rad is not set
+  // Why the URDF's position limits cannot be used, and position_limit_rad is not set; empty: they can.
+  std::vector<std::string> unlimited;
+  // Of each joint: the link that it moves, then all that is fixed to it.
+  std::vector<std::vector<UrdfPart>> part;
   // Frame 0 seen from the URDF's root link, and the URDF's last link frame seen from the last DH frame.
   Eigen::Isometry3d base, flange;
+  std::vector<std::string> same_inertia;  // moving links that share mass, centre and inertia: nobody computed these
+  std::map<std::string, double> held;     // movable joints that are held, mimic joints among them; rad or m
 };
+
+// The URDF's text. A .xacro file, or a file that holds xacro's macros, is expanded by the program `xacro` if there is
+// one. Throws io::InputError: no such file; the command to run where `xacro` is missing or fails.
+std::string UrdfText(const std::filesystem::path& path);
 
 // What is fixed to each other is one body; what is fixed to the root is left out. Joint positions, their zero and their
 // sign are the URDF's. Quarter turns within 1e-5 rad (a URDF prints pi/2 as 1.5708) and offsets below 1e-5 m are taken
-// as meant exactly.
-// Throws io::InputError, one line with file and joint or link: unreadable, branching, no movable joint, a floating,
-// planar or mimic joint.
-UrdfChain ReadUrdf(const std::filesystem::path& path);
+// as meant exactly. With a tip, all movable joints that do not lead to it are held at `fixed`, or at zero, or at the
+// limit next to zero. A mimic joint is held with the joint that it follows.
+// Throws io::InputError with all faults, a line for each with file and joint or link: unreadable, branching, no movable
+// joint, a floating, planar or mimic joint, lengths in millimetres, a body that cannot exist (unless bodies do not
+// count).
+enum class UrdfBodies { kChecked, kIgnored };
+UrdfChain ReadUrdf(const UrdfChoice& choice, UrdfBodies bodies = UrdfBodies::kChecked);
+
+// Completes what a user has asked for: holds mimic joints and those that they follow, and ends the chain at the
+// only longest one. `said`: a line for each choice that was made. Throws io::InputError as ReadUrdf does, and where two
+// chains are equally long.
+UrdfChoice ChooseChain(const UrdfChoice& asked, std::vector<std::string>& said);
 
 }  // namespace armcal::codegen

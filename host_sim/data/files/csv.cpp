@@ -6,12 +6,15 @@
 #include <cmath>
 #include <cstdlib>
 #include <string_view>
+#include <unordered_set>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
 
 namespace armcal::files {
 namespace {
+
+constexpr std::size_t kMostColumns = 4096;
 
 std::string_view Trim(std::string_view s) {
   constexpr std::string_view kBlank = " \t\r";
@@ -64,11 +67,13 @@ std::vector<std::string> ScanHeader(Scanner& scan) {
     scan.Fail("columns are separated by ';', expected ',' (and '.' in numbers)");
   }
   std::vector<std::string> names;
+  std::unordered_set<std::string> known;
   std::string_view field;
   while (scan.NextField(field)) {
     const std::string name(Trim(field));
+    if (names.size() == kMostColumns) scan.Fail("more than " + std::to_string(kMostColumns) + " columns");
     if (name.empty()) scan.Fail("column " + std::to_string(names.size() + 1) + " has no name");
-    if (std::find(names.begin(), names.end(), name) != names.end()) scan.Fail("column '" + name + "' appears twice");
+    if (!known.insert(name).second) scan.Fail("column '" + name + "' appears twice");
     names.push_back(name);
   }
   return names;

@@ -22,6 +22,9 @@ struct CloseGz {
 };
 using GzHandle = std::unique_ptr<gzFile_s, CloseGz>;
 
+// Text of numbers shrinks to a third or a fifth. A file made to fill the memory shrinks to a thousandth.
+constexpr std::size_t kExpansion = 60, kExpansionFree_bytes = std::size_t{16} << 20;
+
 void RequireRegular(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error)) throw io::InputError(path.string() + ": no such file");
@@ -63,10 +66,14 @@ std::string ReadWholeFile(const fs::path& path) {
   GzHandle in(gzopen(path.c_str(), "rb"));
   if (!in) throw io::InputError(path.string() + ": cannot be opened");
   gzbuffer(in.get(), 1u << 18);
+  const std::size_t most = kExpansion * static_cast<std::size_t>(fs::file_size(path)) + kExpansionFree_bytes;
   std::string content;
   std::size_t used = 0;
   for (;;) {
-    content.resize(std::max<std::size_t>(std::size_t{1} << 20, 2 * used));
+    if (used > most)
+      throw io::InputError(path.string() + ": grows to more than " + std::to_string(kExpansion) +
+                           " times its size when it is decompressed, which no log does");
+    content.resize(std::max<std::size_t>(std::size_t{1} << 20, used + used / 2));
     const int got = gzread(in.get(), content.data() + used,
                            static_cast<unsigned>(std::min<std::size_t>(content.size() - used, std::size_t{1} << 30)));
     int code = Z_OK;

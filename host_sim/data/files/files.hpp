@@ -7,7 +7,8 @@
 
 namespace armcal::files {
 
-// The whole content; gzip is recognised by its content, not by the name. InputError: cannot be opened, or is cut short.
+// The whole content; gzip is recognised by its content, not by the name. InputError: cannot be opened, is
+// cut short, or grows to more than 60 times its size and 16 MB.
 std::string ReadWholeFile(const std::filesystem::path& path);
 
 // Writes the text so that a reader sees the old file or the new one, never a part. A name that ends in ".gz" is

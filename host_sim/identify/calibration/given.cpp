@@ -71,6 +71,7 @@ Given Empty(const codegen::Model& model) {
 }
 
 void SetBodies(const codegen::Model& model, const Eigen::VectorXd& bodies, Given& given) {
+  given.bodies = bodies;
   given.x.segment(model.front(), model.rigid()) = model.base_map() * bodies;
 }
 
@@ -122,6 +123,7 @@ Given GivenByRobot(const codegen::Model& model) {
                          "identify --json writes");
   Given given = Empty(model);
   given.x.head(model.columns()) = MakePrior(model).mean.head(model.columns());
+  given.bodies = BodyMean(model);
   for (int k = 0; k < model.nonlinear(); ++k)
     given.eta.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
   return given;
@@ -177,6 +179,7 @@ void AddPayload(const codegen::Model& model, const codegen::Payload& payload, co
       Eigen::Map<const Eigen::Matrix<double, 6, 1>>(body.inertia_kgm2.data());
   bodies.segment(11 * (model.joints() - 1), 10) = ToOrigin(centre);
   given.x.segment(model.front(), model.rigid()) += model.base_map() * bodies;
+  if (given.bodies.size() > 0) given.bodies += bodies;
 }
 
 }  // namespace armcal::calibration

@@ -174,6 +174,10 @@ void WriteTable(const std::filesystem::path& path, const TableFile& t) {
 TableFile ReadTable(const std::filesystem::path& path) {
   const toml::table toml = io::ParseToml(path);
   const io::TomlReader in(toml, path.string());
+  if (in.Has("gravity_mps2") || in.Has("dh") || in.Has("urdf"))
+    throw io::InputError(path.string() +
+                         ": a robot file, expected a parameter table, which armcal identify --table-out writes; a "
+                         "robot file is given as --robot");
   in.AllowOnly({"robot", "note", "schema", "bumpless", "blend_ms", "forgetting", "joint", "parameter"});
   TableFile t;
   t.robot = in.Text("robot");

@@ -46,7 +46,7 @@ class Drive {
         arm_(plant::ReadScenario(o.scenario), o.robot),
         player_(n, arm_.tick_s(), Limits(robot_)),
         storage_(2, kSectorBytes, 8),
-        controller_(Opened(storage_, o.storage), port_linux::SteadyClock(tick_), Identity()),
+        controller_(Opened(storage_, o.storage), port_linux::SteadyClock(tick_), Identity(), Rules()),
         vendor_(player_, n) {
     Require(controller_.Record(raw_trace_));
     Require(sample_trace_.Serve(controller_.map(), 1));
@@ -68,7 +68,8 @@ class Drive {
   void Run(const std::atomic<bool>& quit, OnListen on_listen) {
     link::TcpService<port_linux::TcpServer::kSlots> service(controller_.engine());
     using Service = decltype(service);
-    port_linux::TcpServer server({&service, Service::kMaxReply, &Service::Open, &Service::Receive, &Service::MidFrame},
+    port_linux::TcpServer server({&service, Service::kMaxReply, &Service::Open, &Service::Receive, &Service::MidFrame,
+                                  &Service::Close, &Service::Keep},
                                  port_linux::SteadyClock(tick_));
     if (!core::IsOk(server.Listen(options_.address, static_cast<std::uint16_t>(options_.port))))
       throw io::InputError(server.error());
@@ -94,6 +95,12 @@ class Drive {
     identity.firmware_version = 1, identity.serial_number = 1;
     identity.capabilities = link::reg::kHasSampleTrace;
     return identity;
+  }
+  // A file does not wear out.
+  static controller::BoardRules Rules() {
+    controller::BoardRules rules;
+    rules.saves.interval_ms = 0;
+    return rules;
   }
   static hardware::Storage Opened(port_linux::FileStorage& storage, const std::string& path) {
     if (!core::IsOk(storage.Open(path))) throw io::InputError(path + ": expected a file that can be written");

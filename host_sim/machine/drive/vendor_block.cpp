@@ -95,7 +95,7 @@ Status VendorBlock::WritePoints(void* self, std::uint16_t offset, std::uint16_t 
   auto& b = *static_cast<VendorBlock*>(self);
   if (offset != 0 || count < 2 || (count - 2) % (2 * b.joints_) != 0) return Status::kWrongSize;
   const std::uint32_t first = core::GetU32(w), points = static_cast<std::uint32_t>((count - 2) / (2 * b.joints_));
-  if (first + points > b.points_) return Status::kOutOfRange;
+  if (points > b.points_ || first > b.points_ - points) return Status::kOutOfRange;  // first + points may wrap
   for (int k = 2; k < count; k += 2)
     if (!std::isfinite(core::GetF32(w + k))) return Status::kNotFinite;
   for (std::uint32_t k = 0; k < points * b.joints_; ++k)

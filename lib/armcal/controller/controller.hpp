@@ -14,6 +14,7 @@
 #include "armcal/link/device.hpp"
 #include "armcal/link/table_transaction.hpp"
 #include "armcal/link/trace.hpp"
+#include "armcal/model/friction_grid.hpp"
 #include "armcal/table/table_store.hpp"
 
 namespace armcal::controller {
@@ -22,6 +23,12 @@ namespace armcal::controller {
 template <int n>
 struct SetPoint {
   float q[n], qd[n], qdd[n];
+};
+
+// What a board lets a client do. The defaults are the careful ones.
+struct BoardRules {
+  bool adopt_while_enabled = false;  // a bumpless table may be adopted while axes are enabled
+  link::SaveRate saves = {};
 };
 
 // One motion controller. It lives as long as the power is on, and takes some 80 KB for six joints. Filters: one or two
@@ -35,13 +42,17 @@ class Controller {
   static constexpr int n = Model::kJoints;
   static constexpr int kFilters = sizeof...(Filters);
   static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
+  using Ceilings = model::Ceilings<n, Model::kParameters>;
 
   // `identity`: versions, texts and further capabilities, which are the integrator's. This class fills in the rest from
-  // the model.
-  Controller(const hardware::Storage& storage, const hardware::Clock& clock, const link::Identity& identity = {})
+  // the model. `ceilings`: the hardest values that a table may hold; they outlive this object.
+  Controller(const hardware::Storage& storage, const hardware::Clock& clock, const link::Identity& identity = {},
+             const BoardRules& rules = {}, const Ceilings& ceilings = Model::kCeilings)
       : clock_(clock),
+        rules_(rules),
+        ceilings_(model::View(ceilings)),
         store_(storage, Model::kSchema, kWords),
-        transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords),
+        transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords, rules.saves),
         device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals}),
         estimators_(Shared<Filters>()...) {
     model::Encode(estimator::DefaultTable<Model>(), active_);
@@ -173,16 +184,18 @@ class Controller {
     live_.enabled_axes = enabled_axes_.load(std::memory_order_relaxed);
     live_.clamp_count = clamp_count_.load(std::memory_order_relaxed);
     live_.sample_gaps = intake_.refused();
+    live_.implausible_ticks = intake_.implausible();
     (Show(k, estimator<k>()), ...);
   }
   template <class Estimator>
   void Show(std::size_t k, Estimator& estimator) {
     estimator::Estimates<Model>& e = estimates_[k];
     if (!estimator.Take(e)) return;
-    live_.rows_used[k] = live_.rows_gated[k] = 0;
+    live_.rows_used[k] = live_.rows_gated[k] = live_.rows_outside[k] = 0;
     for (int i = 0; i < n; ++i) {
       live_.rows_used[k] += e.rows_used[i];
       live_.rows_gated[k] += e.rows_gated[i];
+      live_.rows_outside[k] += e.rows_outside[i];
     }
     const auto bit = static_cast<std::uint16_t>(1u << k);
     live_.health = static_cast<std::uint16_t>(e.inconsistent ? live_.health | bit : live_.health & ~bit);
@@ -225,13 +238,22 @@ class Controller {
 
   // What link::TableTransaction asks for when a table is flashed. Check decodes and builds the table, once. What it has
   // built waits in the spare until it is adopted or until another table is checked. Context: background.
-  static core::Status Check(void* self, const std::uint16_t* words) {
+  static core::Refusal Check(void* self, const std::uint16_t* words) {
     auto& c = *static_cast<Controller*>(self);
     c.spare_is_checked_ = false;
-    core::Status status = model::Decode(words, Model::kSchema, c.table_);
-    if (core::IsOk(status)) status = c.BuildSpare();
-    c.spare_is_checked_ = core::IsOk(status);
-    return status;
+    const core::Refusal refusal = c.Judge(words);
+    c.spare_is_checked_ = core::IsOk(refusal.status);
+    return refusal;
+  }
+  core::Refusal Judge(const std::uint16_t* words) {
+    core::Refusal refusal;
+    refusal.status = model::CheckHeading<n, Model::kParameters>(words, Model::kSchema);
+    if (core::IsOk(refusal.status)) refusal = model::CheckWords(ceilings_, rules_.adopt_while_enabled, words);
+    if (core::IsOk(refusal.status)) refusal.status = model::Decode(words, Model::kSchema, table_);
+    if (core::IsOk(refusal.status)) refusal.status = BuildSpare();
+    if (core::IsOk(refusal.status))
+      refusal = model::CheckFriction(Spare().committed, ceilings_, friction_memory_, friction_rows_);
+    return refusal;
   }
   static core::Status Permit(void* self) {
     auto& c = *static_cast<Controller*>(self);
@@ -268,6 +290,8 @@ class Controller {
   }
 
   hardware::Clock clock_;
+  BoardRules rules_;
+  model::CeilingView ceilings_;
   std::uint16_t staged_[kWords] = {}, active_[kWords] = {};
   table::TableStore store_;
   link::TableTransaction transaction_;
@@ -282,6 +306,8 @@ class Controller {
   std::tuple<estimator::Estimator<Model, Filters, estimator::Intake<Model>&>...> estimators_;
   estimator::Estimates<Model> estimates_[kFilters];
   monitor::ResidualStatistics<n> residuals_;
+  model::Memory<Model> friction_memory_;  // work space of a check, as the next one
+  model::Rows<Model> friction_rows_;
   estimator::Table<Model> table_;  // the last one that was decoded
   estimator::RigidPrior<Model, float> rigid_;
   estimator::AdoptedTable<Model> adopted_[2];

@@ -11,28 +11,42 @@ namespace armcal::core {
 // comment of the function says what it changes.
 enum class [[nodiscard]] Status : std::uint8_t{
     kOk = 0,
-    kNotFinite = 1,      // a number is NaN or infinite
-    kOutOfRange = 2,     // a number lies outside its documented range
-    kWrongSize = 3,      // a count or length does not fit
-    kWrongOrder = 4,     // not allowed in the present state of a transaction
-    kWrongSchema = 5,    // made for another model
-    kUnphysical = 6,     // a body whose pseudo-inertia is not positive definite
-    kAxisEnabled = 7,    // refused while an axis is enabled
-    kLocked = 8,         // the session is not unlocked
-    kFull = 9,           // no room; the new item was refused whole
-    kEmpty = 10,         // nothing there to take
-    kBadCrc = 11,        // content and checksum differ
-    kBadAddress = 12,    // no such register
-    kBadFunction = 13,   // no such function code
-    kReadOnly = 14,      // this register cannot be written
-    kBusy = 15,          // an earlier command is still running
-    kStorageFault = 32,  // the storage refused or returned what was not written
-    kBlank = 33,         // storage holds no record at all
-    kCorrupt = 34,       // storage holds a record that fails its checks
-    kTimeout = 35,       // a partner did not answer in time
-    kGated = 64,         // accepted, but no row of the sample may update an estimate
-    kClamped = 65,       // a value was cut to its limit; the limit's counter went up
-    kHeld = 66,          // the supervisor keeps the last good value
+    kNotFinite = 1,       // a number is NaN or infinite
+    kOutOfRange = 2,      // a number lies outside its documented range
+    kWrongSize = 3,       // a count or length does not fit
+    kWrongOrder = 4,      // not allowed in the present state of a transaction
+    kWrongSchema = 5,     // made for another model
+    kUnphysical = 6,      // a body whose pseudo-inertia is not positive definite
+    kAxisEnabled = 7,     // refused while an axis is enabled
+    kLocked = 8,          // the session is not unlocked
+    kFull = 9,            // no room; the new item was refused whole
+    kEmpty = 10,          // nothing there to take
+    kBadCrc = 11,         // content and checksum differ
+    kBadAddress = 12,     // no such register
+    kBadFunction = 13,    // no such function code
+    kReadOnly = 14,       // this register cannot be written
+    kBusy = 15,           // an earlier command is still running
+    kBeyondCeiling = 16,  // a number lies beyond the hardest value that the firmware allows
+    kFeedsEnergy = 17,    // a joint's friction would push instead of brake
+    kForbidden = 18,      // the board does not allow it
+    kSeatTaken = 19,      // another connection is writing
+    kTooSoon = 20,        // the board allows no further save yet
+    kStorageFault = 32,   // the storage refused or returned what was not written
+    kBlank = 33,          // storage holds no record at all
+    kCorrupt = 34,        // storage holds a record that fails its checks
+    kTimeout = 35,        // a partner did not answer in time
+    kGated = 64,          // accepted, but no row of the sample may update an estimate
+    kClamped = 65,        // a value was cut to its limit; the limit's counter went up
+    kHeld = 66,           // the supervisor keeps the last good value
+};
+
+// Why a table was refused, and which of its words. `value` was found there, `bound` would have been accepted.
+struct Refusal {
+  static constexpr std::uint16_t kNoWord = 0xFFFF;
+
+  Status status = Status::kOk;
+  std::uint16_t word = kNoWord;  // its first one, counted from 0
+  float value = 0.0f, bound = 0.0f;
 };
 
 constexpr bool IsOk(Status s) { return s == Status::kOk; }

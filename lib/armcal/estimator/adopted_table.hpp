@@ -2,6 +2,7 @@
 #pragma once
 
 #include "armcal/estimator/rigid_prior.hpp"
+#include "armcal/estimator/row_gate.hpp"
 #include "armcal/filter/prior.hpp"
 #include "armcal/model/evaluate.hpp"
 #include "armcal/model/parameters.hpp"
@@ -22,6 +23,7 @@ using Table = model::ParameterTable<Model::kJoints, Model::kParameters>;
 // What one table means for feed-forward and filters. It must stay as it is while an estimator works with it.
 template <class Model>
 struct AdoptedTable {
+  static_assert(Model::kRigid > 0, "a model has at least one base parameter of its links");
   model::Committed<Model> committed;  // b0, and all that the tick needs
   filter::Prior<Model> prior;
   // s: an estimate is b = b0 + s x; of a logarithmic eta, ln b = ln b0 + s x.
@@ -29,6 +31,7 @@ struct AdoptedTable {
   float eta_low[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // bounds of x
   float eta_high[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
   float sigma_Nm[Model::kJoints] = {};
+  float gate_sigma[Model::kJoints] = {};  // of RowGate; 0: open
 };
 
 // A nonlinear parameter whose range excludes zero is positive, and is estimated as its logarithm.
@@ -168,18 +171,21 @@ core::Status BuildAdoptedTable(const Table<Model>& table, std::uint32_t generati
   }
   internal::PriorOfEta<Model>(table, adopted);
   prior.link_floor = kLinkFloor;
-  prior.gate_sigma = 0.0f;
+  prior.gate_sigma = 0.0f;  // RowGate decides, for every filter
   internal::ScaleCorrelation(rigid, adopted);
 
   c.valid = true;
   c.generation = generation;
   c.bumpless = (table.flags & model::kFlagBumpless) != 0;
-  c.blend_ticks = static_cast<std::uint32_t>(static_cast<float>(table.blend_ms) * (Model::kTickRate_Hz / 1000.0f));
+  // Cut to the largest float below 2^32: the cast of a larger number differs between machines.
+  const float blend = static_cast<float>(table.blend_ms) * (Model::kTickRate_Hz / 1000.0f);
+  c.blend_ticks = static_cast<std::uint32_t>(math::Min(blend, 4294967040.0f));
   for (int i = 0; i < Model::kJoints; ++i) {
     c.limit_Nm[i] = table.joint[i].torque_limit_Nm;
     c.v_min_radps[i] = table.joint[i].v_min_radps;
     c.torque_scale[i] = table.joint[i].torque_scale;
     adopted.sigma_Nm[i] = table.joint[i].sigma_Nm;
+    adopted.gate_sigma[i] = kGateSigma;
   }
   return Status::kOk;
 }

@@ -24,7 +24,8 @@ struct Estimates {
   float eta_sd[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
   std::uint32_t clamps = 0;  // how often an eta was cut to its bound
   std::uint32_t rows_used[Model::kJoints] = {};
-  std::uint32_t rows_gated[Model::kJoints] = {};    // not valid, not moving, or outside the innovation gate
+  std::uint32_t rows_gated[Model::kJoints] = {};    // not valid, not moving, or outside the gate
+  std::uint32_t rows_outside[Model::kJoints] = {};  // of these, in motion and outside the gate: see RowGate
   std::uint32_t rows_refused[Model::kJoints] = {};  // not finite or beyond filter::kRowLimit
   float nis[Model::kJoints] = {};                   // see monitor::JointMonitor
   float residual_rms_Nm[Model::kJoints] = {};       // measured minus committed model, used rows

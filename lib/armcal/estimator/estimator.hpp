@@ -7,6 +7,7 @@
 #include "armcal/estimator/estimates.hpp"
 #include "armcal/estimator/intake.hpp"
 #include "armcal/estimator/live_model.hpp"
+#include "armcal/estimator/row_gate.hpp"
 #include "armcal/math/columns.hpp"
 
 namespace armcal::estimator {
@@ -15,28 +16,26 @@ namespace armcal::estimator {
 template <class Model>
 struct Row {
   float front[Model::kFront > 0 ? Model::kFront : 1] = {};  // from the joint's first column on
-  float dense[Model::kDense] = {};
+  float dense[Model::kDense] = {};  // from kRowBegin[joint] on; what is before is not of this row
   float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // extended filter only
   float y = 0.0f;
   float load_Nm = 0.0f, model_Nm = 0.0f;  // committed torque of the dense columns alone, and of all columns
   float residual_Nm = 0.0f;               // measured minus committed
 };
 
-// Fills in all but eta. y = (tau - tau at b0) / sigma. committed, seen: the regressor at the committed parameters, and
-// the one that the filter sees. One copy serves all estimators of a model. Context: background.
+// Fills in front, dense, residual_Nm and y = (tau - tau at b0) / sigma; row.model_Nm is given. seen: the regressor that
+// the filter sees. One copy serves all estimators of a model. Context: background.
 template <class Model>
-ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows<Model>& committed,
-                             const model::Rows<Model>& seen, int joint, float tau_Nm, Row<Model>& row) {
+ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows<Model>& seen, int joint, float tau_Nm,
+                             Row<Model>& row) {
   const int first = Model::kFrontBegin[joint], end = Model::kFrontBegin[joint + 1];
   const float whiten = 1.0f / table.sigma_Nm[joint];
   const auto scaled = [&](float value, int column) {
     return math::Masked(value * (table.scale[column] * whiten), table.prior.active[column]);
   };
   for (int k = first; k < end; ++k) row.front[k - first] = scaled(seen.front[k], k);
-  for (int k = 0; k < Model::kDense; ++k)
+  for (int k = Model::kRowBegin[joint]; k < Model::kDense; ++k)
     row.dense[k] = scaled(seen.dense[joint * Model::kDense + k], Model::kFront + k);
-  row.load_Nm = model::LoadTorque(table.committed.p, committed, joint);
-  row.model_Nm = model::RowTorque(table.committed.p, committed, joint, row.load_Nm);
   row.residual_Nm = tau_Nm - row.model_Nm;
   row.y = row.residual_Nm * whiten;
 }
@@ -80,11 +79,12 @@ class Estimator {
     estimates_ = Estimates<Model>{};
     estimates_.generation = table.committed.generation;
     statistics_.Restart(adopted_tick);
+    gate_.Restart();
     if constexpr (Filter::kExtended) live_.Restart();
     stage_ = Stage::kIdle;
     credit_ = 0;
     resets_due_ = 0;
-    slice_ = filter::EqualSlices(filter_.SampleCost() + kSampleCost + n * kRowCost);
+    slice_ = filter::EqualSlices(filter_.SampleCost() + kSampleCost + kGateCost + n * kRowCost);
     read_out_due_ = true;
   }
 
@@ -137,8 +137,9 @@ class Estimator {
 
   // Counts of the intake.
   std::uint32_t refused_samples() const { return intake_.refused(); }
-  std::uint32_t pending() const { return intake_.pending(); }      // samples waiting for Step; context: any
-  std::uint32_t tick_gaps() const { return intake_.tick_gaps(); }  // restarts of the signal path; context: tick
+  std::uint32_t pending() const { return intake_.pending(); }          // samples waiting for Step; context: any
+  std::uint32_t implausible() const { return intake_.implausible(); }  // ticks that the arm cannot have made
+  std::uint32_t tick_gaps() const { return intake_.tick_gaps(); }      // restarts of the signal path; context: tick
 
   const Filter& filter() const { return filter_; }
   // The filter's finished read-out, for BeginPhysical; nullptr: rows have come in since. Context: background.
@@ -147,7 +148,8 @@ class Estimator {
  private:
   enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReset, kReadOut };
   // Credit of a sample's regressor, and of a row's whitening and statistics: from counts of six-axis models.
-  static constexpr int kSampleCost = Intake<Model>::kEvaluationCost, kRowCost = 3 * Model::kDense;
+  static constexpr int kSampleCost = Intake<Model>::kEvaluationCost, kRowCost = 5 * Model::kDense / 2;
+  static constexpr int kGateCost = 5 * n * Model::kDense / 2;  // of both torques of all rows, and of the gate
 
   struct Nothing {};
 
@@ -194,11 +196,29 @@ class Estimator {
       credit_ -= kSampleCost;
       live_.Linearise(*table_, filter_, intake_.input(), intake_.gap());
     }
-    updating_ = hold_ ? 0u : intake_.moving();
+    JudgeRows();
+    credit_ -= kGateCost;
+    updating_ = hold_ ? 0u : intake_.moving() & ~outside_;
     used_ = 0;
     joint_ = 0;
     stage_ = Stage::kRow;
     return true;
+  }
+
+  // Decides which rows of the sample are outside the gate, from what was known before the sample: the last read-out,
+  // and the rows before.
+  void JudgeRows() {
+    outside_ = 0;
+    for (int i = 0; i < n; ++i) {
+      const float tau_Nm = intake_.sample().tau[i], whiten = 1.0f / table_->sigma_Nm[i];
+      load_Nm_[i] = model::LoadTorque(table_->committed.p, intake_.rows(), i);
+      tau_model_Nm_[i] = model::RowTorque(table_->committed.p, intake_.rows(), i, load_Nm_[i]);
+      const float known_Nm = model::RowTorque(estimates_.value, FilterRows(), i);
+      const bool moves = ((intake_.moving() >> i) & 1u) != 0u;
+      const bool inside = gate_.Admit(i, (tau_Nm - tau_model_Nm_[i]) * whiten, (tau_Nm - known_Nm) * whiten, moves,
+                                      intake_.sample().qd[i] > 0.0f, table_->gate_sigma[i]);
+      outside_ |= static_cast<std::uint32_t>(moves & !inside) << i;
+    }
   }
 
   void BeginReset() {
@@ -214,14 +234,15 @@ class Estimator {
   void BeginRow() {
     const float tau_Nm = intake_.sample().tau[joint_];
     const bool use = ((updating_ >> joint_) & 1u) != 0u;
-    FillRow(*table_, intake_.rows(), FilterRows(), joint_, tau_Nm, row_);
+    row_.load_Nm = load_Nm_[joint_];
+    row_.model_Nm = tau_model_Nm_[joint_];
+    FillRow(*table_, FilterRows(), joint_, tau_Nm, row_);
     if constexpr (Filter::kExtended) {
       live_.CompleteRow(*table_, joint_, tau_Nm, row_);
       filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use, row_.eta);
     } else {
       filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use);
     }
-    tau_model_Nm_[joint_] = row_.model_Nm;
     credit_ -= kRowCost;
     stage_ = Stage::kUpdate;
   }
@@ -236,6 +257,7 @@ class Estimator {
     const filter::UpdateReport& report = filter_.report();
     used_ |= static_cast<std::uint32_t>(report.accepted) << i;
     const bool moves = ((intake_.moving() >> i) & 1u) != 0u;
+    estimates_.rows_outside[i] += (outside_ >> i) & 1u;
     statistics_.Add(i, report, row_.residual_Nm, row_.load_Nm, intake_.sample(), moves, estimates_);
     stage_ = ++joint_ == n ? Stage::kEnd : Stage::kRow;
     if (stage_ == Stage::kEnd) EndRows();
@@ -288,11 +310,13 @@ class Estimator {
   std::conditional_t<Filter::kExtended, LiveModel<Model>, Nothing> live_;
   Row<Model> row_;
   RowStatistics<Model> statistics_;
+  RowGate<n> gate_;
   Estimates<Model> estimates_;
-  float tau_model_Nm_[n] = {};
+  float load_Nm_[n] = {}, tau_model_Nm_[n] = {};
   int credit_ = 0, slice_ = filter::kSliceCredit;
   const std::uint32_t reader_ = intake_.Join();  // this estimator's bit
   std::uint32_t updating_ = 0, used_ = 0;        // joints, a bit each: rows that may change the estimate, and that did
+  std::uint32_t outside_ = 0;                    // rows that the gate refuses
   std::uint32_t resets_due_ = 0;                 // blocks, a bit each
   std::uint32_t publish_every_ = 125;
   Observer observer_ = nullptr;

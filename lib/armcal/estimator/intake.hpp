@@ -1,6 +1,8 @@
 // estimator - from raw samples to the regressor: signal path, ring and model, once however many filters there are.
 #pragma once
 
+#include <atomic>
+
 #include "armcal/core/mailbox.hpp"
 #include "armcal/core/sample_ring.hpp"
 #include "armcal/estimator/adopted_table.hpp"
@@ -54,7 +56,9 @@ class Intake {
   // (counted). Context: tick.
   core::Status Push(const model::RawSample<n>& raw) {
     TakeSettings();
-    if (!path_.PushTick(raw)) return core::Status::kOk;
+    const bool ready = path_.PushTick(raw);
+    implausible_.store(path_.implausible_count(), std::memory_order_relaxed);
+    if (!ready) return core::Status::kOk;
     return ring_.Push({path_.sample(), path_.generation()});
   }
   // One sample that a signal path made elsewhere: torque scale and flags are already inside. The rest is bit for bit
@@ -114,6 +118,7 @@ class Intake {
   // Context: any.
   std::uint32_t refused() const { return ring_.refused(); }
   std::uint32_t pending() const { return ring_.size(); }
+  std::uint32_t implausible() const { return implausible_.load(std::memory_order_relaxed); }  // ticks: see SignalPath
 
  private:
   struct Item {
@@ -151,6 +156,7 @@ class Intake {
   signal::SignalPath<n, Model::kSampleTicks> path_;  // the tick's
   core::Mailbox<signal::Settings<n>> settings_;
   core::SampleRing<Item, kRingSamples> ring_;
+  std::atomic<std::uint32_t> implausible_{0};  // the tick writes it
 
   const model::Committed<Model>* committed_ = nullptr;  // the background's, from here on
   model::Memory<Model> memory_ = {};

@@ -30,7 +30,7 @@ class LiveModel {
       }
     }
     Model::Regressor(x, table.committed.p, eta_, now_, next_, rows_.front, rows_.dense);
-    Model::Jacobian(x, table.committed.p, eta_, p_, now_, next_, jacobian_);
+    if constexpr (kNonlinear > 0) Model::Jacobian(x, table.committed.p, eta_, p_, now_, next_, jacobian_);
     running_ = true;
     for (int k = 0; k < kCarried; ++k) {
       running_ = running_ && math::IsFinite(next_[k]);
@@ -49,7 +49,7 @@ class LiveModel {
                                 table.prior.active[Model::kColumns + e]);
     float y = (tau_Nm - model::RowTorque(p_, rows_, joint)) * whiten;
     for (int k = first; k < end; ++k) y += row.front[k - first] * x0_[k];
-    for (int k = 0; k < Model::kDense; ++k) y += row.dense[k] * x0_[Model::kFront + k];
+    for (int k = Model::kRowBegin[joint]; k < Model::kDense; ++k) y += row.dense[k] * x0_[Model::kFront + k];
     for (int e = 0; e < kNonlinear; ++e) y += (row.eta[e] *= whiten) * x0_[Model::kColumns + e];
     row.y = y;
   }
@@ -57,8 +57,9 @@ class LiveModel {
  private:
   static constexpr int kCarried = Model::kStates + Model::kSensitivities;
   model::Rows<Model> rows_ = {};
-  float jacobian_[n * kNonlinear] = {};
-  float x0_[Model::kColumns + kNonlinear] = {}, p_[Model::kColumns] = {}, eta_[kNonlinear] = {};
+  static constexpr int kRoom = kNonlinear > 0 ? kNonlinear : 1;  // a model without eta is served, too
+  float jacobian_[n * kRoom] = {};
+  float x0_[Model::kColumns + kNonlinear] = {}, p_[Model::kColumns] = {}, eta_[kRoom] = {};
   float now_[kCarried > 0 ? kCarried : 1] = {}, next_[kCarried > 0 ? kCarried : 1] = {};
   bool running_ = false;
 };

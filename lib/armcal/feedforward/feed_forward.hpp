@@ -7,6 +7,9 @@
 
 namespace armcal::feedforward {
 
+// The shortest cross-fade of a bumpless table. A table that asks for less would be a step of the torque.
+inline constexpr float kShortestFade_s = 0.05f;
+
 template <class Model>
 class FeedForward {
  public:
@@ -23,8 +26,10 @@ class FeedForward {
   // Torque of the set-point. Shapes: all [kJoints]. t_s: seconds since the table was adopted. A set-point slower than
   // v_min counts as standing, so that friction does not chatter. kOk; kClamped (a joint was cut to its limit, and that
   // was counted); kEmpty (no valid table; torque zero); kNotFinite (set-point or model is not finite; that joint's
-  // torque is zero). Constant time, because the old and the new parameters of a cross-fade are always both evaluated.
-  // Context: tick.
+  // torque is zero). Constant time, because the old and the new parameters of a cross-fade are always both evaluated;
+  // only the tick that takes a new table takes longer. A cross-fade starts from the present torque, also if another one
+  // is under way. A limit that the new table lowers holds at once; one that it raises rises with the fade. Context:
+  // tick.
   core::Status Evaluate(const float* q, const float* qd, const float* qdd, const float* temperature_degC, float t_s,
                         float* tau_Nm) {
     Adopt();
@@ -42,7 +47,8 @@ class FeedForward {
     const float share =
         math::Select(blending, static_cast<float>(blended_ticks_) / Positive(active_.blend_ticks), 1.0f);
     float before[n], now[n];
-    model::ModelTorque(previous_, state, previous_memory_, rows_, before);
+    model::EvaluateRows(previous_, state, previous_memory_, rows_);
+    for (int i = 0; i < n; ++i) before[i] = model::RowTorque(previous_p_, rows_, i) + remainder_Nm_[i];
     model::ModelTorque(active_, state, active_memory_, rows_, now);
 
     core::Status status = active_.valid ? core::Status::kOk : core::Status::kEmpty;
@@ -51,8 +57,13 @@ class FeedForward {
       const float tau = share * now[i] + math::Masked((1.0f - share) * before[i], fading);
       const bool usable = active_.valid && math::IsFinite(tau);
       if (active_.valid && !usable) status = core::Status::kNotFinite;
-      tau_Nm[i] = Clamp(math::Masked(tau, math::MaskOf(usable)), active_.limit_Nm[i], status);
+      const float rising = first_limit_Nm_[i] + share * (active_.limit_Nm[i] - first_limit_Nm_[i]);
+      const float present = math::Select(fading != 0u, rising, active_.limit_Nm[i]);
+      limit_Nm_[i] = math::Min(active_.limit_Nm[i], present);
+      tau_Nm[i] = Clamp(math::Masked(tau, math::MaskOf(usable)), limit_Nm_[i], status);
+      unlimited_Nm_[i] = math::Masked(tau, math::MaskOf(usable));
     }
+    share_ = share;
     return status;
   }
 
@@ -66,12 +77,31 @@ class FeedForward {
 
   void Adopt() {
     if (!offered_.Refresh()) return;
-    previous_ = active_;
-    previous_memory_ = active_memory_;
+    StartFromHere();
     active_ = offered_.latest();
     active_memory_.running = false;
-    if (!active_.bumpless) active_.blend_ticks = 0;
+    constexpr auto kShortest = static_cast<std::uint32_t>(kShortestFade_s * Model::kTickRate_Hz);
+    active_.blend_ticks = active_.bumpless ? math::Max(active_.blend_ticks, kShortest) : 0u;
     blended_ticks_ = 0;
+  }
+
+  // The next fade starts from what the last tick gave. Amplitudes are mixed by the share that the fade under way has
+  // reached, so that this start goes on to follow the motion. What differs then, because the two tables had other
+  // nonlinear parameters, memories or columns, is carried along as a torque. rows_ is still what the table in force had
+  // in the last tick. Without a fade under way nothing differs, and no bit changes.
+  void StartFromHere() {
+    const bool was_fading = active_.valid && share_ < 1.0f;
+    for (int k = 0; k < Model::kColumns; ++k) {
+      const float from = previous_.valid ? previous_p_[k] : 0.0f;
+      previous_p_[k] = was_fading ? from + share_ * (active_.p[k] - from) : active_.p[k];
+    }
+    for (int i = 0; i < n; ++i) {
+      const float rest = unlimited_Nm_[i] - model::RowTorque(previous_p_, rows_, i);
+      remainder_Nm_[i] = math::Masked(rest, math::MaskOf(was_fading && math::IsFinite(rest)));
+      first_limit_Nm_[i] = limit_Nm_[i];
+    }
+    previous_ = active_;
+    previous_memory_ = active_memory_;
   }
 
   float Clamp(float tau, float limit, core::Status& status) {
@@ -85,6 +115,11 @@ class FeedForward {
   model::Committed<Model> active_, previous_;
   model::Memory<Model> active_memory_, previous_memory_;
   model::Rows<Model> rows_ = {};
+  float previous_p_[Model::kColumns] = {};  // amplitudes that a fade starts from, with the columns of previous_
+  float remainder_Nm_[n] = {};              // and a torque beside them
+  float first_limit_Nm_[n] = {}, limit_Nm_[n] = {},
+        unlimited_Nm_[n] = {};  // at the start of the fade; of the last tick
+  float share_ = 1.0f;          // of the last tick
   std::uint32_t blended_ticks_ = 0;
   std::uint32_t clamp_count_ = 0;
 };

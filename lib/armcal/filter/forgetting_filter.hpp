@@ -238,7 +238,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   float d_[kColumns] = {};
   float rows_[kTriangle] = {};
   float row_[kColumns + 1] = {};  // what remains of the row in work
-  float weight_ = 1.0f;
+  float weight_ = 0.0f;
   int first_ = 0, width_ = 0, length_ = 0, dense_first_ = 0, next_ = 0;
 };
 

@@ -19,9 +19,10 @@ namespace armcal::filter {
 template <class Layout>
 struct Prior {
   static constexpr int kStates = Layout::kColumns + Layout::kNonlinear;
-  float dense_ud[math::UdSize(Layout::kDense)] = {};  // correlation of the dense columns as U D U'
-  std::uint32_t active[kStates] = {};                 // all ones: the column has uncertainty; 0: fixed or standby
-  bool considered[kStates] = {};                      // its uncertainty counts, but no row changes it (Kalman form)
+  float dense_ud[Layout::kDense > 0 ? math::UdSize(Layout::kDense) : 1] =
+      {};                              // correlation of the dense columns as U D U'
+  std::uint32_t active[kStates] = {};  // all ones: the column has uncertainty; 0: fixed or standby
+  bool considered[kStates] = {};       // its uncertainty counts, but no row changes it (Kalman form)
   bool any_considered = false;
   float lambda[kStates] = {};  // forgetting per sample, in (0, 1] (forgetting form)
   float noise[kStates] = {};   // variance per sample, prior units (Kalman form)

@@ -21,12 +21,13 @@ constexpr int EqualSlices(int cost) {
   return slices > 1 ? (cost + slices - 1) / slices : cost;
 }
 
-// What one row did. Whitened units.
+// What one row did. Whitened units. All zero before a filter's first row: a static filter then needs no flash for its
+// initial bytes.
 struct UpdateReport {
   float innovation = 0.0f;  // row minus its prediction by this filter before the row; 0 unless the row was judged
-  float variance = 1.0f;    // its variance by this filter (forgetting form: from data alone, without the prior)
+  float variance = 0.0f;    // its variance by this filter (forgetting form: from data alone, without the prior)
   bool accepted = false;
-  core::Status status = core::Status::kGated;  // kOk, kGated, kNotFinite, kOutOfRange (element beyond kRowLimit)
+  core::Status status = core::Status::kOk;  // kOk, kGated, kNotFinite, kOutOfRange (element beyond kRowLimit)
 };
 
 // The calls without slices, made of those in slices. Base of a Filter that has BeginRow, StepRow, report, BeginEnd and

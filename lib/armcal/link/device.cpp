@@ -19,6 +19,8 @@ Status Device::ServeOwn() {
   const Block blocks[] = {
       FilledBlock<reg::kIdentityBlock, &Device::FillIdentity>(this),
       FilledBlock<reg::kStatusBlock, &Device::FillStatus>(this),
+      FilledBlock<reg::kDoubtBlock, &Device::FillDoubt>(this),
+      FilledBlock<reg::kWritingBlock, &Device::FillWriting>(this),
       FilledBlock<reg::kResidualHeaderBlock, &Device::FillResidualHeader>(this),
       DirectBlock<&FloatList::Read>(reg::kResidualValuesBlock, &residual_values_),
       FilledBlock<reg::kCommandBlock, &Device::FillCommand, &Device::TakeCommand>(this),
@@ -45,7 +47,10 @@ Status Device::Serve(const Span& list, const float* values) {
 
 void Device::Step(std::uint32_t now_ms) {
   now_ms_ = now_ms;
-  if (unlocked_ && now_ms - touched_ms_ >= kUnlock_ms) unlocked_ = false;
+  Sessions& sessions = map_.sessions();
+  sessions.Tell(now_ms);
+  const bool late = now_ms - touched_ms_ >= kUnlock_ms;
+  if (sessions.writer() != Sessions::kNobody && (late || !sessions.IsOpen(sessions.writer()))) LeaveSeat();
   transaction_.Step(now_ms);
 }
 
@@ -94,7 +99,7 @@ void Device::FillStatus(Words<reg::kStatusBlock>& w) {
   w.Set<reg::kErrorAddress>(error.address);
   w.Set<reg::kErrorStatus>(error.status);
   w.Set<reg::kErrorRequest>(error.request);
-  w.Set<reg::kUnlocked>(unlocked_);
+  w.Set<reg::kUnlocked>(Seated());
   w.Set<reg::kHealth>(live_.health);
   w.Set<reg::kRowsUsedA>(live_.rows_used[0]);
   w.Set<reg::kRowsGatedA>(live_.rows_gated[0]);
@@ -102,21 +107,60 @@ void Device::FillStatus(Words<reg::kStatusBlock>& w) {
   w.Set<reg::kRowsGatedB>(live_.rows_gated[1]);
 }
 
-// Lock and tables ----------------------------------------------------------------------------------------------------
+void Device::FillDoubt(Words<reg::kDoubtBlock>& w) {
+  w.Set<reg::kRowsOutsideA>(live_.rows_outside[0]);
+  w.Set<reg::kRowsOutsideB>(live_.rows_outside[1]);
+  w.Set<reg::kImplausibleTicks>(live_.implausible_ticks);
+  w.Set<reg::kTableFallbacks>(transaction_.store().fallbacks());
+}
 
-// kLocked; or kOk, and the lock stays open for another while.
+void Device::FillWriting(Words<reg::kWritingBlock>& w) {
+  const core::Refusal& why = transaction_.refusal();
+  w.Set<reg::kRefusedStatus>(why.status);
+  w.Set<reg::kRefusedWord>(why.word);
+  w.Set<reg::kRefusedValue>(why.value);
+  w.Set<reg::kRefusedBound>(why.bound);
+  const std::uint32_t writer = map_.sessions().writer();
+  const bool there = writer != Sessions::kNobody && map_.sessions().IsPresent(writer);
+  w.Set<reg::kWriterSeat>(static_cast<std::uint16_t>(Seated() ? 1 : there ? 2 : 0));
+  w.Set<reg::kSaveWait>(static_cast<std::uint16_t>((transaction_.save_wait_ms() + 999) / 1000));
+}
+
+// Seat and tables ----------------------------------------------------------------------------------------------------
+
+// Whether the session that asks may write.
+bool Device::Seated() { return map_.sessions().writer() == map_.sessions().asking(); }
+
+// The next writer begins with open.
+void Device::LeaveSeat() {
+  map_.sessions().SetWriter(Sessions::kNobody);
+  transaction_.Abandon();
+}
+
+// kLocked, kSeatTaken; or kOk, and the seat is kept for another while.
 Status Device::NeedsUnlock() {
-  if (!unlocked_) return Status::kLocked;
+  if (!Seated()) return map_.sessions().IsPresent(map_.sessions().writer()) ? Status::kSeatTaken : Status::kLocked;
   touched_ms_ = now_ms_;
   return Status::kOk;
 }
 
-void Device::FillUnlock(Words<reg::kUnlock>& w) { w.Set<reg::kUnlock>(std::uint32_t{unlocked_ ? 1u : 0u}); }
+void Device::FillUnlock(Words<reg::kUnlock>& w) { w.Set<reg::kUnlock>(std::uint32_t{Seated() ? 1u : 0u}); }
 
 Status Device::TakeUnlock(const Words<reg::kUnlock>& w) {
-  unlocked_ = w.Get<reg::kUnlock>() == reg::kUnlockKey;
+  Sessions& sessions = map_.sessions();
+  const std::uint32_t key = w.Get<reg::kUnlock>();
+  if (key == 0 && Seated()) {
+    LeaveSeat();
+    return Status::kOk;
+  }
+  if (key != reg::kUnlockKey) return Status::kLocked;
+  if (!Seated()) {
+    if (sessions.IsPresent(sessions.writer())) return Status::kSeatTaken;
+    LeaveSeat();
+    sessions.SetWriter(sessions.asking());
+  }
   touched_ms_ = now_ms_;
-  return unlocked_ ? Status::kOk : Status::kLocked;
+  return Status::kOk;
 }
 
 void Device::FillCommand(Words<reg::kCommandBlock>& w) {
@@ -129,11 +173,14 @@ void Device::FillCommand(Words<reg::kCommandBlock>& w) {
 }
 
 Status Device::TakeCommand(const Words<reg::kCommandBlock>& w) {
+  const TableCommand command{w.Get<reg::kSequence>(), w.Get<reg::kCommand>(), w.Get<reg::kCommandSchema>(),
+                             w.Get<reg::kCommandWords>(), w.Get<reg::kCommandCrc>()};
+  // A client whose connection broke before the reply asks again over a new one, which has no seat.
+  if (w.Get<reg::kCommandReserved>() == 0 && transaction_.IsRepeat(command)) return Status::kOk;
   const Status unlocked = NeedsUnlock();
   if (!core::IsOk(unlocked)) return unlocked;
   if (w.Get<reg::kCommandReserved>() != 0) return Status::kOutOfRange;
-  return transaction_.Command({w.Get<reg::kSequence>(), w.Get<reg::kCommand>(), w.Get<reg::kCommandSchema>(),
-                               w.Get<reg::kCommandWords>(), w.Get<reg::kCommandCrc>()});
+  return transaction_.Command(command);
 }
 
 Status Device::ReadStaged(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {

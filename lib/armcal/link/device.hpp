@@ -1,4 +1,4 @@
-// link - serves the registers of a drive, all but the traces, and keeps the lock of a session.
+// link - serves the registers of a drive, all but the traces, and keeps the seat of the one who writes.
 #pragma once
 
 #include <cstdint>
@@ -33,6 +33,8 @@ struct LiveStatus {
   std::uint16_t health = 0;         // bit k: filter k's deviations are smaller than its innovations
   std::uint32_t rows_used[2] = {};  // filter A, B
   std::uint32_t rows_gated[2] = {};
+  std::uint32_t rows_outside[2] = {};
+  std::uint32_t implausible_ticks = 0;
 };
 
 // The residual statistics of one joint at one instant. SPEC.md lists the values.
@@ -55,10 +57,12 @@ struct ClientRequests {
   void (*take_residuals)(void* context, int joint, ResidualPage& page);
 };
 
+// One session at a time may write: the one that has unlocked. It keeps the seat until it gives it up, until it ends, or
+// until another session unlocks after it has not asked for Sessions::kPatience_ms. What it has staged goes with it.
 // Context of every call: background.
 class Device {
  public:
-  // The lock closes this long after the last write that needs it open.
+  // The seat is free this long after the last write that needs it.
   static constexpr std::uint32_t kUnlock_ms = 60000;
 
   // `live` and `transaction` outlive the device.
@@ -78,7 +82,6 @@ class Device {
 
   RegisterMap& map() { return map_; }  // for further blocks: traces, and the integrator's own
   PduEngine& engine() { return engine_; }
-  bool unlocked() const { return unlocked_; }
 
  private:
   static constexpr int kMaxLists = 8;
@@ -97,10 +100,14 @@ class Device {
   };
 
   core::Status ServeOwn();
+  bool Seated();
+  void LeaveSeat();
   core::Status NeedsUnlock();
 
   void FillIdentity(Words<reg::kIdentityBlock>& w);
+  void FillWriting(Words<reg::kWritingBlock>& w);
   void FillStatus(Words<reg::kStatusBlock>& w);
+  void FillDoubt(Words<reg::kDoubtBlock>& w);
   void FillUnlock(Words<reg::kUnlock>& w);
   core::Status TakeUnlock(const Words<reg::kUnlock>& w);
   void FillCommand(Words<reg::kCommandBlock>& w);
@@ -126,7 +133,6 @@ class Device {
   int list_count_ = 0;
   Scratch<reg::kScratchWords> scratch_;
   Scratch<2 * reg::kScratchValues> scratch_float_, scratch_u32_;
-  bool unlocked_ = false;
   std::uint32_t now_ms_ = 0;
   std::uint32_t touched_ms_ = 0;
   std::uint16_t held_ = 0;

@@ -38,8 +38,10 @@ std::size_t PduEngine::Refuse(std::uint8_t function, std::uint16_t address, Stat
   return 2;
 }
 
-std::size_t PduEngine::Handle(const std::uint8_t* request, std::size_t count, std::uint8_t* reply) {
+std::size_t PduEngine::Handle(const std::uint8_t* request, std::size_t count, std::uint8_t* reply,
+                              std::uint32_t session) {
   if (count == 0) return 0;
+  map_.sessions().Ask(session);
   map_.CountRequest();
   switch (request[0]) {
     case kReadHolding:

@@ -25,8 +25,11 @@ class PduEngine {
   PduEngine(RegisterMap& map, const DeviceIdentification& identification)
       : map_(map), identification_(identification) {}
 
-  // `request` [count], `reply` [kMaxPdu]. Returns the reply's length. An empty request has no answer: 0.
-  std::size_t Handle(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
+  // `request` [count], `reply` [kMaxPdu]. `session`: whose request it is. Returns the reply's length. An empty request
+  // has no answer: 0.
+  std::size_t Handle(const std::uint8_t* request, std::size_t count, std::uint8_t* reply, std::uint32_t session = 0);
+
+  Sessions& sessions() { return map_.sessions(); }
 
  private:
   std::size_t Refuse(std::uint8_t function, std::uint16_t address, core::Status status, std::uint8_t* reply);

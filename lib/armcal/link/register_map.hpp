@@ -9,6 +9,7 @@
 #include "armcal/core/status.hpp"
 #include "armcal/link/register_words.hpp"
 #include "armcal/link/registers.hpp"
+#include "armcal/link/sessions.hpp"
 
 namespace armcal::link {
 
@@ -72,6 +73,7 @@ class RegisterMap {
     last_error_ = {ExceptionOf(status), function, address, status, requests_};
   }
   std::uint32_t requests() const { return requests_; }
+  Sessions& sessions() { return sessions_; }
   const LastError& last_error() const { return last_error_; }
 
  private:
@@ -80,6 +82,7 @@ class RegisterMap {
   Block blocks_[kMaxBlocks] = {};
   int count_ = 0;
   std::uint32_t requests_ = 0;
+  Sessions sessions_;
   LastError last_error_;
 };
 

@@ -114,7 +114,7 @@ inline constexpr std::uint16_t kVendor = 0x8000;
 
 // Values that never change.
 inline constexpr std::uint32_t kMagicValue = 0x41524D43;  // "ARMC"
-inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 2;
+inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 3;
 inline constexpr float kProbeFloatValue = 123456.789f;  // reads 123456.79 only with the right word order
 inline constexpr std::uint32_t kProbeU32Value = 0x12345678;
 
@@ -161,7 +161,7 @@ inline constexpr Register kTick = In(0x0046, 1, kU32, "tick", "", "control ticks
 inline constexpr Register kActiveCrc = In(0x0048, 1, kU32, "active_crc", "", "CRC-32 over the active table's registers");
 inline constexpr Register kCommandSequence = In(0x004A, 1, kU32, "command_sequence", "", "of the last command accepted");
 inline constexpr Register kStoreSequence = In(0x004C, 1, kU32, "store_sequence", "", "of the stored table in force, 0: none");
-inline constexpr Register kSlotState = In(0x004E, 2, kU16, "slot_state", "", "storage slots: 0 blank, 1 good, 2 other schema, 3 corrupt");
+inline constexpr Register kSlotState = In(0x004E, 2, kU16, "slot_state", "", "storage slots: 0 blank, 1 good, 2 other schema, 3 corrupt, 4 refused at boot");
 inline constexpr Register kEnabledAxes = In(0x0050, 1, kU32, "enabled_axes", "", "bit i: axis i is enabled");
 inline constexpr Register kClampCount = In(0x0052, 1, kU32, "clamp_count", "", "feed-forward values cut to their limit");
 inline constexpr Register kSampleGaps = In(0x0054, 1, kU32, "sample_gaps", "", "samples refused because the estimator was behind");
@@ -171,13 +171,26 @@ inline constexpr Register kErrorFunction = In(0x0059, 1, kU16, "error_function",
 inline constexpr Register kErrorAddress = In(0x005A, 1, kU16, "error_address", "", "its first register");
 inline constexpr Register kErrorStatus = In(0x005B, 1, kU16, "error_status", "", "its Status");
 inline constexpr Register kErrorRequest = In(0x005C, 1, kU32, "error_request", "", "request_count of that request");
-inline constexpr Register kUnlocked = In(0x005E, 1, kU16, "unlocked", "", "1: table commands are accepted");
+inline constexpr Register kUnlocked = In(0x005E, 1, kU16, "unlocked", "", "1: table commands are accepted from this connection");
 inline constexpr Register kHealth = In(0x005F, 1, kU16, "health", "", "verdict of the monitor, 0 ok; bits: 1 filter A, 2 filter B: its deviations are smaller than its innovations");
 inline constexpr Register kRowsUsedA = In(0x0060, 1, kU32, "rows_used_a", "", "rows that updated filter A since the adoption");
 inline constexpr Register kRowsGatedA = In(0x0062, 1, kU32, "rows_gated_a", "", "rows that were not admitted to filter A");
 inline constexpr Register kRowsUsedB = In(0x0064, 1, kU32, "rows_used_b", "", "as above, filter B");
 inline constexpr Register kRowsGatedB = In(0x0066, 1, kU32, "rows_gated_b", "", "as above, filter B");
 inline constexpr Span kStatusBlock = Between(kTransactionState, kRowsGatedB);
+inline constexpr Register kRowsOutsideA = In(0x0068, 1, kU32, "rows_outside_a", "", "rows in motion that the innovation gate kept from filter A since the adoption");
+inline constexpr Register kRowsOutsideB = In(0x006A, 1, kU32, "rows_outside_b", "", "as above, filter B");
+inline constexpr Register kImplausibleTicks = In(0x006C, 1, kU32, "implausible_ticks", "", "ticks with a count or current that the arm cannot have made");
+inline constexpr Register kTableFallbacks = In(0x006E, 1, kU32, "table_fallbacks", "", "stored tables passed over since power-up: not readable any more, or refused at boot");
+inline constexpr Span kDoubtBlock = Between(kRowsOutsideA, kTableFallbacks);
+// Writing: why the last table was refused, who may write, and how long the board wants to wait.
+inline constexpr Register kRefusedStatus = In(0x0070, 1, kU16, "refused_status", "", "Status of the last check, 0: the table was accepted");
+inline constexpr Register kRefusedWord = In(0x0071, 1, kU16, "refused_word", "", "word of the table that it refused, from 0; 0xFFFF: no single one");
+inline constexpr Register kRefusedValue = In(0x0072, 1, kF32, "refused_value", "SI", "what was found there");
+inline constexpr Register kRefusedBound = In(0x0074, 1, kF32, "refused_bound", "SI", "what would have been accepted");
+inline constexpr Register kWriterSeat = In(0x0076, 1, kU16, "writer_seat", "", "0 free, 1 this connection writes, 2 another one does");
+inline constexpr Register kSaveWait = In(0x0077, 1, kU16, "save_wait", "s", "until the board allows the next save, 0: now");
+inline constexpr Span kWritingBlock = Between(kRefusedStatus, kSaveWait);
 inline constexpr Span kErrorBlock = Between(kErrorException, kErrorStatus);
 
 // Estimates: lists of floats, one a joint or one a column.
@@ -226,7 +239,7 @@ inline constexpr Span kCommandBlock = Between(kSequence, kCommandCrc);
 
 // The session's lock, and registers for trying the connection.
 inline constexpr Register kScratch = Hold(0x0020, kScratchWords, kU16, kWrite, "scratch", "", "does nothing: for trying the connection");
-inline constexpr Register kUnlock = Hold(0x0040, 1, kU32, kWrite, "unlock", "", "write 0x6B6C6E75; reads 1 while unlocked, else 0");
+inline constexpr Register kUnlock = Hold(0x0040, 1, kU32, kWrite, "unlock", "", "write 0x6B6C6E75, or 0 to give the seat up; reads 1 while this connection has unlocked, else 0");
 inline constexpr Register kScratchFloat = Hold(0x0050, kScratchValues, kF32, kWrite, "scratch_float", "", "does nothing; NaN and infinity are refused");
 inline constexpr Register kScratchU32 = Hold(0x0058, kScratchValues, kU32, kWrite, "scratch_u32", "", "does nothing; half a value is refused");
 
@@ -255,6 +268,8 @@ inline constexpr const Register* kDeclared[] = {
   &kTransactionState, &kTransactionStatus, &kTableStatus, &kFeedForwardState, &kGeneration, &kTick, &kActiveCrc, &kCommandSequence,
   &kStoreSequence, &kSlotState, &kEnabledAxes, &kClampCount, &kSampleGaps, &kRequestCount, &kErrorException, &kErrorFunction,
   &kErrorAddress, &kErrorStatus, &kErrorRequest, &kUnlocked, &kHealth, &kRowsUsedA, &kRowsGatedA, &kRowsUsedB, &kRowsGatedB,
+  &kRowsOutsideA, &kRowsOutsideB, &kImplausibleTicks, &kTableFallbacks,
+  &kRefusedStatus, &kRefusedWord, &kRefusedValue, &kRefusedBound, &kWriterSeat, &kSaveWait,
   &kResidualRms, &kConsistency, &kEstimateA, &kDeviationA, &kEstimateB, &kDeviationB,
   &kResidualJoint, &kResidualSnapshot, &kResidualGeneration, &kResidualElapsed, &kResidualSigma, &kResidualReference, &kResidualRecent,
   &kResidualHistory,
@@ -336,9 +351,10 @@ constexpr bool IsWhole(const Span& block) {
     if (r.kind == block.kind && r.access == block.access && r.address == at && at < block.end()) at = SpanOf(r).end();
   return at == block.end();
 }
-static_assert(IsWhole(reg::kIdentityBlock) && IsWhole(reg::kStatusBlock) && IsWhole(reg::kErrorBlock) &&
-                  IsWhole(reg::kResidualHeaderBlock) && IsWhole(reg::kResidualValuesBlock) &&
-                  IsWhole(reg::kTracePageBlock) && IsWhole(reg::kCommandBlock) && IsWhole(reg::kTraceStartBlock),
+static_assert(IsWhole(reg::kIdentityBlock) && IsWhole(reg::kStatusBlock) && IsWhole(reg::kWritingBlock) &&
+                  IsWhole(reg::kErrorBlock) && IsWhole(reg::kResidualHeaderBlock) &&
+                  IsWhole(reg::kResidualValuesBlock) && IsWhole(reg::kTracePageBlock) && IsWhole(reg::kCommandBlock) &&
+                  IsWhole(reg::kTraceStartBlock),
               "a block has a gap, or a register of it is not listed in kDeclared");
 
 constexpr std::uint32_t LayoutCrc() {

@@ -118,7 +118,7 @@ void RtuService::Poll() {
   const RtuFramer::Result result = framer_.OnBytes(bytes_ + taken_, there_ - taken_, clock_.Ms(), used);
   taken_ += used;
   if (result == RtuFramer::Result::kNothing) return;
-  const std::size_t pdu = engine_.Handle(framer_.pdu(), framer_.pdu_bytes(), reply_ + 1);
+  const std::size_t pdu = engine_.Handle(framer_.pdu(), framer_.pdu_bytes(), reply_ + 1, session_);
   sent_ = 0;
   reply_bytes_ = result == RtuFramer::Result::kBroadcast || pdu == 0 ? 0 : framer_.FinishReply(reply_, pdu);
 }

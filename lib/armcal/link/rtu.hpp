@@ -54,7 +54,11 @@ class RtuService {
  public:
   RtuService(PduEngine& engine, const hardware::Serial& serial, const hardware::Clock& clock, std::uint8_t address,
              std::uint32_t silence_ms)
-      : engine_(engine), serial_(serial), clock_(clock), framer_(address, silence_ms) {}
+      : engine_(engine),
+        serial_(serial),
+        clock_(clock),
+        framer_(address, silence_ms),
+        session_(engine.sessions().Begin()) {}
 
   // Reads one portion of bytes and answers at most one request. It never waits. Context: background.
   void Poll();
@@ -64,6 +68,7 @@ class RtuService {
   hardware::Serial serial_;
   hardware::Clock clock_;
   RtuFramer framer_;
+  std::uint32_t session_;  // the line's: whoever writes on it
   std::uint8_t bytes_[64] = {};
   std::size_t there_ = 0, taken_ = 0;
   std::uint8_t reply_[kMaxRtuFrame] = {};

@@ -17,15 +17,29 @@ bool Same(const TableCommand& a, const TableCommand& b) {
 }  // namespace
 
 TableTransaction::TableTransaction(const TableApplication& application, table::TableStore& store, std::uint32_t schema,
-                                   std::uint16_t* staged, std::uint16_t* active, std::uint16_t words)
-    : application_(application), store_(store), schema_(schema), staged_(staged), active_(active), words_(words) {
+                                   std::uint16_t* staged, std::uint16_t* active, std::uint16_t words,
+                                   const SaveRate& rate)
+    : application_(application),
+      store_(store),
+      schema_(schema),
+      staged_(staged),
+      active_(active),
+      words_(words),
+      rate_(rate),
+      saves_left_(rate.burst) {
   active_crc_ = core::Crc32Words(active_, words_);
 }
 
 Status TableTransaction::Boot() {
   table_status_ = store_.Load(staged_);
   if (!core::IsOk(table_status_)) return table_status_;
-  table_status_ = application_.check(application_.context, staged_);
+  // A record that the application refuses is as good as none: the older one has its turn.
+  why_ = application_.check(application_.context, staged_);
+  for (int slot = 0; slot < table::TableStore::kSlots && !core::IsOk(why_.status); ++slot) {
+    if (!core::IsOk(store_.LoadOlder(staged_))) break;
+    why_ = application_.check(application_.context, staged_);
+  }
+  table_status_ = why_.status;
   if (!core::IsOk(table_status_)) return table_status_;
   state_ = TransactionState::kCommitting;
   phase_ = Phase::kBooting;
@@ -34,9 +48,8 @@ Status TableTransaction::Boot() {
 }
 
 Status TableTransaction::Command(const TableCommand& command) {
-  if (command.sequence == last_.sequence && command.sequence != 0)
-    return Same(command, last_) ? Status::kOk : Status::kWrongOrder;
   if (command.sequence == 0) return Status::kWrongOrder;
+  if (command.sequence == last_.sequence) return IsRepeat(command) ? Status::kOk : Status::kWrongOrder;
   if (phase_ != Phase::kNone) return Status::kBusy;
   const Status status = Apply(command);
   status_ = status;
@@ -45,6 +58,18 @@ Status TableTransaction::Command(const TableCommand& command) {
     touched_ms_ = now_ms_;
   }
   return status;
+}
+
+bool TableTransaction::IsRepeat(const TableCommand& command) const {
+  return command.sequence != 0 && Same(command, last_);
+}
+
+void TableTransaction::Abandon() {
+  if (phase_ == Phase::kNone && staging()) Finish(TransactionState::kIdle, Status::kTimeout);
+}
+
+std::uint32_t TableTransaction::save_wait_ms() const {
+  return saves_left_ > 0 || rate_.interval_ms == 0 ? 0 : rate_.interval_ms - (now_ms_ - earned_ms_);
 }
 
 Status TableTransaction::Apply(const TableCommand& command) {
@@ -65,7 +90,8 @@ Status TableTransaction::Open() {
 Status TableTransaction::Check(const TableCommand& command) {
   if (state_ != TransactionState::kLoading && state_ != TransactionState::kChecked) return Status::kWrongOrder;
   if (core::Crc32Words(staged_, words_) != command.crc) return Status::kBadCrc;
-  const Status status = application_.check(application_.context, staged_);
+  why_ = application_.check(application_.context, staged_);
+  const Status status = why_.status;
   // A refused check has thrown away what an earlier one built, so nothing is left that could be saved.
   state_ = core::IsOk(status) ? TransactionState::kChecked : TransactionState::kLoading;
   checked_crc_ = command.crc;
@@ -77,8 +103,10 @@ Status TableTransaction::Save(const TableCommand& command) {
   if (command.crc != checked_crc_) return Status::kBadCrc;
   Status status = application_.permit(application_.context);
   if (!core::IsOk(status)) return status;
+  if (rate_.interval_ms != 0 && saves_left_ == 0) return Status::kTooSoon;
   status = store_.Save(staged_);
   if (!core::IsOk(status)) return status;
+  if (saves_left_ > 0) --saves_left_;
   state_ = TransactionState::kCommitting;
   phase_ = Phase::kStoring;
   return Status::kOk;
@@ -86,8 +114,7 @@ Status TableTransaction::Save(const TableCommand& command) {
 
 Status TableTransaction::WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words) {
   if (phase_ != Phase::kNone) return Status::kBusy;
-  if (state_ != TransactionState::kOpen && state_ != TransactionState::kLoading && state_ != TransactionState::kChecked)
-    return Status::kWrongOrder;
+  if (!staging()) return Status::kWrongOrder;
   std::memcpy(staged_ + offset, words, 2u * count);
   state_ = TransactionState::kLoading;  // the staged words are no longer those that were checked
   touched_ms_ = now_ms_;
@@ -96,13 +123,16 @@ Status TableTransaction::WriteStaged(std::uint16_t offset, std::uint16_t count, 
 
 void TableTransaction::Step(std::uint32_t now_ms) {
   now_ms_ = now_ms;
+  if (saves_left_ >= rate_.burst) {
+    earned_ms_ = now_ms;
+  } else if (now_ms - earned_ms_ >= rate_.interval_ms) {
+    ++saves_left_;
+    earned_ms_ += rate_.interval_ms;
+  }
   switch (phase_) {
-    case Phase::kNone: {
-      const bool staging = state_ == TransactionState::kOpen || state_ == TransactionState::kLoading ||
-                           state_ == TransactionState::kChecked;
-      if (staging && now_ms - touched_ms_ >= kStageTimeout_ms) Finish(TransactionState::kIdle, Status::kTimeout);
+    case Phase::kNone:
+      if (now_ms - touched_ms_ >= kStageTimeout_ms) Abandon();
       return;
-    }
     case Phase::kStoring: {
       const Status stored = store_.Step();
       if (stored == Status::kBusy) return;

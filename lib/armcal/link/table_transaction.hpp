@@ -13,15 +13,22 @@ namespace armcal::link {
 // Context: background.
 struct TableApplication {
   void* context;
-  // Decodes `words`, judges them and builds what adopt() will put in force. kOk, or the reason of refusal. What was
-  // built stays ready until the next check; nothing is in force yet.
-  core::Status (*check)(void* context, const std::uint16_t* words);
+  // Decodes `words`, judges them and builds what adopt() will put in force. Status kOk, or the reason of refusal. What
+  // was built stays ready until the next check; nothing is in force yet.
+  core::Refusal (*check)(void* context, const std::uint16_t* words);
   // Answers what adopt() would answer now: kOk or kAxisEnabled. It has no effect. The transaction asks before it stores
   // anything.
   core::Status (*permit)(void* context);
   // Puts in force what the last check built. kBusy: call again, it is not finished. Any other answer but kOk: no
   // effect. The transaction calls it only as long as the staged words are those of the last check.
   core::Status (*adopt)(void* context);
+};
+
+// How often tables may be stored, because a storage wears out: `burst` saves without a pause, then one in each
+// interval. interval_ms 0: as often as a client likes.
+struct SaveRate {
+  std::uint16_t burst = 5;
+  std::uint32_t interval_ms = 60000;
 };
 
 // The command block, which a client writes in one request.
@@ -44,16 +51,22 @@ class TableTransaction {
 
   // `staged`, `active`: buffers [words] that outlive this. `active` may hold defaults, which Boot() replaces.
   TableTransaction(const TableApplication& application, table::TableStore& store, std::uint32_t schema,
-                   std::uint16_t* staged, std::uint16_t* active, std::uint16_t words);
+                   std::uint16_t* staged, std::uint16_t* active, std::uint16_t words, const SaveRate& rate = {});
 
   // At power-up: loads the stored table, checks it and adopts it. The answer is kept as table_status(): kOk; what the
-  // store answers (kBlank, kCorrupt, kWrongSchema, kWrongSize); or why the application refused. kBusy: the application
-  // is still adopting, and Step() finishes it.
+  // store answers (kBlank, kCorrupt, kWrongSchema, kWrongSize); or why the application refused the last stored table
+  // that reads well: the newest is tried first, then the older one. kBusy: the application is still adopting, and
+  // Step() finishes it.
   core::Status Boot();
 
   // kWrongOrder: not in this state, or the sequence is 0 or was used with other content. kOutOfRange: no such command.
-  // kWrongSchema, kWrongSize: not a table of this firmware. kBadCrc. kBusy: committing. Or the application's answer.
+  // kWrongSchema, kWrongSize: not a table of this firmware. kBadCrc. kBusy: committing. kTooSoon: the rate of saves.
+  // Or the application's answer.
   core::Status Command(const TableCommand& command);
+  // True if it is the last command that was accepted, come again: it would have no effect.
+  bool IsRepeat(const TableCommand& command) const;
+  // Drops a stage, because its writer is gone. A commit goes on.
+  void Abandon();
 
   // offset + count <= words(). kWrongOrder: no stage is open. kBusy: committing.
   core::Status WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
@@ -64,6 +77,8 @@ class TableTransaction {
   TransactionState state() const { return state_; }
   core::Status status() const { return status_; }
   core::Status table_status() const { return table_status_; }
+  const core::Refusal& refusal() const { return why_; }  // what the last check said
+  std::uint32_t save_wait_ms() const;                    // until the rate allows the next save
   std::uint32_t active_crc() const { return active_crc_; }
   const TableCommand& last_command() const { return last_; }
   const std::uint16_t* staged() const { return staged_; }
@@ -75,6 +90,10 @@ class TableTransaction {
   enum class Phase : std::uint8_t { kNone, kStoring, kAdopting, kRevoking, kBooting };
 
   core::Status Apply(const TableCommand& command);
+  bool staging() const {
+    return state_ == TransactionState::kOpen || state_ == TransactionState::kLoading ||
+           state_ == TransactionState::kChecked;
+  }
   core::Status Open();
   core::Status Check(const TableCommand& command);
   core::Status Save(const TableCommand& command);
@@ -93,12 +112,16 @@ class TableTransaction {
   Phase phase_ = Phase::kNone;
   core::Status status_ = core::Status::kOk;
   core::Status table_status_ = core::Status::kBlank;
+  core::Refusal why_;
   core::Status refusal_ = core::Status::kOk;  // why the adoption failed, while the record is taken back
   TableCommand last_;
   std::uint32_t checked_crc_ = 0;
   std::uint32_t active_crc_ = 0;
   std::uint32_t now_ms_ = 0;
   std::uint32_t touched_ms_ = 0;
+  SaveRate rate_;
+  std::uint16_t saves_left_;
+  std::uint32_t earned_ms_ = 0;  // when the last one of saves_left_ was earned
 };
 
 }  // namespace armcal::link

@@ -37,7 +37,8 @@ class TcpFramer {
   bool complete_ = false;
 };
 
-// One framer for each connection slot. A byte server calls the three functions; `context` is the TcpService.
+// One framer and one session for each connection slot. A byte server calls these functions; `context` is the
+// TcpService.
 template <int kSlots>
 class TcpService {
  public:
@@ -46,7 +47,17 @@ class TcpService {
   explicit TcpService(PduEngine& engine) : engine_(engine) {}
 
   // A new connection has taken the slot.
-  static void Open(void* context, int slot) { Self(context).framers_[slot].Reset(); }
+  static void Open(void* context, int slot) {
+    Self(context).framers_[slot].Reset();
+    Self(context).Restart(slot, Self(context).engine_.sessions().Begin());
+  }
+  // The slot's connection is gone.
+  static void Close(void* context, int slot) { Self(context).Restart(slot, 0); }
+  // True if the slot's connection should not make room for another one, because it writes.
+  static bool Keep(void* context, int slot) {
+    const std::uint32_t session = Self(context).session_[slot];
+    return session != 0 && Self(context).engine_.sessions().writer() == session;
+  }
 
   // Takes at most one request out of `bytes` and puts its reply into `reply` [kMaxReply]. `used` says how many bytes it
   // took; call it again with the rest. False: the stream cannot be understood any more, close the connection.
@@ -57,7 +68,8 @@ class TcpService {
     const TcpFramer::Result result = framer.OnBytes(bytes, count, *used);
     if (result == TcpFramer::Result::kBroken) return false;
     if (result == TcpFramer::Result::kNeedMore) return true;
-    const std::size_t pdu = Self(context).engine_.Handle(framer.pdu(), framer.pdu_bytes(), reply + kMbapBytes);
+    const std::size_t pdu = Self(context).engine_.Handle(framer.pdu(), framer.pdu_bytes(), reply + kMbapBytes,
+                                                         Self(context).session_[slot]);
     framer.PutReplyHeader(pdu, reply);
     *reply_bytes = kMbapBytes + pdu;
     return true;
@@ -68,9 +80,14 @@ class TcpService {
 
  private:
   static TcpService& Self(void* context) { return *static_cast<TcpService*>(context); }
+  void Restart(int slot, std::uint32_t session) {
+    if (session_[slot] != 0) engine_.sessions().End(session_[slot]);
+    session_[slot] = session;
+  }
 
   PduEngine& engine_;
   TcpFramer framers_[kSlots];
+  std::uint32_t session_[kSlots] = {};
 };
 
 }  // namespace armcal::link

@@ -160,6 +160,7 @@ Status Trace::Push(const std::uint16_t* record, std::uint32_t generation) {
 
 Status Trace::Serve(RegisterMap& map, int number) {
   if (number < 0 || number >= reg::kTraces) return Status::kOutOfRange;
+  sessions_ = &map.sessions();
   const Block blocks[] = {
       FilledBlock<reg::kTracePageBlock, &Trace::FillPageHeader>(this, number),
       DirectBlock<&Trace::ReadPage>(SpanOf(reg::kTraceData).Of(number), this),
@@ -202,7 +203,12 @@ Status Trace::TakeStart(const Words<reg::kTraceStartBlock>& w) {
   Words<reg::kTraceStartBlock> present;
   FillStart(present);
   const bool same = std::memcmp(present.data(), w.data(), 2u * w.size()) == 0;
-  if (w.Get<reg::kTraceRecording>() != 0 && same) return Status::kOk;  // the client asks again because a reply was lost
+  const bool repeated = w.Get<reg::kTraceRecording>() != 0 && same;  // the client asks again because a reply was lost
+  if (OwnedByAnother()) return repeated ? Status::kOk : Status::kSeatTaken;
+  if (repeated) {
+    owner_ = sessions_->asking();
+    return Status::kOk;
+  }
   Recording recording;
   recording.number = w.Get<reg::kTraceRecording>();
   recording.mode = static_cast<TraceMode>(w.Get<reg::kTraceMode>());
@@ -210,12 +216,20 @@ Status Trace::TakeStart(const Words<reg::kTraceStartBlock>& w) {
   recording.start_tick = w.Get<reg::kTraceStartTick>();
   recording.limit = w.Get<reg::kTraceLimit>();
   recording.channels = w.Get<reg::kTraceChannelMask>();
-  return Start(recording);
+  const Status started = Start(recording);
+  if (core::IsOk(started)) owner_ = sessions_->asking();
+  return started;
+}
+
+bool Trace::OwnedByAnother() const {
+  return requested_.mode != TraceMode::kOff && owner_ != sessions_->asking() && sessions_->IsPresent(owner_);
 }
 
 void Trace::FillAcknowledge(Words<reg::kTraceAcknowledge>& w) { w.Set<reg::kTraceAcknowledge>(acknowledged()); }
 
 Status Trace::TakeAcknowledge(const Words<reg::kTraceAcknowledge>& w) {
+  if (OwnedByAnother()) return Status::kSeatTaken;
+  owner_ = sessions_->asking();
   return Acknowledge(w.Get<reg::kTraceAcknowledge>());
 }
 

@@ -37,8 +37,9 @@ struct TracePage {
 };
 
 // One context produces (tick or background) and one reads (background). Neither waits for the other. When the ring is
-// full, the new record is refused and counted. A page stays as it is until the reader names the next record it wants,
-// so a reader that lost a reply can read it again.
+// full, the new record is refused and counted. A recording belongs to the connection that started it; another one may
+// read it, but neither release its pages nor start another recording while the owner is there. A page stays as it is
+// until the reader names the next record it wants, so a reader that lost a reply can read it again.
 class Trace {
  public:
   // Answers how many words a record of these channels has, or 0 if they are not served.
@@ -101,6 +102,7 @@ class Trace {
   core::Status TakeAcknowledge(const Words<reg::kTraceAcknowledge>& w);
 
   void Begin();
+  bool OwnedByAnother() const;
   bool Ready() const { return started_.load(std::memory_order_acquire) == serial_; }
   std::uint32_t Slots(std::uint16_t record_words) const { return storage_words_ / (record_words + kStampWords); }
   const std::uint16_t* Slot(std::uint32_t behind_tail) const;
@@ -114,6 +116,8 @@ class Trace {
 
   // Of the reader.
   Recording requested_;
+  Sessions* sessions_ = nullptr;
+  std::uint32_t owner_ = Sessions::kNobody;  // who started the recording
   std::uint32_t serial_ = 0;
   TracePage page_;
   std::uint32_t tail_slot_ = 0;

@@ -99,15 +99,29 @@ template <class T>
 void Fold(T* __restrict x, T* __restrict r, T x0, T s, int length) {
   for (int k = 0; k < length; ++k) internal::FoldElement(x[k], r[k], x0, s);
 }
-// The same with r1, then with r2.
+// The same with r1, then with r2. Every load of a turn stands before its first store. Compilers keep that order, and a
+// core that issues in order (Cortex-M7) would otherwise wait for each element's chain before it starts the next one.
 template <class T>
 ARMCAL_NOINLINE void Fold(T* __restrict x, T* __restrict r1, T* __restrict r2, T x1, T s1, T x2, T s2, int length) {
-  internal::ByFours(length, [&](int k) ARMCAL_INLINE {
+  int k = 0;
+  for (; k + 3 < length; k += 4) {
+    T x_a = x[k], x_b = x[k + 1], x_c = x[k + 2], x_d = x[k + 3];
+    T a1 = r1[k], b1 = r1[k + 1], c1 = r1[k + 2], d1 = r1[k + 3];
+    T a2 = r2[k], b2 = r2[k + 1], c2 = r2[k + 2], d2 = r2[k + 3];
+    internal::FoldElement(x_a, a1, x1, s1), internal::FoldElement(x_b, b1, x1, s1);
+    internal::FoldElement(x_c, c1, x1, s1), internal::FoldElement(x_d, d1, x1, s1);
+    internal::FoldElement(x_a, a2, x2, s2), internal::FoldElement(x_b, b2, x2, s2);
+    internal::FoldElement(x_c, c2, x2, s2), internal::FoldElement(x_d, d2, x2, s2);
+    r1[k] = a1, r1[k + 1] = b1, r1[k + 2] = c1, r1[k + 3] = d1;
+    r2[k] = a2, r2[k + 1] = b2, r2[k + 2] = c2, r2[k + 3] = d2;
+    x[k] = x_a, x[k + 1] = x_b, x[k + 2] = x_c, x[k + 3] = x_d;
+  }
+  for (; k < length; ++k) {
     T rest = x[k];
     internal::FoldElement(rest, r1[k], x1, s1);
     internal::FoldElement(rest, r2[k], x2, s2);
     x[k] = rest;
-  });
+  }
 }
 
 // A row worked into a unit upper triangle R by Givens rotations without square roots: W. M. Gentleman, Least squares

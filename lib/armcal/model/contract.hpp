@@ -21,6 +21,9 @@
 //   kForgetting[kForgettingGroups]  default forgetting per estimator sample of each group (float)
 //   kMapBegin[kRigid+1], kMapColumn[], kMapValue[]  base = B body, compressed rows (float)
 //
+//   kCeilings    the hardest values that a table may hold: Ceilings<n, kParameters>
+//   kFriction[kFront]  columns that brake their own joint; kFrictionReads: what they depend on (friction_grid.hpp)
+//
 //   kStates      values that effects with memory carry from sample to sample (0 for most models)
 //   kSensitivities  d state / d eta, carried by the extended Kalman filter only
 //   kReadyState[i]  which state is 1 once the states of row i no longer depend on their start; -1: row i is always

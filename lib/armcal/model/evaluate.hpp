@@ -28,7 +28,7 @@ struct Committed {
 template <class Model>
 struct Rows {
   float front[Model::kFront > 0 ? Model::kFront : 1] = {};
-  float dense[Model::kJoints * Model::kDense] = {};
+  float dense[Model::kDense > 0 ? Model::kJoints* Model::kDense : 1] = {};
 };
 
 // The states of effects with memory. Each stream of samples has a Memory of its own.
@@ -58,7 +58,7 @@ void EvaluateRows(const Committed<Model>& committed, const ModelInput<float, Mod
 template <class Model>
 float LoadTorque(const float* p, const Rows<Model>& rows, int joint) {
   float sum = 0.0f;
-  for (int k = 0; k < Model::kDense; ++k) {
+  for (int k = Model::kRowBegin[joint]; k < Model::kDense; ++k) {
     const float parameter = p[Model::kFront + k];
     sum += parameter * math::Masked(rows.dense[joint * Model::kDense + k], math::MaskOf(parameter != 0.0f));
   }

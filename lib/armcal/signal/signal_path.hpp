@@ -5,6 +5,7 @@
 
 #include "armcal/math/elementary.hpp"
 #include "armcal/model/sample.hpp"
+#include "armcal/signal/reading_check.hpp"
 
 namespace armcal::signal {
 
@@ -33,11 +34,15 @@ struct Settings {
 // the centre window. Sample::tick is the FIRST tick of the centre window; all quantities belong to the instant
 // (kSampleTicks - 1) / 2 ticks later. A window starts where tick % kSampleTicks == 0. Differences are taken in integers
 // before any float. Limit: counts over five windows x kSampleTicks < 2^31.
-// Context of every call: tick. The time does not depend on the data. Each tick that completes a window takes longer.
+// A count that the arm cannot have made (CountCheck) acts as a stale axis, such a current (CurrentCheck) as a saturated
+// one. Such ticks are counted.
+// Context of every call: tick. The time depends on the data by a few instructions. Each tick that completes a window
+// takes longer.
 template <int n, int kSampleTicks>
 class SignalPath {
  public:
   explicit SignalPath(const Axes<n>& axes) : axes_(axes) {
+    for (int i = 0; i < n; ++i) counts_[i].Start(axes.counts_to_rad[i], axes.tick_rate_Hz);
     for (int i = 0; i < n; ++i) settings_.torque_scale[i] = 1.0f;
     for (int i = 0; i < n * n; ++i)
       if (axes.motor_to_joint[i] != 0.0f || axes.motor_torque_to_joint[i] != 0.0f) axes_of_joint_[i / n] |= 1u << i % n;
@@ -70,7 +75,8 @@ class SignalPath {
 
   const model::Sample<n>& sample() const { return sample_; }
   std::uint32_t generation() const { return settings_.generation; }
-  std::uint32_t gap_count() const { return gap_count_; }  // restarts because a tick was missing
+  std::uint32_t gap_count() const { return gap_count_; }                  // restarts because a tick was missing
+  std::uint32_t implausible_count() const { return implausible_count_; }  // ticks that the arm cannot have made
 
  private:
   static constexpr int kWindows = 5;
@@ -78,7 +84,7 @@ class SignalPath {
   struct Window {
     std::uint32_t tick;
     std::uint32_t first[n];  // counts of the first tick
-    std::int32_t rest[n];    // sum of (counts - first)
+    std::uint32_t rest[n];   // sum of (counts - first); unsigned, because a jump of an encoder may make it wrap
     std::int32_t current[n];
     float temperature[n];
     std::uint8_t spoilt[n];  // not enabled or saturated
@@ -86,6 +92,7 @@ class SignalPath {
   };
 
   void Restart() {
+    for (int i = 0; i < n; ++i) counts_[i].Restart(), currents_[i].Restart();
     running_ = false;
     phase_ = 0;
     newest_ = 0;
@@ -99,20 +106,26 @@ class SignalPath {
       w.tick = raw.tick;
       for (int i = 0; i < n; ++i) w.first[i] = static_cast<std::uint32_t>(raw.counts[i]);
     }
+    bool all_good = true;
     for (int i = 0; i < n; ++i) {
-      w.rest[i] += static_cast<std::int32_t>(static_cast<std::uint32_t>(raw.counts[i]) - w.first[i]);
+      w.rest[i] += static_cast<std::uint32_t>(raw.counts[i]) - w.first[i];
       w.current[i] += raw.current[i];
       w.temperature[i] += raw.temperature_degC[i];
       const std::uint8_t usable = static_cast<std::uint8_t>(raw.flags[i] & (model::kEnabled | model::kSaturated));
-      w.spoilt[i] |= usable != model::kEnabled;
-      w.stale[i] |= (raw.flags[i] & model::kStale) != 0;
+      const bool moves = raw.counts[i] != last_counts_[i];
+      const bool count_good = counts_[i].Check(raw.counts[i]), current_good = currents_[i].Check(raw.current[i], moves);
+      last_counts_[i] = raw.counts[i];
+      all_good &= count_good & current_good;
+      w.spoilt[i] |= (usable != model::kEnabled) | !current_good;
+      w.stale[i] |= (raw.flags[i] & model::kStale) != 0 || !count_good;
     }
+    implausible_count_ += !all_good;
   }
 
   // kSampleTicks x (average of window a - average of window b), exact.
   static float Difference(const Window& a, const Window& b, int axis) {
     const std::uint32_t first = (a.first[axis] - b.first[axis]) * static_cast<std::uint32_t>(kSampleTicks);
-    const std::uint32_t rest = static_cast<std::uint32_t>(a.rest[axis]) - static_cast<std::uint32_t>(b.rest[axis]);
+    const std::uint32_t rest = a.rest[axis] - b.rest[axis];
     return static_cast<float>(static_cast<std::int32_t>(first + rest));
   }
 
@@ -128,8 +141,8 @@ class SignalPath {
     for (int i = 0; i < n; ++i) {
       const float scale = axes_.counts_to_rad[i], share = scale * kShare;
       const std::uint32_t from_zero = centre.first[i] - static_cast<std::uint32_t>(axes_.zero_counts[i]);
-      q[i] =
-          scale * static_cast<float>(static_cast<std::int32_t>(from_zero)) + share * static_cast<float>(centre.rest[i]);
+      q[i] = scale * static_cast<float>(static_cast<std::int32_t>(from_zero)) +
+             share * static_cast<float>(static_cast<std::int32_t>(centre.rest[i]));
       for (int k = 0; k < 4; ++k) step[k][i] = share * Difference(*w[k + 1], *w[k], i);
       const float inner = Difference(*w[3], *w[1], i), outer = Difference(*w[4], *w[0], i);
       qd[i] = (8.0f * inner - outer) * (share / 12.0f) * step_rate_Hz;
@@ -173,12 +186,15 @@ class SignalPath {
   }
 
   Axes<n> axes_;
+  CountCheck counts_[n];
+  CurrentCheck currents_[n];
+  std::int32_t last_counts_[n] = {};
   Settings<n> settings_ = {};
   std::uint32_t axes_of_joint_[n] = {};
   Window window_[kWindows] = {};
   model::Sample<n> sample_;
   std::uint32_t last_tick_ = 0;
-  std::uint32_t gap_count_ = 0;
+  std::uint32_t gap_count_ = 0, implausible_count_ = 0;
   int phase_ = 0;
   int newest_ = 0;
   int complete_ = 0;

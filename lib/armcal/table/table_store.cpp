@@ -12,6 +12,8 @@ using core::Status;
 
 namespace {
 
+constexpr int kRechecks = 3;  // of the record in force before an erase
+
 struct Header {
   std::uint16_t format;
   std::uint32_t schema;
@@ -107,12 +109,29 @@ Status TableStore::Load(std::uint16_t* out) {
   if (!Fits()) return Status::kWrongSize;
   if (busy()) return Status::kBusy;
   revocable_ = false;
-  for (int slot = 0; slot < kSlots; ++slot) state_[slot] = Inspect(slot);
+  for (int slot = 0; slot < kSlots; ++slot) {
+    state_[slot] = Inspect(slot);
+    fallbacks_ += state_[slot] == SlotState::kCorrupt;
+  }
+  return TakeBest(out);
+}
+
+Status TableStore::LoadOlder(std::uint16_t* out) {
+  if (busy()) return Status::kBusy;
+  if (current_ >= 0) {
+    state_[current_] = SlotState::kRefused;
+    fallbacks_ += 1u;
+  }
+  return TakeBest(out);
+}
+
+Status TableStore::TakeBest(std::uint16_t* out) {
   for (int attempt = 0; attempt < kSlots; ++attempt) {
     current_ = Newest(SlotState::kGood);
     if (current_ < 0) break;
     if (IsOk(CopyOut(current_, out))) return Status::kOk;
     state_[current_] = SlotState::kCorrupt;
+    ++fallbacks_;
   }
   current_ = -1;
   if (Newest(SlotState::kOtherSchema) >= 0) return Status::kWrongSchema;
@@ -125,8 +144,11 @@ Status TableStore::Save(const std::uint16_t* words) {
   // Keep the slot of the table in force. If there is none, keep the newest record of another schema.
   const int keep = current_ >= 0 ? current_ : Newest(SlotState::kOtherSchema);
   target_ = keep == 0 ? 1 : 0;
-  const bool whole[kSlots] = {state_[0] == SlotState::kGood || state_[0] == SlotState::kOtherSchema,
-                              state_[1] == SlotState::kGood || state_[1] == SlotState::kOtherSchema};
+  const auto is_whole = [&](int slot) {
+    return state_[slot] == SlotState::kGood || state_[slot] == SlotState::kOtherSchema ||
+           state_[slot] == SlotState::kRefused;
+  };
+  const bool whole[kSlots] = {is_whole(0), is_whole(1)};
   std::uint32_t newest = 0;
   if (whole[0]) newest = sequence_[0];
   if (whole[1] && (!whole[0] || static_cast<std::int32_t>(sequence_[1] - newest) > 0)) newest = sequence_[1];
@@ -138,7 +160,56 @@ Status TableStore::Save(const std::uint16_t* words) {
   revocable_ = false;
   at_ = 0;
   stage_ = Stage::kErase;
+  if (current_ >= 0) BeginRecheck(current_);
   return Status::kOk;
+}
+
+void TableStore::BeginRecheck(int slot) {
+  checking_ = slot;
+  passes_ = 0;
+  check_ = 0;
+  at_ = 0;
+  stage_ = Stage::kRecheck;
+}
+
+// First the record in force. If that no longer reads well, the other one, if it was good: then the two change places.
+// Otherwise the record in force stays where it is, because another reading of it may still succeed.
+Status TableStore::RecheckNext() {
+  const std::uint32_t base = AddressOf(checking_), covered = kHeaderBytes + 2 * words_;
+  std::uint8_t bytes[kChunkBytes];
+  const std::uint32_t count = covered - at_ < kChunkBytes ? covered - at_ : kChunkBytes;
+  bool good = IsOk(storage_.Read(base + at_, bytes, count));
+  if (at_ == 0) {
+    const Header header = GetHeader(bytes);
+    good = good && core::GetBytes32(bytes) == kRecordMagic && header.sequence == sequence_[checking_];
+  }
+  check_ = core::Crc32(bytes, count, check_);
+  at_ += count;
+  if (good && at_ < covered) return Status::kBusy;
+  good = good && IsOk(storage_.Read(base + covered, bytes, kCrcBytes)) && core::GetBytes32(bytes) == check_;
+  const std::uint32_t commit_at = base + CommitOffset(words_, storage_.program_unit);
+  good = good && IsOk(storage_.Read(commit_at, bytes, 4)) && core::GetBytes32(bytes) == kCommitWord;
+
+  if (good && ++passes_ < kRechecks) {
+    check_ = 0;
+    at_ = 0;
+    return Status::kBusy;
+  }
+  const int other = 1 - current_;
+  if (!good && checking_ == current_) {
+    ++fallbacks_;
+    if (state_[other] == SlotState::kGood) {
+      BeginRecheck(other);
+      return Status::kBusy;
+    }
+  } else if (good && checking_ == other) {
+    state_[current_] = SlotState::kCorrupt;
+    target_ = current_;
+    current_ = previous_ = other;
+  }
+  at_ = 0;
+  stage_ = Stage::kErase;
+  return Status::kBusy;
 }
 
 Status TableStore::Revoke() {
@@ -154,6 +225,8 @@ Status TableStore::Step() {
   switch (stage_) {
     case Stage::kIdle:
       return Status::kOk;
+    case Stage::kRecheck:
+      return RecheckNext();
     case Stage::kErase:
       return EraseNext();
     case Stage::kProgram:

@@ -43,10 +43,14 @@ enum class SlotState : std::uint8_t {
   kGood = 1,
   kOtherSchema = 2,  // whole, but of another schema, length or format; it is kept as long as the other slot is free
   kCorrupt = 3,
+  kRefused = 4,  // whole, but its content was refused at boot
 };
 
-// A save erases the other slot, programs it, reads it back and then programs the commit word. Each Step does one
-// storage operation. The slot of the table in force is never touched. Context of every call: background.
+// A save reads the record in force three times more, because a cell may read well only now and then. Then it erases the
+// other slot, programs it, reads it back and programs the commit word. Each Step does one storage operation. If the
+// record in force no longer reads well and the other slot holds a good one, the new record goes into the slot of the
+// one in force, and the older good one stays: at any time at least one good record is left alone. Context of every
+// call: background.
 class TableStore {
  public:
   static constexpr int kSlots = 2;
@@ -59,6 +63,10 @@ class TableStore {
   // kBlank. kWrongSize: a record does not fit this storage. Unless kOk, `out` may hold words of a record that was
   // rejected.
   core::Status Load(std::uint16_t* out);
+
+  // The record that Load or this copied last is of no use: its content is refused. Copies the good one with the next
+  // lower sequence to `out` [words] in its place. Answers as Load. Call it at power-up only.
+  core::Status LoadOlder(std::uint16_t* out);
 
   // Starts a save. `words` [words] must stay unchanged until Step no longer answers kBusy.
   // kBusy: a save is running. kWrongSize: a record does not fit this storage.
@@ -76,9 +84,10 @@ class TableStore {
   SlotState slot_state(int slot) const { return state_[slot]; }
   std::uint32_t sequence() const { return current_ < 0 ? 0 : sequence_[current_]; }  // of the table in force, 0: none
   int slot() const { return current_; }                                              // -1: none
+  std::uint32_t fallbacks() const { return fallbacks_; }  // records passed over since power-up
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kErase, kProgram, kVerify, kCommit, kVerifyCommit, kRevoke };
+  enum class Stage : std::uint8_t { kIdle, kRecheck, kErase, kProgram, kVerify, kCommit, kVerifyCommit, kRevoke };
 
   bool Fits() const;
   std::uint32_t BaseOf(int slot) const { return static_cast<std::uint32_t>(slot) * (storage_.sector_count / 2); }
@@ -88,6 +97,9 @@ class TableStore {
   int Newest(SlotState wanted) const;
   void FillBody(std::uint32_t first, std::uint8_t* bytes, std::uint32_t count) const;
   void FillCommit(std::uint8_t* bytes) const;
+  core::Status TakeBest(std::uint16_t* out);
+  core::Status RecheckNext();
+  void BeginRecheck(int slot);
   core::Status EraseNext();
   core::Status ProgramNext();
   core::Status VerifyNext();
@@ -107,10 +119,14 @@ class TableStore {
   Stage stage_ = Stage::kIdle;
   bool revocable_ = false;
   int target_ = 0;
-  std::uint32_t at_ = 0;  // sector or byte offset inside the running stage
+  int checking_ = 0;         // slot that is read once more before the erase
+  int passes_ = 0;           // how often it was read well
+  std::uint32_t check_ = 0;  // checksum of it so far
+  std::uint32_t at_ = 0;     // sector or byte offset inside the running stage
   const std::uint16_t* source_ = nullptr;
   std::uint8_t header_[kHeaderBytes] = {};
   std::uint32_t crc_ = 0;
+  std::uint32_t fallbacks_ = 0;              // see register table_fallbacks
   core::Status result_ = core::Status::kOk;  // what Step answers when kRevoke has ended
 };
 

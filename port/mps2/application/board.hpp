@@ -19,6 +19,8 @@ inline armcal::application::PretendAxes<armcal::generated::SelectedModel> axes;
 inline armcal::hardware::Storage Storage() { return mps2::PsramStorage(); }
 inline armcal::hardware::Clock Clock() { return mps2::TickClock(); }
 inline armcal::hardware::Serial Serial() { return mps2::Uart1(); }
+// Its axes are always enabled and drive nothing.
+inline armcal::controller::BoardRules Rules() { return {true, {100, 1000}}; }
 inline void OnSerial() { mps2::OnUart1(); }
 inline void Sleep() { mps2::Sleep(); }
 

@@ -1,11 +1,11 @@
 // application - the example firmware, as the README shows it.
 #include "armcal/armcal.hpp"
-#include "board.hpp"           // yours: storage, clock, serial line and axes
+#include "board.hpp"           // yours: storage, clock, serial line, axes and what a client may do
 #include "selected_model.hpp"  // generated: the model that this program links
 
 using Model = armcal::generated::SelectedModel;
 using Filter = armcal::filter::ForgettingFilter<Model>;
-static armcal::controller::Controller<Model, Filter> controller(board::Storage(), board::Clock());
+static armcal::controller::Controller<Model, Filter> controller(board::Storage(), board::Clock(), {}, board::Rules());
 static armcal::link::RtuService modbus(controller.engine(), board::Serial(), board::Clock(), 1, board::kSilence_ms);
 static armcal::controller::RawTrace<Model, 16384> trace;  // 32 KB: a client that records may be 4 s late
 

@@ -63,7 +63,7 @@ bool Run(const char* name, std::uint32_t period) {
 int Program() {
   if (port::runner::Read(trace, sizeof trace) != sizeof trace) return 1;
   if (!core::IsOk(estimator::BuildAdoptedTable(estimator::DefaultTable<Model>(), 1, rigid, adopted))) return 1;
-  const bool forgetting = Run<filter::ForgettingFilter<Model>>("forgetting", 8009);
-  const bool kalman = Run<filter::KalmanFilter<Model, filter::Form::kBlock>>("kalman_block", 16001);
+  const bool forgetting = Run<filter::ForgettingFilter<Model>>("forgetting", 10007);
+  const bool kalman = Run<filter::KalmanFilter<Model, filter::Form::kBlock>>("kalman_block", 18013);
   return forgetting && kalman ? 0 : 2;
 }

@@ -30,7 +30,7 @@ signal::Axes<n> CoupledAxes() {
 }  // namespace
 
 int Program() {
-  Path path(CoupledAxes());
+  static Path path(CoupledAxes());
   signal::Settings<n> settings = {};
   for (int i = 0; i < n; ++i) {
     settings.v_min_radps[i] = 0.01f;

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "tests/unit/client/test_server.hpp"
@@ -20,7 +21,12 @@ using Bytes = std::vector<std::uint8_t>;
 
 class RawClient {
  public:
-  explicit RawClient(int port) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  // `from`: the client's own address, 127.0.0.from.
+  explicit RawClient(int port, std::uint32_t from = 1) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in own{};
+    own.sin_family = AF_INET;
+    own.sin_addr.s_addr = htonl((INADDR_LOOPBACK & 0xFFFFFF00u) | from);
+    ::bind(socket_, reinterpret_cast<sockaddr*>(&own), sizeof own);
     sockaddr_in where{};
     where.sin_family = AF_INET;
     where.sin_port = htons(static_cast<std::uint16_t>(port));
@@ -194,6 +200,66 @@ TEST(TcpServer, FifthConnection_IsTurnedAway_AndSlotsAreReused) {
     ASSERT_EQ(client.Receive(13), kAnswer) << i;
     if (i % 2 == 0) client.Reset();
   }
+}
+
+bool Answers(RawClient& client) {
+  client.Send(kProbe);
+  return client.Receive(13) == kAnswer;
+}
+
+TEST(TcpServer, AnAddressThatHoldsAllSlots_MakesRoomForAnotherAddress) {
+  test::TestServer server;
+  RawClient a(server.port()), b(server.port()), c(server.port()), d(server.port());
+  for (RawClient* client : {&a, &b, &c, &d}) ASSERT_TRUE(Answers(*client));
+  server.Jump(1000);
+  for (RawClient* client : {&a, &c, &d}) ASSERT_TRUE(Answers(*client));  // b is silent longest
+  RawClient other(server.port(), 2);
+  EXPECT_TRUE(Answers(other));
+  EXPECT_TRUE(b.Closed());
+  for (RawClient* client : {&a, &c, &d}) EXPECT_TRUE(Answers(*client));
+  RawClient more(server.port());
+  EXPECT_TRUE(more.Closed()) << "three are its share";
+  EXPECT_TRUE(Answers(other));
+}
+
+TEST(TcpServer, FourAddresses_KeepTheirOneConnection) {
+  test::TestServer server;
+  RawClient a(server.port(), 1), b(server.port(), 2), c(server.port(), 3), d(server.port(), 4);
+  for (RawClient* client : {&a, &b, &c, &d}) ASSERT_TRUE(Answers(*client));
+  RawClient fifth(server.port(), 5);
+  EXPECT_TRUE(fifth.Closed());
+  for (RawClient* client : {&a, &b, &c, &d}) EXPECT_TRUE(Answers(*client));
+}
+
+// The writer is silent longest, and keeps its connection all the same.
+TEST(TcpServer, TheWritersConnection_IsNeverTheOneThatMakesRoom) {
+  test::TestServer server;
+  RawClient writer(server.port());
+  const Bytes unlock = {0, 1, 0, 0, 0, 11, 1, 16, 0, 0x40, 0, 2, 4, 0x6B, 0x6C, 0x6E, 0x75};
+  writer.Send(unlock);
+  ASSERT_EQ(writer.Receive(12).size(), 12u);
+  server.Jump(1000);
+  RawClient b(server.port()), c(server.port()), d(server.port());
+  for (RawClient* client : {&b, &c, &d}) ASSERT_TRUE(Answers(*client));
+  std::vector<std::unique_ptr<RawClient>> others;
+  for (std::uint32_t from = 2; from <= 4; ++from) {
+    others.push_back(std::make_unique<RawClient>(server.port(), from));
+    ASSERT_TRUE(Answers(*others.back())) << from;
+  }
+  writer.Send({0, 2, 0, 0, 0, 6, 1, 4, 0, 0x5E, 0, 1});
+  EXPECT_EQ(writer.Receive(11), (Bytes{0, 2, 0, 0, 0, 5, 1, 4, 2, 0, 1})) << "still unlocked";
+  for (const auto& other : others) EXPECT_TRUE(Answers(*other));
+}
+
+TEST(TcpServer, AnUnusedConnection_MakesRoomForTheNextOfItsAddress) {
+  test::TestServer server;
+  RawClient a(server.port()), b(server.port()), c(server.port()), d(server.port());
+  for (RawClient* client : {&a, &b, &c, &d}) ASSERT_TRUE(Answers(*client));
+  server.Jump(10000);
+  for (RawClient* client : {&b, &c, &d}) ASSERT_TRUE(Answers(*client));
+  RawClient e(server.port());
+  EXPECT_TRUE(Answers(e));
+  EXPECT_TRUE(a.Closed());
 }
 
 TEST(TcpServer, PortInUse_IsSaidClearly) {

@@ -127,6 +127,34 @@ TEST(Flash, WhenTheDriveReadsBackSomethingElse_IsAVerifyError) {
   EXPECT_THROW(FlashTable(drive, MakeTable(1)), client::VerifyError);
 }
 
+// Two clients at once: one waits for the other, and each ends with its own table having been in force.
+TEST(Flash, OfTwoClientsAtOnce_EndsWithBothTablesFlashedOneAfterTheOther) {
+  test::TestServer server;
+  constexpr int kRounds = 5;
+  const auto flash = [&](int first) {
+    auto drive = server.Connect();
+    for (int k = 0; k < kRounds; ++k) EXPECT_NO_THROW(FlashTable(drive, MakeTable(first + k)));
+  };
+  std::thread other(flash, 100);
+  flash(200);
+  other.join();
+  EXPECT_EQ(server.drive.application.adoptions, 2 * kRounds);
+}
+
+// A check that is refused says which word, what it holds and what would have been accepted.
+TEST(Flash, RefusedForOneWord_NamesIt) {
+  test::TestServer server;
+  auto drive = server.Connect();
+  Words unphysical = MakeTable(2);
+  unphysical[5] = test::kBadPhysics;
+  try {
+    FlashTable(drive, unphysical);
+    FAIL();
+  } catch (const RefusedError& error) {
+    EXPECT_NE(std::string(error.what()).find("word 5 of the table is 1"), std::string::npos) << error.what();
+  }
+}
+
 // The connection is cut once, after every possible number of reply bytes. The client connects again and finishes, and
 // each table is adopted exactly once.
 TEST(Flash, WithTheConnectionCutAtAnyByte_EndsWithTheNewTable) {

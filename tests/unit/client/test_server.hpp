@@ -59,7 +59,8 @@ class TestServer {
   using Service = link::TcpService<port_linux::TcpServer::kSlots>;
   Service service_{drive.device.engine()};
   std::atomic<std::uint32_t> jumped_ms_{0};
-  port_linux::TcpServer server_{{&service_, Service::kMaxReply, &Service::Open, &Service::Receive, &Service::MidFrame},
+  port_linux::TcpServer server_{{&service_, Service::kMaxReply, &Service::Open, &Service::Receive, &Service::MidFrame,
+                                 &Service::Close, &Service::Keep},
                                 {this, &Ticks, &Ms}};
   std::atomic<int> connections_{0};
   std::atomic<bool> stop_{false};

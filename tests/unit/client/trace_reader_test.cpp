@@ -138,7 +138,16 @@ TEST(TraceReader, StartedAnewByAnotherClient_IsNoticed) {
   TraceReader reader(drive, 1);
   TraceRecords records;
   EXPECT_EQ(reader.TakePage(records), 0u);
-  StartTrace(other, 1, {TraceMode::kStreaming, 1, 0, 0, kMask});
+  EXPECT_THROW(StartTrace(other, 1, {TraceMode::kStreaming, 1, 0, 0, kMask}), client::RefusedError);
+  server.Jump(link::Sessions::kPatience_ms);  // its owner has been silent for so long
+  ASSERT_TRUE(test::Await([&] {
+    try {
+      StartTrace(other, 1, {TraceMode::kStreaming, 1, 0, 0, kMask});
+      return true;
+    } catch (const client::RefusedError&) {
+      return false;  // the server has not seen the new time yet
+    }
+  }));
   EXPECT_THROW(reader.TakePage(records), client::LinkError);
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 TEST(WithoutUrdfdom, AUrdf_IsRefusedInOneLineThatNamesThePackage) {
   try {
-    ReadUrdf("arms/my_arm.urdf");
+    ReadUrdf({"arms/my_arm.urdf", "", {}});
     FAIL() << "accepted";
   } catch (const io::InputError& e) {
     const std::string line = e.what();

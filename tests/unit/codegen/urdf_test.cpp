@@ -36,7 +36,8 @@ class Urdf : public testing::Test {
   codegen::Robot Read(const std::string& urdf, const std::vector<std::string>& joints, const std::string& more = "") {
     std::ofstream(folder_ / "arm.urdf") << urdf;
     std::ofstream out(folder_ / "arm.toml");
-    out << "name = \"arm\"\nsource = \"test\"\ngravity_mps2 = [0.0, 0.0, -9.81]\nurdf = \"arm.urdf\"\n" << more;
+    out << "name = \"arm\"\nsource = \"test\"\ngravity_mps2 = [0.0, 0.0, -9.81]\nurdf = \"arm.urdf\"\n"
+        << more << "[prior]\nlink_relative_sd = 0.2\n";  // the bodies below are equal, and meant so
     for (const auto& j : joints)
       out << "[[joint]]\nname = \"" << j << "\"\n"
           << (j[0] == 'p' ? "acceleration_limit_mps2 = 1.0\ntorque_noise_N = 1.0\nv_min_mps = 0.01\n"

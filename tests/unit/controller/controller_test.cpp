@@ -105,7 +105,12 @@ struct Bench {
   hardware::Clock clock{&now, [](void* t) { return *static_cast<std::uint32_t*>(t); },
                         [](void* t) { return *static_cast<std::uint32_t*>(t); }};
   Axes axes;
-  controller::Controller<Model, Filters...> controller{flash.storage(), clock};
+  static controller::BoardRules Rules() {
+    controller::BoardRules rules;
+    rules.adopt_while_enabled = true;
+    return rules;
+  }
+  controller::Controller<Model, Filters...> controller{flash.storage(), clock, {}, Rules()};
   Status booted = Status::kOk, torque = Status::kOk;
   float tau_Nm[n] = {};
   int disturbance_LSB = 0;
@@ -121,6 +126,33 @@ TEST(Controller, WithoutAStoredTable_LearnsFromTheDefaultsAndFeedsNothingForward
   EXPECT_EQ(bench->torque, Status::kEmpty);
   EXPECT_EQ((bench->Value<reg::kFeedForwardState>()), 0);
   EXPECT_GT(bench->Value<reg::kRowsUsedA>(), 0u);
+}
+
+// One tick with a count that is far off, and later ten ticks with a wrong torque: a register counts each.
+TEST(Controller, WhatIsRefused_IsServedInRegisters) {
+  const auto bench = std::make_unique<Bench<Forgetting, Block>>();
+  bench->Run(4000);
+  EXPECT_EQ((bench->Read<reg::kDoubtBlock>().template Get<reg::kImplausibleTicks>()), 0u);
+  const auto push = [&](auto change) {
+    model::RawSample<n> raw;
+    controller::SetPoint<n> set;
+    (void)bench->axes.Read(bench->now, raw, set);
+    change(raw);
+    ASSERT_EQ(bench->controller.Push(raw), Status::kOk);
+    ++bench->now;
+    bench->Idle();
+  };
+  push([](auto& raw) { raw.counts[1] ^= 1 << 20; });
+  bench->Run(999);
+  for (int k = 0; k < 10; ++k)
+    push([](auto& raw) { raw.current[1] = static_cast<std::int16_t>(raw.current[1] + 4000); });
+  bench->Run(2000);
+  const auto doubt = bench->Read<reg::kDoubtBlock>();
+  EXPECT_EQ(doubt.template Get<reg::kImplausibleTicks>(), 1u);
+  EXPECT_GT(doubt.template Get<reg::kRowsOutsideA>(), 0u);
+  EXPECT_LE(doubt.template Get<reg::kRowsOutsideA>(), 6u);
+  EXPECT_EQ(doubt.template Get<reg::kRowsOutsideB>(), doubt.template Get<reg::kRowsOutsideA>());
+  EXPECT_EQ(doubt.template Get<reg::kTableFallbacks>(), 0u);
 }
 
 TEST(Controller, ATableFlashed_IsInForceAndStaysSoAfterPowerUp) {
@@ -150,7 +182,7 @@ TEST(Controller, OfTablesCheckedOneAfterTheOther_TheOneThatIsSavedComesIntoForce
   ASSERT_EQ(bench->Check(table(2.0f), crc), Status::kOk);
   EXPECT_EQ(bench->controller.adopted().sigma_Nm[0], 1.0f) << "checked is not adopted";
   auto unphysical = table(3.0f);
-  unphysical.parameter[0].mean = -1.0f;
+  unphysical.parameter[2 * model::kBodyBlock + model::kIxx].mean = 1e-6f;  // Iyy and Izz are not alike
   EXPECT_EQ(bench->Check(unphysical, crc), Status::kUnphysical);
   EXPECT_EQ(bench->Command(reg::kSave, crc), Status::kWrongOrder);
   ASSERT_EQ(bench->Check(table(4.0f), crc), Status::kOk);
@@ -174,8 +206,53 @@ TEST(Controller, WhileAxesAreEnabled_AdoptsABumplessTableOnly) {
   EXPECT_EQ(bench->Flash(table), Status::kAxisEnabled);
   EXPECT_EQ(bench->controller.generation(), 1u);
   table.flags |= model::kFlagBumpless;
+  EXPECT_EQ(bench->Flash(table), Status::kBeyondCeiling) << "without a fade";
+  table.blend_ms = 500;
   EXPECT_EQ(bench->Flash(table), Status::kOk);
   EXPECT_EQ(bench->controller.generation(), 2u);
+}
+
+TEST(Controller, OnABoardThatDoesNotAllowIt_RefusesABumplessTable) {
+  test::NorFlash flash{{2, 16384, 8, 0xFF}};
+  std::uint32_t now = 0;
+  const auto count = [](void* t) { return *static_cast<std::uint32_t*>(t); };
+  auto table = estimator::DefaultTable<Model>();
+  table.flags = model::kFlagBumpless, table.blend_ms = 500;
+  std::vector<std::uint16_t> words(Bench<Forgetting>::kWords);
+  model::Encode(table, words.data());
+  table::TableStore store(flash.storage(), Model::kSchema, Bench<Forgetting>::kWords);
+  std::vector<std::uint16_t> unused(words.size());
+  ASSERT_EQ(store.Load(unused.data()), Status::kBlank);
+  ASSERT_EQ(store.Save(words.data()), Status::kOk);
+  while (store.Step() == Status::kBusy) {
+  }
+  const auto drive =
+      std::make_unique<controller::Controller<Model, Forgetting>>(flash.storage(), hardware::Clock{&now, count, count});
+  EXPECT_EQ(drive->Boot(), Status::kForbidden) << "not even from storage";
+}
+
+// The board allows five saves, then one a minute.
+TEST(Controller, Saves_AreAllowedInABurstAndThenOneAMinute) {
+  const auto bench = std::make_unique<Bench<Forgetting>>();
+  const auto save = [&] { return bench->Flash(estimator::DefaultTable<Model>()); };
+  for (int k = 0; k < 5; ++k) ASSERT_EQ(save(), Status::kOk) << k;
+  EXPECT_EQ(save(), Status::kTooSoon);
+  EXPECT_EQ(bench->controller.generation(), 6u);
+  EXPECT_EQ((bench->Value<reg::kSaveWait>()), 60);
+  bench->now += 59999;
+  bench->Idle();
+  EXPECT_EQ(save(), Status::kTooSoon);
+  bench->now += 1;
+  bench->Idle();
+  EXPECT_EQ((bench->Value<reg::kSaveWait>()), 0);
+  EXPECT_EQ(save(), Status::kOk);
+  EXPECT_EQ(save(), Status::kTooSoon);
+  for (int minute = 0; minute < 20; ++minute) {
+    bench->now += 60000;
+    bench->Idle();
+  }
+  for (int k = 0; k < 5; ++k) EXPECT_EQ(save(), Status::kOk) << "after a pause a burst again, and no more";
+  EXPECT_EQ(save(), Status::kTooSoon);
 }
 
 TEST(Controller, ATableThatAFilterCannotHold_IsRefusedAndNothingChanges) {

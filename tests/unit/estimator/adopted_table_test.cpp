@@ -49,6 +49,13 @@ TEST_F(AdoptedTableTest, DefaultTable_MapsBodiesAndSpreadsByHand) {
   EXPECT_EQ(adopted->scale[0], 4.0f);
 }
 
+// 2^32 - 256 is the largest float that still fits: 49 days of ticks.
+TEST_F(AdoptedTableTest, FadeOfMoreTicksThanACounterHolds_IsCut) {
+  table.blend_ms = 0xFFFFFFFFu;
+  ASSERT_EQ(Build(), Status::kOk);
+  EXPECT_EQ(adopted->committed.blend_ticks, 0xFFFFFF00u);
+}
+
 TEST_F(AdoptedTableTest, RigidColumns_AreCorrelatedThroughTheSharedMass) {
   ASSERT_EQ(Build(), Status::kOk);
   // cov(MX1 + a1 m2, MX2) = a1 c2x var(m2) = 0.5 * 0.2 * 1.

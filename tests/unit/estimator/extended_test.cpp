@@ -297,5 +297,53 @@ TEST(Extended, EtaThatRunsIntoItsBound_StaysThereAndIsCounted) {
   for (const float v : e.value) EXPECT_TRUE(std::isfinite(v));
 }
 
+// The two-link model with its eta made a constant.
+struct NoEta : armcal::test::TwoLink {
+  static constexpr int kNonlinear = 0, kParameters = TwoLink::kParameters - 1;
+  template <class T>
+  static void Regressor(const model::ModelInput<T, 2>& x, const T* p, const T*, const T* state, T* next, T* front,
+                        T* dense) {
+    const T eta[1] = {T(0.1f)};
+    TwoLink::Regressor(x, p, eta, state, next, front, dense);
+  }
+};
+
+// Without nonlinear parameters there is nothing to linearise, so both filters are the same up to rounding.
+TEST(Extended, ModelWithoutEta_IsThePlainKalmanFilter) {
+  const auto rigid = std::make_unique<RigidPrior<NoEta, float>>();
+  const auto table = std::make_unique<AdoptedTable<NoEta>>();
+  ASSERT_EQ(BuildAdoptedTable<NoEta>(DefaultTable<NoEta>(), 1, *rigid, *table), core::Status::kOk);
+  Estimator<NoEta, filter::KalmanFilter<NoEta>> plain;
+  Estimator<NoEta, filter::ExtendedKalmanFilter<NoEta>> extended;
+  plain.Adopt(*table, 0), extended.Adopt(*table, 0);
+  std::mt19937 random(5);
+  std::normal_distribution<float> normal;
+  model::Sample<2> sample;
+  for (int k = 0; k < 500; ++k, sample.tick += 8) {
+    for (int i = 0; i < 2; ++i) {
+      sample.q[i] = normal(random), sample.qd[i] = 1 + normal(random) / 4, sample.qdd[i] = normal(random);
+      sample.tau[i] = 20 * normal(random), sample.flags[i] = model::kValid | model::kMoving;
+    }
+    ASSERT_EQ(plain.PushSample(sample), core::Status::kOk);
+    ASSERT_EQ(extended.PushSample(sample), core::Status::kOk);
+    while (plain.Step()) {
+    }
+    while (extended.Step()) {
+    }
+  }
+  plain.RequestReadOut(), extended.RequestReadOut();
+  while (plain.Step()) {
+  }
+  while (extended.Step()) {
+  }
+  Estimates<NoEta> a, b;
+  ASSERT_TRUE(plain.Take(a) && extended.Take(b));
+  EXPECT_GT(a.rows_used[0], 400u);
+  for (int k = 0; k < NoEta::kColumns; ++k) {
+    EXPECT_NEAR(a.value[k], b.value[k], 0.01 * a.sd[k] + 1e-6) << k;
+    EXPECT_NEAR(a.sd[k], b.sd[k], 1e-3 * a.sd[k]) << k;
+  }
+}
+
 }  // namespace
 }  // namespace armcal::estimator

@@ -114,12 +114,12 @@ TEST_F(FeedForwardTest, BumplessTable_IsCrossFadedWithoutAStep) {
   Set c = Example(2);
   for (float& p : c.p) p *= 2;
   c.bumpless = true;
-  c.blend_ticks = 10;
+  c.blend_ticks = 100;
   ASSERT_EQ(ff->Offer(c, true), Status::kOk);
-  for (int tick = 1; tick <= 12; ++tick) {
+  for (int tick = 1; tick <= 120; ++tick) {
     ASSERT_EQ(Evaluate(), Status::kOk);
-    EXPECT_NEAR(tau[0], from * (1 + std::min(tick, 10) / 10.0), 1e-4);
-    EXPECT_EQ(ff->blending(), tick < 10);
+    EXPECT_NEAR(tau[0], from * (1 + std::min(tick, 100) / 100.0), 1e-4);
+    EXPECT_EQ(ff->blending(), tick < 100);
   }
   EXPECT_NEAR(tau[0], Exact(c, 0), 1e-5 * 100);
 }
@@ -127,10 +127,93 @@ TEST_F(FeedForwardTest, BumplessTable_IsCrossFadedWithoutAStep) {
 TEST_F(FeedForwardTest, FirstBumplessTable_FadesInFromZero) {
   Set c = Example(1);
   c.bumpless = true;
-  c.blend_ticks = 4;
+  c.blend_ticks = 80;
   ASSERT_EQ(ff->Offer(c, true), Status::kOk);
-  EXPECT_EQ(Evaluate(), Status::kOk);
+  for (int tick = 0; tick < 20; ++tick) EXPECT_EQ(Evaluate(), Status::kOk);
   EXPECT_NEAR(tau[0], 0.25 * Exact(c, 0), 1e-4);
+}
+
+// Whatever a table asks for, a bumpless one takes the shortest fade at least: 50 ms are 50 ticks.
+TEST_F(FeedForwardTest, FadeOfZeroMs_TakesTheShortestFade) {
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  Set c = Example(2);
+  for (float& p : c.p) p *= 3;
+  c.bumpless = true;
+  ASSERT_EQ(ff->Offer(c, true), Status::kOk);
+  for (int tick = 1; tick <= 60; ++tick) {
+    ASSERT_EQ(Evaluate(), Status::kOk);
+    EXPECT_NEAR(tau[0], (1 + 2 * std::min(tick, 50) / 50.0) * Exact(Example(1), 0), 1e-3) << tick;
+  }
+}
+
+// The tables differ in everything: amplitudes, and an eta that a column depends on. The oracle knows only that nothing
+// may move by more than a tick's share of what is left.
+TEST_F(FeedForwardTest, FadeInsideAFade_StartsFromThePresentTorque) {
+  Set first = Example(1);
+  first.p[6] = 6.0f;  // the column that depends on eta
+  ASSERT_EQ(ff->Offer(first, false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  Set second = first, third = first;
+  second.generation = 2, third.generation = 3;
+  for (float& p : second.p) p *= 4;
+  for (float& p : third.p) p *= -2;
+  second.eta[0] = 2.0f, third.eta[0] = 0.7f;
+  second.bumpless = third.bumpless = true;
+  second.blend_ticks = third.blend_ticks = 100;
+  ASSERT_EQ(ff->Offer(second, true), Status::kOk);
+  for (int tick = 0; tick < 40; ++tick) ASSERT_EQ(Evaluate(), Status::kOk);
+  const float present[2] = {tau[0], tau[1]};
+  for (int i = 0; i < 2; ++i) ASSERT_NEAR(present[i], 0.6 * Exact(first, i) + 0.4 * Exact(second, i), 1e-3);
+  ASSERT_EQ(ff->Offer(third, true), Status::kOk);
+  for (int tick = 1; tick <= 110; ++tick) {
+    ASSERT_EQ(Evaluate(), Status::kOk);
+    const double share = std::min(tick, 100) / 100.0;
+    for (int i = 0; i < 2; ++i) EXPECT_NEAR(tau[i], (1 - share) * present[i] + share * Exact(third, i), 2e-3) << tick;
+  }
+}
+
+// What an interrupted fade starts from goes on to follow the motion: it is torque of the mixed table, not a number.
+TEST_F(FeedForwardTest, FadeInsideAFade_FollowsTheMotion) {
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  Set second = Example(2), third = Example(3);
+  for (float& p : second.p) p *= 4;
+  for (float& p : third.p) p *= -2;
+  second.bumpless = third.bumpless = true;
+  second.blend_ticks = third.blend_ticks = 100;
+  ASSERT_EQ(ff->Offer(second, true), Status::kOk);
+  for (int tick = 0; tick < 40; ++tick) ASSERT_EQ(Evaluate(), Status::kOk);
+  ASSERT_EQ(ff->Offer(third, true), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  q[0] = -1.1f, qd[0] = -0.4f, qdd[1] = -6.0f;
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  for (int i = 0; i < 2; ++i) {
+    const double mixed = 0.6 * Exact(Example(1), i) + 0.4 * Exact(second, i);
+    EXPECT_NEAR(tau[i], 0.98 * mixed + 0.02 * Exact(third, i), 2e-3);
+  }
+}
+
+TEST_F(FeedForwardTest, LimitOfTheNextTable_HoldsAtOnceOrRisesWithTheFade) {
+  Set first = Example(1);
+  first.limit_Nm[0] = 10.0f;
+  first.limit_Nm[1] = 4.0f;
+  ASSERT_EQ(ff->Offer(first, false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kClamped);
+  ASSERT_EQ(tau[0], 10.0f);
+  ASSERT_GT(std::abs(Exact(first, 1)), 4.0);
+  Set second = first;
+  second.generation = 2;
+  second.bumpless = true;
+  second.blend_ticks = 100;
+  second.limit_Nm[0] = 20.0f;
+  second.limit_Nm[1] = 3.0f;
+  ASSERT_EQ(ff->Offer(second, true), Status::kOk);
+  for (int tick = 1; tick <= 110; ++tick) {
+    ASSERT_EQ(Evaluate(), Status::kClamped);
+    EXPECT_NEAR(tau[0], 10 + std::min(tick, 100) / 10.0, 1e-4);
+    EXPECT_EQ(std::abs(tau[1]), 3.0f);
+  }
 }
 
 TEST_F(FeedForwardTest, EachColumn_AddsItsOwnTorque) {

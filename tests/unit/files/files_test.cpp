@@ -30,6 +30,19 @@ TEST(Files, AtomicWrite_PlainAndGzip_ReadBackTheSame) {
   EXPECT_LT(std::filesystem::file_size(folder / "b.gz"), text.size() / 2);
 }
 
+// 64 MB of zeros in a file of 64 KB. Text of numbers of the same size is read.
+TEST(Files, AFileMadeToFillTheMemory_IsRefused_AndALongLogIsNot) {
+  const TemporaryFolder folder;
+  WriteWholeFile(folder / "bomb.gz", std::string(std::size_t{64} << 20, '0'));
+  EXPECT_NE(ErrorOf([&] { (void)ReadWholeFile(folder / "bomb.gz"); }).find("bomb.gz: grows to more than 60 times"),
+            std::string::npos);
+  std::string rows;
+  for (long k = 0; rows.size() < (std::size_t{24} << 20); ++k)
+    rows += std::to_string(k * 7919 % 1000003) + ",0.0,0.0\n";
+  WriteWholeFile(folder / "log.gz", rows);
+  EXPECT_EQ(ReadWholeFile(folder / "log.gz").size(), rows.size());
+}
+
 TEST(Files, AtomicWrite_GzipTwice_GivesTheSameBytes) {
   const TemporaryFolder folder;
   WriteWholeFile(folder / "a.gz", "same text");

@@ -71,10 +71,10 @@ TEST(Registers, Access_IsWhatTheListSays) {
 }
 
 // The compiler makes this checksum out of the declarations. Another one would mean a map that old clients cannot read.
-TEST(Registers, LayoutCrc_IsThatOfMapVersion1_2) {
+TEST(Registers, LayoutCrc_IsThatOfMapVersion1_3) {
   EXPECT_EQ(link::reg::kMapMajorValue, 1);
-  EXPECT_EQ(link::reg::kMapMinorValue, 2);
-  EXPECT_EQ(link::kLayoutCrc, 0x41383644u);
+  EXPECT_EQ(link::reg::kMapMinorValue, 3);
+  EXPECT_EQ(link::kLayoutCrc, 0xB29A9115u);
 }
 
 // Every word of the block has a value of its own, so a wrong place would show.
@@ -91,6 +91,15 @@ TEST(Words, ValuesLieWhereTheRegisterIsDeclared) {
   EXPECT_EQ(core::GetF32(identity.data() + 12), reg::kProbeFloatValue);
   EXPECT_EQ(reg::kTracePageBlock.Of(1).first, 0x6000);
   EXPECT_EQ(SpanOf(reg::kTraceAcknowledge).Of(1).first, 0x011C);
+}
+
+TEST(Registers, CountersOfDoubt_EachServeTheirOwn) {
+  test::TestDevice drive;
+  drive.live.rows_outside[0] = 0x10001, drive.live.rows_outside[1] = 0x20002, drive.live.implausible_ticks = 0x30003;
+  std::uint16_t words[8];
+  ASSERT_EQ(drive.device.map().Read(RegisterKind::kInput, 0x0068, 8, words), Status::kOk);
+  for (std::uint32_t k = 0; k < 3; ++k) EXPECT_EQ(core::GetU32(words + 2 * k), (k + 1) * 0x10001);
+  EXPECT_EQ(core::GetU32(words + 6), drive.store.fallbacks());
 }
 
 TEST(Registers, FloatsBeyondTheDevicesColumns_AreNotThere) {

@@ -220,6 +220,30 @@ TEST_F(Transaction, StoredTableThatTheApplicationRefuses_LeavesTheDefaultsActive
   EXPECT_EQ(drive_.application.adoptions, 0);
 }
 
+TEST_F(Transaction, NewestStoredTableRefused_BootsTheOlderOne_AndTheNextSaveReplacesTheRefusedOne) {
+  Flash(1);
+  Words unphysical = MakeTable(2);
+  unphysical[5] = test::kBadPhysics;
+  ASSERT_EQ(drive_.store.Save(unphysical.data()), Status::kOk);
+  while (drive_.store.Step() == Status::kBusy) {
+  }
+  Words staged(kTableWords), active(kTableWords);
+  table::TableStore store(drive_.flash.storage(), kSchema, kTableWords);
+  test::FakeApplication application;
+  link::TableTransaction next(application.Functions(), store, kSchema, staged.data(), active.data(), kTableWords);
+  EXPECT_EQ(next.Boot(), Status::kOk);
+  EXPECT_EQ(next.table_status(), Status::kOk);
+  EXPECT_EQ(active, MakeTable(1));
+  EXPECT_EQ(application.adopted, MakeTable(1));
+  EXPECT_EQ(store.fallbacks(), 1u);
+  const int kept = store.slot();
+  const Words third = MakeTable(3);
+  ASSERT_EQ(store.Save(third.data()), Status::kOk);
+  while (store.Step() == Status::kBusy) {
+  }
+  EXPECT_EQ(store.slot(), 1 - kept);
+}
+
 TEST_F(Transaction, CommandRepeated_HasNoSecondEffect) {
   const Words words = MakeTable(1);
   const TableCommand open = Make(reg::kOpen, words);

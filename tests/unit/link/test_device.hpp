@@ -39,13 +39,13 @@ struct FakeApplication {
 
   link::TableApplication Functions() { return {this, &Check, &Permit, &Adopt}; }
 
-  static core::Status Check(void* self, const std::uint16_t* words) {
+  static core::Refusal Check(void* self, const std::uint16_t* words) {
     auto& a = *static_cast<FakeApplication*>(self);
     ++a.checks;
     a.built.clear();
-    if (a.refuse_check || words[5] == kBadPhysics) return core::Status::kUnphysical;
+    if (a.refuse_check || words[5] == kBadPhysics) return {core::Status::kUnphysical, 5, 1.0f, 0.0f};
     a.built.assign(words, words + kTableWords);
-    return core::Status::kOk;
+    return {};
   }
   static core::Status Permit(void* self) {
     auto& a = *static_cast<FakeApplication*>(self);
@@ -126,8 +126,8 @@ struct TestDevice {
   FakeApplication application;
   std::vector<std::uint16_t> staged = std::vector<std::uint16_t>(kTableWords);
   std::vector<std::uint16_t> active = std::vector<std::uint16_t>(kTableWords);
-  link::TableTransaction transaction{application.Functions(), store,         kSchema,
-                                     staged.data(),           active.data(), kTableWords};
+  link::TableTransaction transaction{application.Functions(), store,       kSchema, staged.data(),
+                                     active.data(),           kTableWords, {1, 0}};
   link::Identity identity{kSchema,  0x00010002, 77,   kAxes, 30,
                           kColumns, 15 + 64,    1000, 8,     {"armcal", "test_arm", "1.0"}};
   link::LiveStatus live;

@@ -114,6 +114,23 @@ TEST(SignalPath, CountsThatWrapAtTwoToThe31_GiveTheSameMotion) {
     }
 }
 
+// The sum over a window wraps. That is defined, and the sanitizers watch it; later windows are not touched.
+TEST(SignalPath, CountsThatJumpThroughTheirWholeRange_LeaveTheNextSamplesAsTheyAre) {
+  Path with(Plain()), without(Plain());
+  with.SetSettings(Table()), without.SetSettings(Table());
+  const Drive drive = Sines();
+  for (std::uint32_t tick = 0; tick < 400; ++tick) {
+    Raw raw = drive.At(tick);
+    const bool ready = without.PushTick(raw);
+    if (tick >= 100 && tick < 110)
+      raw.counts[0] ^= static_cast<std::int32_t>(tick % 2 == 0 ? 0x80000000u : 0x60000000u);
+    ASSERT_EQ(with.PushTick(raw), ready);
+    if (!ready || tick < 160) continue;
+    EXPECT_EQ(with.sample().q[0], without.sample().q[0]);
+    EXPECT_EQ(with.sample().qdd[0], without.sample().qdd[0]);
+  }
+}
+
 TEST(SignalPath, TickCounterThatWraps_IsNoGap) {
   Path path(Plain());
   const Drive drive = Sines();

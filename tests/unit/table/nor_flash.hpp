@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <random>
 #include <vector>
 
@@ -39,6 +40,9 @@ class NorFlash {
   // Planted faults.
   void FailOperation(int operation) { failing_ = operation; }   // answers kStorageFault, does nothing
   void SkipOperation(int operation) { skipping_ = operation; }  // answers kOk, does nothing
+  void Fade(std::uint32_t address, int bit) { cells_[address] ^= static_cast<std::uint8_t>(1 << bit); }
+  // From now on this bit reads as it likes, until it is erased or programmed.
+  void MakeUnstable(std::uint32_t address, int bit) { unstable_[address] = static_cast<std::uint8_t>(1 << bit); }
 
   std::vector<std::uint8_t>& cells() { return cells_; }
   int operations() const { return operations_; }
@@ -52,6 +56,8 @@ class NorFlash {
     auto& f = *static_cast<NorFlash*>(self);
     if (f.dead_ || address + count > f.cells_.size()) return core::Status::kStorageFault;
     for (std::uint32_t i = 0; i < count; ++i) bytes[i] = f.cells_[address + i];
+    for (const auto& [at, bit] : f.unstable_)
+      if (at >= address && at < address + count && f.random_() % 2 != 0) bytes[at - address] ^= bit;
     return core::Status::kOk;
   }
 
@@ -91,6 +97,7 @@ class NorFlash {
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::uint8_t old = cells_[base + i];
       if (cut && i > cut_.bytes) break;
+      unstable_.erase(base + i);
       const std::uint8_t wanted = new_value(i);
       const auto done = static_cast<std::uint8_t>(random_());
       cells_[base + i] = cut && i == cut_.bytes ? static_cast<std::uint8_t>((wanted & done) | (old & ~done)) : wanted;
@@ -105,6 +112,7 @@ class NorFlash {
   std::vector<int> erases_;
   std::vector<std::uint32_t> lengths_;
   std::mt19937 random_{7};
+  std::map<std::uint32_t, std::uint8_t> unstable_;
   Cut cut_{-1, 0};
   int failing_ = -1, skipping_ = -1;
   int operations_ = 0;

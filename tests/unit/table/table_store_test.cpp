@@ -205,4 +205,49 @@ TEST(Store, OnStorageThatIsTooSmallOrOdd_RefusesToSave) {
   }
 }
 
+TEST(Store, RefusedRecord_IsPassedOver_AndTheNextSaveTakesItsSlot) {
+  NorFlash flash(kNor);
+  Prepare(flash, 1);
+  Prepare(flash, 2);
+  TableStore store(flash.storage(), kSchema, kWords);
+  Words words(kWords);
+  ASSERT_EQ(store.Load(words.data()), Status::kOk);
+  ASSERT_EQ(words, Table(2));
+  const int refused = store.slot();
+  ASSERT_EQ(store.LoadOlder(words.data()), Status::kOk);
+  EXPECT_EQ(words, Table(1));
+  EXPECT_EQ(store.slot_state(refused), SlotState::kRefused);
+  EXPECT_EQ(store.fallbacks(), 1u);
+  ASSERT_EQ(SaveAll(store, Table(3)), Status::kOk);
+  EXPECT_EQ(store.slot(), refused);
+  EXPECT_EQ(Boot(flash), Table(3));
+}
+
+TEST(Store, WithoutAnOlderRecord_SaysSo) {
+  NorFlash flash(kNor);
+  Prepare(flash, 1);
+  TableStore store(flash.storage(), kSchema, kWords);
+  Words words(kWords);
+  ASSERT_EQ(store.Load(words.data()), Status::kOk);
+  EXPECT_EQ(store.LoadOlder(words.data()), Status::kBlank);
+  EXPECT_EQ(store.slot(), -1);
+  EXPECT_EQ(SaveAll(store, Table(2)), Status::kOk);
+  EXPECT_EQ(Boot(flash), Table(2));
+}
+
+TEST(Store, DamagedRecord_IsCountedAtPowerUp) {
+  NorFlash flash(kNor);
+  Prepare(flash, 1);
+  Prepare(flash, 2);
+  TableStore sound(flash.storage(), kSchema, kWords);
+  Words words(kWords);
+  ASSERT_EQ(sound.Load(words.data()), Status::kOk);
+  EXPECT_EQ(sound.fallbacks(), 0u);
+  flash.Fade(static_cast<std::uint32_t>(sound.slot()) * 512 + 40, 2);
+  TableStore store(flash.storage(), kSchema, kWords);
+  ASSERT_EQ(store.Load(words.data()), Status::kOk);
+  EXPECT_EQ(words, Table(1));
+  EXPECT_EQ(store.fallbacks(), 1u);
+}
+
 }  // namespace

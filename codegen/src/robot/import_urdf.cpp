@@ -1,0 +1,191 @@
+// robot - guesses what a URDF does not say, and writes it down as guessed.
+#include "codegen/src/robot/import_urdf.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "codegen/src/robot/urdf.hpp"
+
+namespace armcal::codegen {
+namespace {
+
+constexpr int kMostJoints = 7;
+constexpr double kDegPerRad = 180 / std::numbers::pi;
+constexpr double kGravity = 9.81;
+// Guesses. A joint reaches its speed limit in a quarter of a second; a reading of torque is good to half a per cent of
+// the limit; a two-hundredth of the speed limit is standstill.
+constexpr double kSpeedUp_s = 0.25, kNoiseShare = 0.005, kStandstillShare = 0.005;
+constexpr double kFastest_radps = 100, kFastest_mps = 20;  // a limit above stands for none
+constexpr double kTurn_deg = 180, kTravel_m = 0.5, kSpeed_degps = 90, kSpeed_mps = 0.5;
+constexpr double kStrength = 2, kLeastTorque_Nm = 1;  // times what gravity asks for at most
+
+std::string Short(double v) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", v);
+  std::string out = text;
+  if (out.find_first_of(".e") == std::string::npos) out += ".0";
+  return out;
+}
+
+std::string Allowed(const std::string& name) {
+  std::string out;
+  for (const char c : name) {
+    const char lower = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    out += std::isalnum(static_cast<unsigned char>(lower)) ? lower : '_';
+  }
+  return out.empty() ? "arm" : out;
+}
+
+std::string Escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
+  return "\"" + out + "\"";
+}
+
+// At most what gravity can ask of a joint: all that lies beyond it, on an arm that is stretched out.
+double GravityTorque(const UrdfChain& chain, std::size_t joint) {
+  const bool slide = chain.joint[joint].kinematics.type == JointType::kPrismatic;
+  double reach = 0, torque = 0;
+  for (std::size_t k = joint; k < chain.joint.size(); ++k) {
+    const Joint& j = chain.joint[k];
+    if (k > joint) reach += std::hypot(j.kinematics.a_m, j.kinematics.d_m);
+    if (k > joint && j.kinematics.type == JointType::kPrismatic && chain.unlimited[k].empty())
+      reach += std::max(std::abs(j.position_limit_rad[0]), std::abs(j.position_limit_rad[1]));
+    const auto& c = j.link.center_m;
+    torque += j.link.mass_kg * kGravity * (slide ? 1 : reach + std::hypot(c[0], c[1], c[2]));
+  }
+  return std::max(kLeastTorque_Nm, torque);
+}
+
+class Writer {
+ public:
+  Writer(const UrdfChain& chain, ImportedRobot& out) : chain_(chain), out_(out) {}
+
+  void Joint(std::size_t j) {
+    const codegen::Joint& joint = chain_.joint[j];
+    const bool slide = joint.kinematics.type == JointType::kPrismatic;
+    joint_ = joint.name;
+    out_.text += "\n[[joint]]\nname = " + Escaped(joint.name) + "  # " + (slide ? "prismatic" : "revolute") + "\n";
+    const double unit = slide ? 1 : kDegPerRad;
+    Position(j, slide);
+    double speed = joint.speed_limit_radps;
+    const bool told = speed > 0 && speed <= (slide ? kFastest_mps : kFastest_radps);
+    if (told) Comment(slide ? "speed_limit_mps" : "speed_limit_degps", Short(speed * unit));
+    else {
+      const std::string why =
+          speed > 0 ? "the URDF has " + Short(speed) + (slide ? " m/s" : " rad/s") : "the URDF has none";
+      speed = (slide ? kSpeed_mps : kSpeed_degps) / unit;
+      Key(slide ? "speed_limit_mps" : "speed_limit_degps", Short(speed * unit), why);
+    }
+    double torque = joint.torque_limit_Nm;
+    if (torque > 0) Comment(slide ? "torque_limit_N" : "torque_limit_Nm", Short(torque));
+    else {
+      torque = kStrength * GravityTorque(chain_, j);
+      Key(slide ? "torque_limit_N" : "torque_limit_Nm", Short(torque),
+          "the URDF has none: twice what gravity can ask of its bodies");
+    }
+    Key(slide ? "acceleration_limit_mps2" : "acceleration_limit_radps2", Short(speed / kSpeedUp_s),
+        "to the speed limit in 0.25 s");
+    Key(slide ? "torque_noise_N" : "torque_noise_Nm", Short(kNoiseShare * torque), "0.5 % of the torque limit");
+    Key(slide ? "v_min_mps" : "v_min_radps", Short(kStandstillShare * speed), "0.5 % of the speed limit");
+    const char* const friction = slide ? "coulomb_N, viscous_Nspm" : "coulomb_Nm, viscous_Nmsprad";
+    out_.text += std::string("# ") + friction + ", motor: not stated, so friction and rotor inertia have wide priors\n";
+  }
+
+ private:
+  void Comment(const std::string& key, const std::string& value) {
+    out_.text += "# " + key + " = " + value + " in the URDF\n";
+  }
+  void Key(const std::string& key, const std::string& value, const std::string& why) {
+    out_.text += key + " = " + value + "  # guessed: " + why + "\n";
+    out_.guessed.push_back({joint_, key, value, why});
+  }
+  void Position(std::size_t j, bool slide) {
+    const auto& found = chain_.joint[j].position_limit_rad;
+    const std::string key = slide ? "position_limit_m" : "position_limit_deg";
+    const double unit = slide ? 1 : kDegPerRad;
+    if (chain_.unlimited[j].empty()) {
+      Comment(key, "[" + Short(found[0] * unit) + ", " + Short(found[1] * unit) + "]");
+      return;
+    }
+    const double half = slide ? kTravel_m : kTurn_deg;
+    Key(key, "[" + Short(-half) + ", " + Short(half) + "]", chain_.unlimited[j]);
+  }
+
+  const UrdfChain& chain_;
+  ImportedRobot& out_;
+  std::string joint_;
+};
+
+// Without bodies if those of the URDF are no prior; says why.
+UrdfChain ReadWhatCanBeUsed(const UrdfChoice& choice, bool& bodies, std::vector<std::string>& said) {
+  UrdfChain chain;
+  io::Faults faults;
+  bodies = faults.Try([&] { chain = ReadUrdf(choice); });
+  if (!bodies) chain = ReadUrdf(choice, UrdfBodies::kIgnored);  // throws what has nothing to do with bodies
+  for (const std::string& line : faults.lines()) said.push_back(line);
+  if (!bodies) return chain;
+  for (const Joint& joint : chain.joint) {
+    const Link& link = joint.link;
+    const std::string missing = Impossible({link.mass_kg, Eigen::Vector3d::Zero(), Symmetric(link.inertia_kgm2)});
+    if (missing.empty()) continue;
+    bodies = false;
+    said.push_back("joint \"" + joint.name + "\": the body that it moves lacks " + missing);
+  }
+  if (chain.same_inertia.empty()) return chain;
+  bodies = false;
+  std::string names;
+  for (const std::string& name : chain.same_inertia) names += (names.empty() ? "" : ", ") + name;
+  said.push_back("links " + names + " have the same inertia, which nobody can have computed");
+  return chain;
+}
+
+}  // namespace
+
+ImportedRobot ImportUrdf(const UrdfChoice& asked, const std::string& name, const std::filesystem::path& file) {
+  ImportedRobot out;
+  out.choice = ChooseChain(asked, out.said);
+  bool bodies = true;
+  const UrdfChain chain = ReadWhatCanBeUsed(out.choice, bodies, out.said);
+  if (chain.joint.size() > kMostJoints)
+    throw io::InputError(asked.path.string() + ": " + std::to_string(chain.joint.size()) +
+                         " movable joints, expected at most 7; name an end nearer to the base with --tip, or hold a "
+                         "joint with --fixed");
+  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  const std::string urdf = std::filesystem::absolute(asked.path).lexically_proximate(folder).string();
+  out.text = "# Made by armcal import. What is marked as guessed is not in the URDF: state it where you know it.\n";
+  out.text += "name = \"" + Allowed(name) + "\"\nsource = " +
+              Escaped("kinematics, bodies, limits: " + asked.path.filename().string() + "; guessed: marked below") +
+              "\nurdf = " + Escaped(urdf) + "\n";
+  if (!out.choice.tip.empty()) out.text += "tip = " + Escaped(out.choice.tip) + "  # the arm ends at this link\n";
+  if (!out.choice.fixed.empty()) {
+    std::string list;
+    for (const auto& [joint, position] : out.choice.fixed)
+      list += (list.empty() ? "" : ", ") + Escaped(joint) + " = " + Short(position);
+    out.text += "fixed = { " + list + " }  # joints that are held, rad or m: parts of the body that carries them\n";
+  }
+  out.text +=
+      "gravity_mps2 = [0.0, 0.0, -9.81]  # guessed: the URDF's z axis points up\n"
+      "tick_rate_Hz = 1000  # guessed: of the controller\nsample_ticks = 8\n";
+  out.guessed.push_back({"", "gravity_mps2", "[0.0, 0.0, -9.81]", "the URDF's z axis points up"});
+  out.guessed.push_back({"", "tick_rate_Hz", "1000", "of the controller; a log has its own rate"});
+  if (bodies) {
+    out.text +=
+        "\n[prior]\nlink_relative_sd = 0.2  # guessed: how far the URDF's masses, centres and inertias may be off\n";
+    out.guessed.push_back({"", "prior.link_relative_sd", "0.2", "how far the URDF's bodies may be off"});
+  } else {
+    out.text += "prior = \"none\"  # the URDF's bodies cannot be used: see what armcal import said\n";
+    out.guessed.push_back({"", "prior", "\"none\"", "the URDF's bodies cannot be used"});
+  }
+  Writer writer(chain, out);
+  for (std::size_t j = 0; j < chain.joint.size(); ++j) {
+    out.joints.push_back(chain.joint[j].name);
+    writer.Joint(j);
+  }
+  return out;
+}
+
+}  // namespace armcal::codegen

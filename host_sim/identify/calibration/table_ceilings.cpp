@@ -1,0 +1,134 @@
+// calibration - the firmware's check of a table, run on the PC against the model of the robot file.
+#include "host_sim/identify/calibration/table_ceilings.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "armcal/model/friction_grid.hpp"
+#include "codegen/src/generator/ceilings.hpp"
+
+namespace armcal::calibration {
+namespace {
+
+using codegen::Ceilings;
+
+// The ceilings as the firmware has them.
+struct Compiled {
+  explicit Compiled(const Ceilings& c) {
+    const auto f = [](double v) { return static_cast<float>(v); };
+    table = {static_cast<std::uint32_t>(c.least_fade_ms), static_cast<std::uint32_t>(c.longest_fade_ms),
+             f(c.least_forgetting), f(c.coldest_degC), f(c.warmest_degC)};
+    for (const Ceilings::OfJoint& j : c.joint)
+      joint.push_back({f(j.torque_Nm), f(j.friction_Nm), f(j.feed_Nm), f(j.scale_low), f(j.scale_high),
+                       f(j.sigma_low_Nm), f(j.sigma_high_Nm), f(j.v_min_low_radps), f(j.v_min_high_radps),
+                       f(j.speed_radps), f(j.position_low_rad), f(j.position_high_rad)});
+    for (const Ceilings::OfParameter& p : c.parameter)
+      parameter.push_back({f(p.low), f(p.high), f(p.sd), f(p.process_noise)});
+  }
+  model::CeilingView View() const {
+    return {static_cast<int>(joint.size()), static_cast<int>(parameter.size()), &table, joint.data(), parameter.data()};
+  }
+  model::TableCeiling table{};
+  std::vector<model::JointCeiling> joint;
+  std::vector<model::ParameterCeiling> parameter;
+};
+
+std::string Named(const TableFile& t, const core::Refusal& r) {
+  const std::string name = WordName(t, r.word);
+  switch (r.status) {
+    case core::Status::kNotFinite:
+      return fmt::format("{} is not finite", name);
+    case core::Status::kFeedsEnergy:
+      return fmt::format(
+          "{}: the joint's friction would push by {:.6g} N m (N) where it has to brake, expected at most {:.6g}", name,
+          -r.value, -r.bound);
+    default:
+      return fmt::format("{} is {:.9g}, expected {} {:.9g}", name, r.value, r.value > r.bound ? "at most" : "at least",
+                         r.bound);
+  }
+}
+
+// Friction on the grid, where the firmware looks.
+core::Refusal JudgeGrid(const codegen::Model& m, const Ceilings& c, const model::CeilingView& view,
+                        const TableFile& t) {
+  const auto amplitude = [](const TableRow& row) { return row.state == "standby" ? 0.0 : row.mean; };
+  const bool history = (c.friction_reads & model::kReadsHistory) != 0;
+  const int n = m.joints(), points = model::GridPoints(c.friction_reads), each = history ? 2 : 1;
+  codegen::Signals s;
+  s.q = s.qd = s.temp = Eigen::MatrixXd(points * each, n);
+  s.qdd = Eigen::MatrixXd::Zero(points * each, n);
+  s.t = Eigen::VectorXd::LinSpaced(points * each, 0, double{model::kGridStep_s} * (points * each - 1));
+  for (int p = 0; p < points; ++p) {
+    Eigen::VectorXd q(n), qd(n), temp(n);
+    model::GridState(view, c.friction_reads, p, q.data(), qd.data(), temp.data());
+    for (int k = 0; k < each; ++k) {
+      const int row = p * each + k;
+      s.q.row(row) = q - (k + 1 < each ? double{model::kGridStep_s} : 0.0) * qd;
+      s.qd.row(row) = qd;
+      s.temp.row(row) = temp;
+    }
+  }
+  Eigen::VectorXd bodies(m.body_parameters());
+  for (int k = 0; k < bodies.size(); ++k) bodies[k] = amplitude(t.row[k]);
+  const Eigen::VectorXd base = m.base_map() * bodies;
+  std::vector<double> committed(m.columns()), eta;
+  for (int k = 0; k < m.columns(); ++k)
+    committed[k] = m.is_rigid(k) ? base[k - m.front()] : amplitude(t.row[m.table_index(k)]);
+  for (int k = m.parameters() - m.nonlinear(); k < m.parameters(); ++k) eta.push_back(t.row[k].mean);
+  std::vector<Eigen::MatrixXd> rows;
+  m.Regressor(s, committed, eta, rows);
+  for (int p = 0; p < points; ++p)
+    for (int i = 0; i < n; ++i) {
+      const int row = p * each + each - 1;
+      double sum = 0, greatest = -1;
+      int column = m.front_begin(i);
+      for (int k = m.front_begin(i); k < m.front_begin(i + 1); ++k) {
+        if (!c.friction[k] || committed[k] == 0) continue;
+        const double part = committed[k] * rows[i](row, k);
+        sum += part;
+        if (std::abs(part) > greatest) greatest = std::abs(part), column = k;
+      }
+      const auto braking = static_cast<float>(s.qd(row, i) < 0 ? -sum : sum);
+      const core::Status judged = model::JudgeFriction(view.joint[i], braking);
+      if (core::IsOk(judged)) continue;
+      const model::JointCeiling& ceiling = view.joint[i];
+      return {judged, model::WordOfParameter(n, m.table_index(column)), braking,
+              judged == core::Status::kFeedsEnergy ? -ceiling.feed_Nm : ceiling.friction_Nm};
+    }
+  return {};
+}
+
+}  // namespace
+
+std::string WordName(const TableFile& t, int word) {
+  const int joints = static_cast<int>(t.joint.size()), parameters = static_cast<int>(t.row.size());
+  if (word >= model::WordOfParameter(joints, parameters)) return fmt::format("word {}", word);
+  if (word >= model::WordOfParameter(joints, 0)) {
+    const int k = word - model::WordOfParameter(joints, 0);
+    const char* const part[] = {"mean", "mean", "sd", "sd", "process_noise", "process_noise", "state and group", "end"};
+    return fmt::format("{}: {}", t.row[k / model::kParameterWords].name, part[k % model::kParameterWords]);
+  }
+  if (word >= model::WordOfJoint(0)) {
+    const int k = word - model::WordOfJoint(0);
+    const char* const part[] = {"sigma_Nm", "v_min_radps", "torque_limit_Nm", "torque_scale"};
+    return fmt::format("joint {}: {}", k / model::kJointWords + 1, part[k % model::kJointWords / 2]);
+  }
+  return word == 5 ? "flags (bumpless)" : word < 8 ? "blend_ms" : fmt::format("forgetting of group {}", (word - 8) / 2);
+}
+
+std::string BeyondCeiling(const codegen::Model& m, const TableFile& t) {
+  const Ceilings ceilings = codegen::MakeCeilings(m);
+  const Compiled compiled(ceilings);
+  const std::vector<std::uint16_t> words = EncodeTable(t);
+  // Only the board knows whether it allows a bumpless table, so the drive is left to say it.
+  const core::Refusal refusal = model::CheckWords(compiled.View(), true, words.data());
+  if (!core::IsOk(refusal.status)) return Named(t, refusal);
+  const core::Refusal friction = JudgeGrid(m, ceilings, compiled.View(), t);
+  if (friction.status == core::Status::kBeyondCeiling)
+    return fmt::format("{}: the joint's friction would reach {:.6g} N m (N), expected at most {:.6g}",
+                       WordName(t, friction.word), friction.value, friction.bound);
+  return core::IsOk(friction.status) ? "" : Named(t, friction);
+}
+
+}  // namespace armcal::calibration

@@ -1,0 +1,62 @@
+// tool - armcal export: writes an identified arm for other programs, and says what their format cannot hold.
+#include <fmt/core.h>
+
+#include "host_sim/identify/description/described_arm.hpp"
+#include "host_sim/tool/given.hpp"
+
+namespace armcal::tool {
+namespace {
+
+struct ExportOptions {
+  GivenOptions given;
+  std::string format, urdf, out, json;
+  bool merge = false;
+};
+
+description::Description Write(const ExportOptions& o, const description::DescribedArm& arm) {
+  if (o.format == "urdf") return description::ToUrdf(arm, o.urdf, o.merge);
+  if (o.merge || !o.urdf.empty())
+    throw io::InputError("--urdf, --merge: expected --format urdf beside them, not " + o.format);
+  if (o.format == "sdf") return description::ToSdf(arm);
+  if (o.format == "mjcf") return description::ToMjcf(arm);
+  if (o.format == "yaml") return description::ToYaml(arm);
+  if (o.format == "c") return description::ToHeader(arm);
+  throw io::InputError("--format " + o.format + ": expected urdf, sdf, mjcf, yaml or c");
+}
+
+int Run(const ExportOptions& o) {
+  const codegen::Model model = GivenModel(o.given);
+  const std::string robot = o.given.model.empty() ? o.given.robot : o.given.model;
+  const std::string source = o.given.table.empty() ? robot : o.given.table;
+  const description::DescribedArm arm = description::Describe(model, ReadGiven(o.given, model), source);
+  const description::Description d = Write(o, arm);
+  files::WriteWholeFile(o.out, d.text);
+  if (o.given.table.empty())
+    fmt::print("values: those that {} states; --table takes what armcal identify found\n", robot);
+  fmt::print("written: {} ({}, {} joints, schema {:08X})\n", o.out, o.format, arm.joint.size(), arm.schema);
+  if (!d.left_out.empty()) fmt::print("{} cannot hold, and does not have:\n", o.format);
+  for (const std::string& line : d.left_out) fmt::print("  {}\n", line);
+  nlohmann::ordered_json json = ToJson(o.given, model);
+  json["format"] = o.format, json["file"] = o.out, json["schema"] = arm.schema, json["left_out"] = d.left_out;
+  WriteJson(o.json, json);
+  return kOk;
+}
+
+}  // namespace
+
+void AddExport(CLI::App& app, Action& action) {
+  auto* verb = app.add_subcommand(
+      "export",
+      "write bodies and friction for other programs\nexample: armcal export --robot my_arm.toml --table new.toml "
+      "--format urdf -o my_arm_identified.urdf");
+  auto o = std::make_shared<ExportOptions>();
+  AddGivenOptions(*verb, o->given);
+  verb->add_option("--format", o->format, "urdf, sdf, mjcf, yaml or c")->required();
+  verb->add_option("--urdf", o->urdf, "the URDF to write into (default: the one that the robot file names)");
+  verb->add_flag("--merge", o->merge, "urdf: a moving link gets the whole body, the links fixed to it get none");
+  verb->add_option("-o,--out", o->out, "file to write")->required();
+  verb->add_option("--json", o->json, "write what was written, and what was left out, here");
+  verb->callback([o, &action] { action = [o] { return Run(*o); }; });
+}
+
+}  // namespace armcal::tool

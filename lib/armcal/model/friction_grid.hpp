@@ -1,0 +1,101 @@
+// model - whether the friction of a table brakes: its torque at a grid of speeds, temperatures and loads.
+//
+// A joint's friction may be a sum of many columns, and a single coefficient may be negative: friction that rises less
+// than in proportion to speed, that falls with temperature, or that differs between the directions. What counts is the
+// sum. It feeds energy where its torque times the speed is negative.
+#pragma once
+
+#include <cstdint>
+
+#include "armcal/core/status.hpp"
+#include "armcal/math/elementary.hpp"
+#include "armcal/model/ceilings.hpp"
+#include "armcal/model/evaluate.hpp"
+
+namespace armcal::model {
+
+// Bits of a model's kFrictionReads: what its friction columns depend on besides the joint's own speed.
+inline constexpr unsigned kReadsPose = 1, kReadsTemperature = 2, kReadsHistory = 4;
+
+// The grid. Speeds are shares of the joint's limit, poses shares of its range. All joints move at once, because a
+// friction column belongs to one joint. Poses vary the load.
+inline constexpr float kGridSpeed[] = {0.003f, 0.01f, 0.03f, 0.1f, 0.2f, 0.4f, 0.7f, 1.0f};
+inline constexpr float kGridPose[] = {0.5f, 0.12f, 0.88f, 0.31f};
+inline constexpr float kGridTemperature[] = {0.5f, 0.0f, 1.0f};  // shares of the range
+inline constexpr int kGridSpeeds = 8, kGridPoses = 4, kGridTemperatures = 3;
+// Friction with memory gets this time at each speed, so that it slides.
+inline constexpr float kGridStep_s = 10.0f;
+
+constexpr int GridPoints(unsigned reads) {
+  return 2 * kGridSpeeds * ((reads & kReadsPose) != 0 ? kGridPoses : 1) *
+         ((reads & kReadsTemperature) != 0 ? kGridTemperatures : 1);
+}
+
+// Where the joints are at one point. Shapes: q, qd, temp [joints].
+template <class T>
+void GridState(const CeilingView& ceilings, unsigned reads, int point, T* q, T* qd, T* temp) {
+  const bool backward = point % 2 != 0;
+  point /= 2;
+  const int speed = point % kGridSpeeds;
+  point /= kGridSpeeds;
+  const int pose = (reads & kReadsPose) != 0 ? point % kGridPoses : 0;
+  if ((reads & kReadsPose) != 0) point /= kGridPoses;
+  const TableCeiling& t = *ceilings.table;
+  const float degC = t.coldest_degC + kGridTemperature[point] * (t.warmest_degC - t.coldest_degC);
+  for (int i = 0; i < ceilings.joints; ++i) {
+    const JointCeiling& c = ceilings.joint[i];
+    const float share = kGridPose[(pose * (i + 1)) % kGridPoses];
+    q[i] = static_cast<T>(c.position_low_rad + share * (c.position_high_rad - c.position_low_rad));
+    const float size = kGridSpeed[speed] * c.speed_radps;
+    qd[i] = static_cast<T>(backward ? -size : size);
+    temp[i] = static_cast<T>(degC);
+  }
+}
+
+// Judges one joint's friction at one point. braking_Nm: the torque, positive if it is against the motion.
+inline core::Status JudgeFriction(const JointCeiling& c, float braking_Nm) {
+  if (!math::IsFinite(braking_Nm)) return core::Status::kNotFinite;
+  if (braking_Nm < -c.feed_Nm) return core::Status::kFeedsEnergy;
+  return braking_Nm > c.friction_Nm ? core::Status::kBeyondCeiling : core::Status::kOk;
+}
+
+// Judges the friction of parameters that BuildAdoptedTable has accepted. kFeedsEnergy; kBeyondCeiling (a joint's
+// friction is higher than the hardest); kNotFinite. The refusal's word is that of the joint's friction column with the
+// greatest part in it. It evaluates the regressor GridPoints(Model::kFrictionReads) times, twice as often if friction
+// has memory. `memory` and `rows`: work space; `rows` has been zero and belongs to this model. Context: background.
+template <class Model>
+core::Refusal CheckFriction(const Committed<Model>& committed, const CeilingView& ceilings, Memory<Model>& memory,
+                            Rows<Model>& rows) {
+  constexpr int n = Model::kJoints;
+  ModelInput<float, n> x = {};
+  x.dt = kGridStep_s;
+  memory.running = false;
+  for (int point = 0; point < GridPoints(Model::kFrictionReads); ++point) {
+    GridState(ceilings, Model::kFrictionReads, point, x.q, x.qd, x.temp);
+    if constexpr ((Model::kFrictionReads & kReadsHistory) != 0) {
+      for (int i = 0; i < n; ++i) x.q[i] -= kGridStep_s * x.qd[i];
+      EvaluateRows(committed, x, memory, rows);
+      for (int i = 0; i < n; ++i) x.q[i] += kGridStep_s * x.qd[i];
+    }
+    EvaluateRows(committed, x, memory, rows);
+    for (int i = 0; i < n; ++i) {
+      float sum = 0.0f, greatest = -1.0f;
+      int column = Model::kFrontBegin[i];
+      for (int c = Model::kFrontBegin[i]; c < Model::kFrontBegin[i + 1]; ++c) {
+        const bool counts = Model::kFriction[c] && committed.p[c] != 0.0f;
+        const float part = math::Masked(committed.p[c] * rows.front[c], math::MaskOf(counts));
+        sum += part;
+        if (math::Abs(part) > greatest) greatest = math::Abs(part), column = c;
+      }
+      const float braking_Nm = x.qd[i] < 0.0f ? -sum : sum;
+      const core::Status judged = JudgeFriction(ceilings.joint[i], braking_Nm);
+      if (core::IsOk(judged)) continue;
+      const JointCeiling& c = ceilings.joint[i];
+      return {judged, WordOfParameter(n, Model::kBodyParameters + column), braking_Nm,
+              judged == core::Status::kFeedsEnergy ? -c.feed_Nm : c.friction_Nm};
+    }
+  }
+  return {};
+}
+
+}  // namespace armcal::model

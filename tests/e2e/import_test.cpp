@@ -1,0 +1,204 @@
+// end-to-end tests - a URDF as it comes: import, generate, excite, identify, diagnose, with no editing between.
+#include <sstream>
+
+#include "tests/e2e/urdf_arm.hpp"
+
+namespace armcal::tests {
+namespace {
+
+struct ImportedArm {
+  std::string urdf;  // declared
+  std::string truth;
+  std::vector<std::string> moving;
+  std::vector<UrdfJoint> joints;
+  std::vector<TrueDrive> drive;
+  std::map<std::string, double> held;
+};
+
+std::string Robot(const std::string& inside) { return "<robot name=\"own arm\">\n" + inside + "</robot>\n"; }
+
+// scale: of the masses of the true arm.
+std::string Serial(const std::vector<UrdfJoint>& joints, const std::vector<std::string>& names, double scale) {
+  std::string text = LinkText("base", 0, "", "");
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    text += LinkText(joints[j].child, joints[j].mass * scale, joints[j].center, joints[j].inertia) +
+            JointText(names[j], joints[j], "<dynamics damping=\"0.003\"/>");
+  return text;
+}
+
+ImportedArm Scara() {
+  ImportedArm arm;
+  arm.moving = {"turn_1", "turn_2", "quill", "tool"};
+  arm.joints = {{"revolute", "base", "s1", "xyz=\"0 0 0.4\"", "0 0 1", -2.2, 2.2, 60, 6, 6, "0.15 0.01 0.02",
+                 "0.03 0 0.001 0.09 0 0.1"},
+                {"revolute", "s1", "s2", "xyz=\"0.325 0 0\"", "0 0 1", -2.5, 2.5, 30, 8, 4, "0.12 -0.01 0.03",
+                 "0.02 0 0.001 0.05 0 0.06"},
+                {"prismatic", "s2", "s3", "xyz=\"0.275 0 0\"", "0 0 -1", 0, 0.18, 200, 1, 1.2, "0.002 0.001 0.1",
+                 "0.006 0 0 0.006 0 0.001"},
+                {"revolute", "s3", "s4", "xyz=\"0 0 0.1\"", "0 0 -1", -6, 6, 5, 20, 0.6, "0.02 0.01 0.02",
+                 "0.001 0 0 0.0012 0 0.0008"}};
+  arm.drive = {{1.5, 0.8, 0.3, 0.15}, {0.8, 0.4, 0.15, 0.08}, {8, 20, 3, 0.6}, {0.1, 0.01, 0.002, 0.02}};
+  arm.urdf = Robot(Serial(arm.joints, arm.moving, 1)), arm.truth = Robot(Serial(arm.joints, arm.moving, 1.1));
+  return arm;
+}
+
+ImportedArm Gantry() {
+  ImportedArm arm;
+  arm.moving = {"along", "across", "down", "turn"};
+  arm.joints = {
+      {"prismatic", "base", "g1", "xyz=\"0 0 2\"", "1 0 0", 0, 4, 900, 1.5, 60, "0 0.6 0", "9 0 0 4 0 8"},
+      {"prismatic", "g1", "g2", "xyz=\"0 0 0\"", "0 1 0", 0, 1.2, 500, 1.2, 22, "0 0 0.1", "0.8 0 0 0.9 0 0.5"},
+      {"prismatic", "g2", "g3", "xyz=\"0 0 0\"", "0 0 -1", 0, 0.8, 400, 0.8, 9, "0 0 -0.2", "0.3 0 0 0.32 0 0.05"},
+      {"revolute", "g3", "g4", "xyz=\"0 0 0.3\"", "0 1 0", -2, 2, 20, 3, 2, "0.08 0.01 0.03",
+       "0.01 0 0 0.015 0 0.012"}};
+  arm.drive = {{30, 40, 10, 3}, {15, 25, 5, 2}, {9, 20, 2, 1}, {0.5, 0.3, 0.05, 0.05}};
+  arm.urdf = Robot(Serial(arm.joints, arm.moving, 1)), arm.truth = Robot(Serial(arm.joints, arm.moving, 0.92));
+  return arm;
+}
+
+// Five axes, a hand with two fingers of which one mimics the other, and a camera on a joint of its own.
+ImportedArm WithGripper() {
+  ImportedArm arm;
+  arm.joints = SevenJoints();
+  arm.joints.resize(5);
+  for (int j = 1; j <= 5; ++j) arm.moving.push_back("joint" + std::to_string(j));
+  arm.drive = {
+      {1.2, 2.0, 0.6, 0.2}, {1.0, 1.8, 0.6, 0.2}, {0.8, 1.5, 0.5, 0.2}, {0.7, 1.2, 0.5, 0.2}, {0.4, 0.5, 0.2, 0.1}};
+  const std::string box = "0.001 0 0 0.0012 0 0.0009", zero = "0 0 0";
+  const UrdfJoint hand{"fixed", "a5", "hand", "xyz=\"0 0 0.1\" rpy=\"0 0 0.7854\"", "0 0 1", 0, 0, 0, 0, 0, "", ""};
+  const UrdfJoint left{"prismatic", "hand", "left", "xyz=\"0 0 0.06\"", "0 1 0", 0.01, 0.04, 20, 0.2, 0, "", ""};
+  const UrdfJoint right{"prismatic", "hand", "right", "xyz=\"0 0 0.06\"", "0 -1 0", 0.01, 0.04, 20, 0.2, 0, "", ""};
+  const UrdfJoint pan{"revolute", "a2", "camera", "xyz=\"0 -0.2 0.1\"", "0 1 0", -1, 1, 2, 2, 0, "", ""};
+  const std::string more =
+      LinkText("hand", 0.7, "0 0 0.04", box) + LinkText("left", 0.1, "0.01 0 0.02", "0.0001 0 0 0.0001 0 0.00012") +
+      LinkText("right", 0.1, "-0.01 0 0.02", "0.0001 0 0 0.00011 0 0.0001") +
+      LinkText("camera", 0.3, "0.02 0 0", "0.0003 0 0 0.0003 0 0.0004") + JointText("to_hand", hand, "") +
+      JointText("finger_left", left, "") + JointText("finger_right", right, "<mimic joint=\"finger_left\"/>") +
+      JointText("camera_pan", pan, "");
+  arm.urdf = Robot(Serial(arm.joints, arm.moving, 1) + more),
+  arm.truth = Robot(Serial(arm.joints, arm.moving, 1.1) + more);
+  arm.held = {{"finger_left", 0.01}, {"finger_right", 0.01}, {"camera_pan", 0}};
+  return arm;
+}
+
+class Import : public testing::Test {
+ protected:
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+
+  void Through(const std::string& name, const ImportedArm& arm, int expected_joints) {
+    folder_ = FreshFolder("import_" + name);
+    std::ofstream(Path("arm.urdf")) << arm.urdf;
+    Outcome o = Tool({"import", Path("arm.urdf"), "-o", Path(name + ".toml"), "--json", Path("import.json")});
+    ASSERT_EQ(o.code, 0) << o.err << o.out;
+    EXPECT_EQ(ReadJson(Path("import.json")).at("joints").size(), static_cast<std::size_t>(expected_joints)) << o.out;
+    const std::string robot = Path(name + ".toml");
+    o = Tool({"generate", "--robot", robot, "--out", Path("generated")});
+    ASSERT_EQ(o.code, 0) << o.err << o.out;
+    o = Tool({"excite", "--robot", robot, "--seconds", "2", "--no-slow", "--out", Path("motion.csv")});
+    ASSERT_EQ(o.code, 0) << o.err << o.out;
+    const UrdfArm truth(arm.truth, arm.moving, arm.joints, arm.drive, arm.held);
+    logs::WriteLog(Path("train.csv"), truth.Run(40, 125, 13));
+    logs::WriteLog(Path("test.csv"), truth.Run(20, 125, 14));
+    o = Tool({"identify", "--robot", robot, "--train", Path("train.csv"), "--test", Path("test.csv"), "--json",
+              Path("fit.json")});
+    ASSERT_EQ(o.code, 0) << o.err << o.out;
+    const nlohmann::json fit = ReadJson(Path("fit.json"));
+    for (std::size_t j = 0; j < arm.joints.size(); ++j)
+      EXPECT_LE(fit["held_out"]["rms_moving"][j].get<double>(), 1.05 * arm.drive[j].noise_Nm) << "joint " << j + 1;
+    for (const auto& row : fit.at("columns"))
+      for (std::size_t j = 0; j < arm.joints.size(); ++j)
+        if (row.at("name") == "Fv" + std::to_string(j + 1)) {
+          EXPECT_NEAR(row.at("value").get<double>(), arm.drive[j].viscous_Nmsprad, 0.03 * arm.drive[j].viscous_Nmsprad);
+        }
+    o = Tool({"diagnose", "--robot", robot, "--train", Path("train.csv"), "--test", Path("test.csv"), "--json",
+              Path("verdict.json")});
+    ASSERT_EQ(o.code, 0) << o.err << o.out;
+    EXPECT_EQ(ReadJson(Path("verdict.json")).at("verdict"), "none") << o.out;
+  }
+  Outcome Try(const std::string& urdf, std::vector<std::string> options = {}) {
+    folder_ = FreshFolder("import_try");
+    std::ofstream(Path("arm.urdf")) << urdf;
+    options.insert(options.begin(), {"import", Path("arm.urdf"), "-o", Path("arm.toml"), "--json", Path("out.json")});
+    return Tool(options);
+  }
+  fs::path folder_;
+};
+
+TEST_F(Import, OfAScara_GoesStraightThrough) { Through("scara", Scara(), 4); }
+
+TEST_F(Import, OfAGantry_GoesStraightThrough) { Through("gantry", Gantry(), 4); }
+
+TEST_F(Import, OfAnArmWithAMimicGripperAndABranch_HoldsThem) {
+  Through("gripper", WithGripper(), 5);
+  const nlohmann::json said = ReadJson(Path("import.json"));
+  EXPECT_EQ(said.at("tip"), "a5");
+  EXPECT_NEAR(said.at("fixed").at("finger_left").get<double>(), 0.01, 1e-12);  // the limit nearest to zero
+  EXPECT_EQ(said.at("fixed").at("camera_pan"), 0.0);
+}
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  EXPECT_NE(at, text.npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST_F(Import, WhereTwoChainsAreEquallyLong_AsksForATip) {
+  const UrdfJoint other{"revolute", "s1", "twin", "xyz=\"0 0.3 0\"", "0 0 1", -1, 1, 20, 3, 0, "", ""};
+  UrdfJoint again = other;
+  again.parent = "twin", again.child = "twin_2";
+  UrdfJoint end = again;
+  end.parent = "twin_2", end.child = "twin_3";
+  const std::string urdf =
+      Replaced(Scara().urdf, "</robot>",
+               LinkText("twin", 1, "0 0 0.1", "0.01 0 0 0.01 0 0.01") +
+                   LinkText("twin_2", 1.1, "0 0 0.1", "0.01 0 0 0.01 0 0.01") +
+                   LinkText("twin_3", 1.2, "0 0 0.1", "0.01 0 0 0.01 0 0.01") + JointText("t1", other, "") +
+                   JointText("t2", again, "") + JointText("t3", end, "") + "</robot>");
+  ExpectOneLine(Try(urdf), 2, "--tip with one of \"s4\", \"twin_3\"");
+  const Outcome o = Try(urdf, {"--tip", "twin_3", "--fixed", "quill=0.05"});
+  ASSERT_EQ(o.code, 0) << o.err;
+  const nlohmann::json json = ReadJson(Path("out.json"));
+  EXPECT_EQ(json.at("joints"), nlohmann::json({"turn_1", "t1", "t2", "t3"}));
+  EXPECT_EQ(json.at("fixed").at("quill"), 0.05);
+}
+
+// What cannot be used is said, and the file is written so that it can be.
+TEST_F(Import, OfBadBodiesAndMissingLimits_SaysSoAndGoesOn) {
+  std::string urdf = Replaced(Scara().urdf, "lower=\"-2.2\" upper=\"2.2\" effort=\"60\" velocity=\"6\"",
+                              "effort=\"0\" velocity=\"0\"");
+  urdf = Replaced(urdf, "<inertia ixx=\"0.02\"", "<inertia ixx=\"0.2\"");
+  const Outcome o = Try(urdf);
+  ASSERT_EQ(o.code, 0) << o.err;
+  const nlohmann::json json = ReadJson(Path("out.json"));
+  EXPECT_FALSE(json.at("prior").get<bool>());
+  EXPECT_NE(o.out.find("link \"s2\": expected principal moments of inertia"), o.out.npos) << o.out;
+  int guessed = 0;
+  for (const auto& g : json.at("guessed"))
+    for (const char* key : {"position_limit_deg", "speed_limit_degps", "torque_limit_Nm"})
+      guessed += g.at("key") == key && g.at("joint") == "turn_1";
+  EXPECT_EQ(guessed, 3);
+  const std::string file = ReadText(Path("arm.toml"));
+  for (const auto& g : json.at("guessed"))
+    EXPECT_NE(file.find(g.at("key").get<std::string>().substr(g.at("key").get<std::string>().rfind('.') + 1) + " = " +
+                        g.at("value").get<std::string>()),
+              file.npos)
+        << g;
+  EXPECT_EQ(Tool({"generate", "--robot", Path("arm.toml"), "--out", Path("generated")}).code, 0);
+  ExpectOneLine(Tool({"import", Path("arm.urdf"), "-o", Path("arm.toml")}), 2, "--overwrite");
+}
+
+TEST_F(Import, OfWhatIsNoArm_SaysEveryFaultOnce) {
+  ExpectOneLine(Try("<robot"), 2, "expected a URDF robot");
+  ExpectOneLine(Try(Scara().urdf, {"--tip", "s5"}), 2,
+                "link \"s5\": expected a link of the URDF as the tip; the nearest is");
+  ExpectOneLine(Try(Scara().urdf, {"--fixed", "quil"}), 2,
+                "joint \"quil\": expected a joint of the URDF to hold; the nearest is quill");
+  ExpectOneLine(Try(Scara().urdf, {"--fixed", "quill=low"}), 2, "expected JOINT or JOINT=POSITION");
+  const Outcome o = Try(
+      Replaced(Replaced(Scara().urdf, "xyz=\"0 0 0.4\"", "xyz=\"0 0 400\""), "xyz=\"0.325 0 0\"", "xyz=\"325 0 0\""));
+  EXPECT_EQ(o.code, 2);
+  EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 2) << o.err;
+}
+
+}  // namespace
+}  // namespace armcal::tests

@@ -1,0 +1,367 @@
+// description tests - exported files against KDL: the torque of what is read from them is that of the identified
+// bodies.
+#include <gtest/gtest.h>
+#include <tinyxml2.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <kdl/tree.hpp>
+#include <kdl/treeidsolver_recursive_newton_euler.hpp>
+#include <kdl_parser/kdl_parser.hpp>
+#include <random>
+#include <regex>
+#include <sstream>
+
+#include "codegen/src/io/input_error.hpp"
+#include "codegen/src/robot/urdf.hpp"
+#include "host_sim/identify/description/described_arm.hpp"
+#include "tests/unit/codegen/kdl_arm.hpp"
+
+namespace armcal::description {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A hand that is fixed to the last link, a finger that moves on it, a slide, right angles, comments, odd spacing.
+const char* const kUrdf = R"(<?xml version="1.0"?>
+<!-- an arm <link name="up"> of our own -->
+<robot name="odd">
+  <link name="base"><inertial><mass value="7"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <link name='up'   >
+    <visual><geometry><box size="1 2 3"/></geometry></visual>
+    <inertial>
+      <origin xyz="0.01 -0.03 0.1" rpy="0.1 0.2 0.3"/><mass value="4.2"/>
+      <inertia ixx="0.04" ixy="0.001" ixz="0.002" iyy="0.038" iyz="-0.003" izz="0.015"/>
+    </inertial>
+  </link>
+  <joint name="turn" type="revolute">
+    <parent link="base"/><child link="up"/><origin xyz="0.1 0 0.4"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="80" velocity="2"/>
+    <dynamics damping="0.003" friction="0"/>   <safety_controller k_velocity="10"/>
+  </joint>
+  <link name="arm"><inertial><mass value="3"/><origin xyz="0.2 0 0.02"/><inertia ixx="0.01" ixy="0" ixz="0.001" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>
+  <joint name="lift" type="revolute"><parent link="up"/><child link="arm"/><origin xyz="0 0.1 0.3" rpy="-1.5707963267948966 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="60" velocity="2"/></joint>
+  <link name="quill"><inertial><mass value="1.5"/><origin xyz="0 0 0.05"/><inertia ixx="0.008" ixy="0" ixz="0" iyy="0.008" iyz="0" izz="0.003"/></inertial></link>
+  <joint name="push" type="prismatic"><parent link="arm"/><child link="quill"/><origin xyz="0.4 0 0" rpy="0 1.5707963267948966 0"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="0.3" effort="200" velocity="1"/></joint>
+  <link name="hand"><inertial><mass value="0.8"/><origin xyz="0.01 0.02 0.1" rpy="0 0 0.4"/><inertia ixx="0.002" ixy="0" ixz="0" iyy="0.0022" iyz="0" izz="0.001"/></inertial></link>
+  <joint name="to_hand" type="fixed"><parent link="quill"/><child link="hand"/><origin xyz="0 0 0.1" rpy="0.3 0.2 0.7"/></joint>
+  <link name="finger"><inertial><mass value="0.2"/><origin xyz="0.01 0 0.02"/><inertia ixx="0.0002" ixy="0" ixz="0" iyy="0.0002" iyz="0" izz="0.0001"/></inertial></link>
+  <joint name="grip" type="prismatic"><parent link="hand"/><child link="finger"/><origin xyz="0 0.02 0.1"/><axis xyz="0 1 0"/>
+    <limit lower="0.01" upper="0.05" effort="20" velocity="1"/></joint>
+</robot>
+)";
+
+const char* const kRobot = R"(name = "odd"
+source = "test"
+urdf = "arm.urdf"
+tip = "hand"
+fixed = { grip = 0.03 }
+gravity_mps2 = [0.0, 0.0, -9.81]
+[[joint]]
+name = "turn"
+acceleration_limit_radps2 = 10.0
+torque_noise_Nm = 0.1
+v_min_radps = 0.01
+[[joint]]
+name = "lift"
+acceleration_limit_radps2 = 10.0
+torque_noise_Nm = 0.1
+v_min_radps = 0.01
+[[joint]]
+name = "push"
+acceleration_limit_mps2 = 5.0
+torque_noise_N = 0.1
+v_min_mps = 0.01
+[[effect]]
+name = "stribeck"
+joints = [2]
+mean = { dFs = 0.7 }
+)";
+
+const codegen::Catalogue& Records() {
+  static const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");
+  return records;
+}
+
+class Export : public testing::Test {
+ protected:
+  Export() : folder_(fs::temp_directory_path() / ("armcal_description_" + std::to_string(getpid()))) {
+    fs::create_directories(folder_);
+    Write("arm.urdf", kUrdf), Write("arm.toml", kRobot);
+    model_ = std::make_unique<codegen::Model>(codegen::ReadRobot(folder_ / "arm.toml"), Records());
+    given_ = calibration::GivenByRobot(*model_);
+    // An identified arm: every body parameter about the centre is another, and so are friction and rotors.
+    for (int j = 0; j < 3; ++j) {
+      Eigen::VectorXd c = calibration::ToCentre(given_.bodies.segment(11 * j, 10));
+      c[0] *= 1.13, c[1] += 0.004, c[2] -= 0.003, c[3] += 0.005, c.tail(6) *= 1.07;
+      given_.bodies.segment(11 * j, 10) = calibration::ToOrigin(c);
+      given_.bodies[11 * j + 10] = 0.3 + 0.1 * j;
+    }
+    for (int c = 0; c < model_->columns(); ++c)
+      if (!model_->is_rigid(c) && model_->column_name(c).size() == 3) given_.x[c] = 1.25 + 0.125 * c;
+    arm_ = Describe(*model_, given_, "table.toml");
+  }
+  ~Export() override { fs::remove_all(folder_); }
+
+  void Write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
+
+  // Torque of the identified bodies by KDL, from the robot's DH rows.
+  Eigen::MatrixXd Expected(bool moving) {
+    Eigen::VectorXd bodies = given_.bodies;
+    for (int j = 0; j < 3; ++j) bodies[11 * j + 10] = 0;
+    tests::KdlArm kdl(model_->robot(), bodies);
+    Eigen::MatrixXd out(kStates, 3);
+    for (int k = 0; k < kStates; ++k) {
+      const Eigen::MatrixXd s = State(k, moving);
+      out.row(k) = kdl.Torque(s.col(0), s.col(1), s.col(2));
+    }
+    return out;
+  }
+  // Of a KDL tree whose joints have these names; others stand at `held`.
+  static Eigen::MatrixXd Torques(const KDL::Tree& tree, const std::map<std::string, double>& held, bool moving) {
+    std::map<std::string, unsigned> at;
+    for (const auto& [name, s] : tree.getSegments()) at[s.segment.getJoint().getName()] = s.q_nr;
+    const unsigned n = tree.getNrOfJoints();
+    KDL::TreeIdSolver_RNE solver(tree, KDL::Vector(0, 0, -9.81));
+    Eigen::MatrixXd out(kStates, 3);
+    for (int k = 0; k < kStates; ++k) {
+      const Eigen::MatrixXd s = State(k, moving);
+      KDL::JntArray q(n), qd(n), qdd(n), tau(n);
+      for (const auto& [name, position] : held) q(at.at(name)) = position;
+      const char* const name[] = {"turn", "lift", "push"};
+      for (int j = 0; j < 3; ++j)
+        q(at.at(name[j])) = s(j, 0), qd(at.at(name[j])) = s(j, 1), qdd(at.at(name[j])) = s(j, 2);
+      EXPECT_GE(solver.CartToJnt(q, qd, qdd, {}, tau), 0);
+      for (int j = 0; j < 3; ++j) out(k, j) = tau(at.at(name[j]));
+    }
+    return out;
+  }
+  static double Relative(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+    return (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff();
+  }
+  static Eigen::MatrixXd State(int k, bool moving) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(k) + 5);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    Eigen::MatrixXd s(3, 3);
+    for (double& v : s.reshaped()) v = uniform(random);
+    if (!moving) s.rightCols(2).setZero();
+    return s;
+  }
+  static constexpr int kStates = 50;
+
+  fs::path folder_;
+  std::unique_ptr<codegen::Model> model_;
+  calibration::Given given_;
+  DescribedArm arm_;
+};
+
+KDL::Tree Tree(const std::string& urdf) {
+  KDL::Tree tree;
+  EXPECT_TRUE(kdl_parser::treeFromString(urdf, tree));
+  return tree;
+}
+
+TEST_F(Export, ToUrdf_HasTheTorqueOfTheIdentifiedBodies_ReadByOthersAndByUs) {
+  for (const bool merge : {false, true}) {
+    SCOPED_TRACE(merge);
+    const Description d = ToUrdf(arm_, "", merge);
+    EXPECT_LT(Relative(Torques(Tree(d.text), {{"grip", 0.03}}, true), Expected(true)), 1e-9);
+    Write("arm.urdf", d.text);
+    const codegen::Robot again = codegen::ReadRobot(folder_ / "arm.toml");
+    Write("arm.urdf", kUrdf);
+    for (std::size_t j = 0; j < 3; ++j) {
+      EXPECT_NEAR(again.joint[j].link.mass_kg, arm_.joint[j].body.mass_kg, 1e-12);
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(again.joint[j].link.center_m[k], arm_.joint[j].body.center_m[k], 1e-11);
+      for (std::size_t k = 0; k < 6; ++k)
+        EXPECT_NEAR(again.joint[j].link.inertia_kgm2[k], arm_.joint[j].body.inertia_kgm2[k], 1e-11);
+      EXPECT_EQ(again.joint[j].nominal.at("Fc"), arm_.joint[j].coulomb_Nm);
+      EXPECT_EQ(again.joint[j].nominal.at("Fv"), arm_.joint[j].viscous_Nmsprad);
+    }
+  }
+}
+
+// The hand's and the finger's inertials are what they were, and so is every byte but those of three links and joints.
+TEST_F(Export, ToUrdf_ChangesNothingElse) {
+  const auto without = [](std::string text) {
+    for (const char* link : {"up", "arm", "quill"}) {
+      text = std::regex_replace(text, std::regex(std::string("(<link name=['\"]") + link + "['\"] *)/>"), "$1></link>");
+      text = std::regex_replace(text,
+                                std::regex(std::string("(<link name=['\"]") + link +
+                                           "['\"] *>(?:(?!</link>)[^])*?)\\s*<inertial>[^]*?</inertial>"),
+                                "$1");
+      text = std::regex_replace(text, std::regex(std::string("(<link name=['\"]") + link + "['\"] *>)\\s*</link>"),
+                                "$1</link>");
+    }
+    return std::regex_replace(text, std::regex("\\s*<dynamics[^>]*>"), "");
+  };
+  const std::string now = ToUrdf(arm_, "", false).text;
+  EXPECT_EQ(without(now), without(kUrdf));
+  const auto parsed = [](const std::string& text) {
+    const KDL::Tree tree = Tree(text);
+    return std::pair(tree.getSegment("hand")->second.segment.getInertia().getMass(),
+                     tree.getSegment("finger")->second.segment.getInertia().getMass());
+  };
+  EXPECT_EQ(parsed(now), parsed(kUrdf));
+}
+
+TEST_F(Export, ToUrdf_WhereTheRestCannotExist_AsksForMerge) {
+  given_.bodies[22] = 0.5;  // lighter than hand and finger
+  Eigen::VectorXd c = calibration::ToCentre(given_.bodies.segment(22, 10));
+  c << 0.5, 0, 0, 0.1, 0.01, 0, 0, 0.01, 0, 0.01;
+  given_.bodies.segment(22, 10) = calibration::ToOrigin(c);
+  arm_ = Describe(*model_, given_, "table.toml");
+  try {
+    ToUrdf(arm_, "", false);
+    FAIL() << "accepted";
+  } catch (const io::InputError& e) {
+    const std::string line = e.what();
+    EXPECT_NE(line.find("link \"quill\" without hand, finger: expected a mass above zero"), line.npos) << line;
+    EXPECT_NE(line.find("--merge"), line.npos) << line;
+  }
+  std::string bare = kUrdf;  // a link without anything in it
+  const auto begin = bare.find("<link name=\"quill\">"), end = bare.find("</link>", begin) + 7;
+  Write("arm.urdf", bare.replace(begin, end - begin, "<link name=\"quill\"/>"));
+  EXPECT_LT(Relative(Torques(Tree(ToUrdf(arm_, "", true).text), {{"grip", 0.03}}, true), Expected(true)), 1e-9);
+}
+
+TEST_F(Export, OfAnotherArmsUrdf_IsRefused) {
+  std::string other = kUrdf;
+  other.replace(other.find("0.4 0 0\" rpy"), 3, "0.5");
+  Write("other.urdf", other);
+  EXPECT_THROW(ToUrdf(arm_, (folder_ / "other.urdf").string(), false), io::InputError);
+  arm_.robot.urdf.path.clear();
+  EXPECT_THROW(ToUrdf(arm_, "", false), io::InputError);
+}
+
+TEST_F(Export, SaysWhatAFormatCannotHold) {
+  const auto holds = [](const Description& d, const std::string& what) {
+    return std::any_of(d.left_out.begin(), d.left_out.end(),
+                       [&](const std::string& line) { return line.find(what) != line.npos; });
+  };
+  for (const Description& d : {ToUrdf(arm_, "", false), ToSdf(arm_)}) {
+    EXPECT_TRUE(holds(d, "rotor inertia of lift = 0.4 kg*m^2"));
+    EXPECT_TRUE(holds(d, "stribeck.dFs2 = 0.7"));
+  }
+  EXPECT_FALSE(holds(ToMjcf(arm_), "rotor"));
+  EXPECT_TRUE(holds(ToMjcf(arm_), "stribeck.dFs2 = 0.7"));
+  EXPECT_TRUE(ToYaml(arm_).left_out.empty());
+  EXPECT_TRUE(ToHeader(arm_).left_out.empty());
+}
+
+std::vector<double> Numbers(const std::string& text) {
+  std::istringstream in(text);
+  return {std::istream_iterator<double>(in), {}};
+}
+KDL::Vector Vector(const std::vector<double>& v, std::size_t at = 0) { return {v[at], v[at + 1], v[at + 2]}; }
+KDL::Joint AxisZ(const std::string& name, bool slide) {
+  return KDL::Joint(name, slide ? KDL::Joint::TransZ : KDL::Joint::RotZ);
+}
+
+// Reads what the test needs of MJCF, by itself: nested bodies, joint at the body's frame along z.
+void AddBody(const tinyxml2::XMLElement* body, const std::string& parent, KDL::Tree& tree) {
+  const std::string name = body->Attribute("name");
+  const auto pos = Numbers(body->Attribute("pos")), quat = Numbers(body->Attribute("quat"));
+  const KDL::Frame frame(KDL::Rotation::Quaternion(quat[1], quat[2], quat[3], quat[0]), Vector(pos));
+  tree.addSegment(KDL::Segment(name + "_place", KDL::Joint(KDL::Joint::None), frame), parent);
+  const auto* inertial = body->FirstChildElement("inertial");
+  const auto full = Numbers(inertial->Attribute("fullinertia"));  // xx yy zz xy xz yz
+  const KDL::RigidBodyInertia own(inertial->DoubleAttribute("mass"), Vector(Numbers(inertial->Attribute("pos"))),
+                                  KDL::RotationalInertia(full[0], full[1], full[2], full[3], full[4], full[5]));
+  const auto* joint = body->FirstChildElement("joint");
+  EXPECT_STREQ(joint->Attribute("axis"), "0 0 1");
+  tree.addSegment(KDL::Segment(name, AxisZ(joint->Attribute("name"), std::string(joint->Attribute("type")) == "slide"),
+                               KDL::Frame::Identity(), own),
+                  name + "_place");
+  for (const auto* b = body->FirstChildElement("body"); b; b = b->NextSiblingElement("body")) AddBody(b, name, tree);
+}
+
+TEST_F(Export, ToMjcf_HasTheTorqueArmatureAndFriction) {
+  tinyxml2::XMLDocument doc;
+  ASSERT_EQ(doc.Parse(ToMjcf(arm_).text.c_str()), tinyxml2::XML_SUCCESS);
+  const auto* world = doc.RootElement()->FirstChildElement("worldbody");
+  KDL::Tree tree("world");
+  AddBody(world->FirstChildElement("body"), "world", tree);
+  EXPECT_LT(Relative(Torques(tree, {}, true), Expected(true)), 1e-9);
+  EXPECT_LT(Relative(Torques(tree, {}, false), Expected(false)), 1e-9);  // gravity
+  const auto* body = world->FirstChildElement("body");
+  for (std::size_t j = 0; j < 3; ++j, body = body->FirstChildElement("body")) {
+    const auto* joint = body->FirstChildElement("joint");
+    EXPECT_EQ(joint->DoubleAttribute("armature"), arm_.joint[j].rotor_kgm2);
+    EXPECT_EQ(joint->DoubleAttribute("damping"), arm_.joint[j].viscous_Nmsprad);
+    EXPECT_EQ(joint->DoubleAttribute("frictionloss"), arm_.joint[j].coulomb_Nm);
+    EXPECT_GT(arm_.joint[j].coulomb_Nm, 1);
+  }
+}
+
+TEST_F(Export, ToSdf_HasTheTorqueAndFriction) {
+  tinyxml2::XMLDocument doc;
+  ASSERT_EQ(doc.Parse(ToSdf(arm_).text.c_str()), tinyxml2::XML_SUCCESS);
+  const auto* model = doc.RootElement()->FirstChildElement("model");
+  KDL::Tree tree("base");
+  std::map<std::string, const tinyxml2::XMLElement*> joint_of;
+  for (const auto* j = model->FirstChildElement("joint"); j; j = j->NextSiblingElement("joint"))
+    joint_of[j->FirstChildElement("child")->GetText()] = j;
+  int moving = 0;
+  for (const auto* l = model->FirstChildElement("link"); l; l = l->NextSiblingElement("link")) {
+    const std::string name = l->Attribute("name");
+    if (name == "base") continue;
+    const auto* joint = joint_of.at(name);
+    const auto* pose = l->FirstChildElement("pose");
+    EXPECT_STREQ(pose->Attribute("relative_to"), joint->FirstChildElement("parent")->GetText());
+    const auto p = Numbers(pose->GetText());
+    tree.addSegment(KDL::Segment(name + "_place", KDL::Joint(KDL::Joint::None),
+                                 KDL::Frame(KDL::Rotation::RPY(p[3], p[4], p[5]), Vector(p))),
+                    pose->Attribute("relative_to"));
+    const auto* inertial = l->FirstChildElement("inertial");
+    const auto* I = inertial->FirstChildElement("inertia");
+    const auto in = [&](const char* key) { return I->FirstChildElement(key)->DoubleText(); };
+    const KDL::RigidBodyInertia own(
+        inertial->FirstChildElement("mass")->DoubleText(),
+        Vector(Numbers(inertial->FirstChildElement("pose")->GetText())),
+        KDL::RotationalInertia(in("ixx"), in("iyy"), in("izz"), in("ixy"), in("ixz"), in("iyz")));
+    tree.addSegment(
+        KDL::Segment(name, AxisZ(joint->Attribute("name"), joint->Attribute("type") == std::string("prismatic")),
+                     KDL::Frame::Identity(), own),
+        name + "_place");
+    const auto* dynamics = joint->FirstChildElement("axis")->FirstChildElement("dynamics");
+    EXPECT_EQ(dynamics->FirstChildElement("damping")->DoubleText(), arm_.joint[moving].viscous_Nmsprad);
+    EXPECT_EQ(dynamics->FirstChildElement("friction")->DoubleText(), arm_.joint[moving++].coulomb_Nm);
+  }
+  ASSERT_EQ(moving, 3);
+  EXPECT_LT(Relative(Torques(tree, {}, true), Expected(true)), 1e-9);
+}
+
+// Every number is there, with all its digits.
+TEST_F(Export, ToYamlAndToHeader_HoldEveryValue) {
+  const std::string yaml = ToYaml(arm_).text, header = ToHeader(arm_).text;
+  const auto has = [](const std::string& text, const std::string& key, double value) {
+    std::smatch found;
+    EXPECT_TRUE(std::regex_search(text, found, std::regex(key + "[ :(]+([-+.0-9e]+)"))) << key;
+    return !found.empty() && std::stod(found[1]) == value;
+  };
+  EXPECT_TRUE(has(header, "#define ODD_M2", arm_.joint[1].body.mass_kg));
+  EXPECT_TRUE(has(header, "#define ODD_IYZ1", arm_.joint[0].body.inertia_kgm2[4]));
+  EXPECT_TRUE(has(header, "#define ODD_IA3", 0.5));
+  EXPECT_TRUE(has(header, "#define ODD_STRIBECK_DFS2", 0.7));
+  EXPECT_NE(header.find("_SCHEMA 0x"), header.npos);
+  EXPECT_TRUE(has(yaml, "mass_kg", arm_.joint[0].body.mass_kg));
+  EXPECT_TRUE(has(yaml, "rotor_inertia_kg", 0.5));
+  EXPECT_TRUE(has(yaml, "coulomb_N", arm_.joint[2].coulomb_Nm));
+  EXPECT_TRUE(has(yaml, "stribeck.dFs2\", value", 0.7));
+  Write("p.c", "#include \"p.h\"\nint main(void) { return ODD_M1 > 0 && ODD_JOINTS == 3 ? 0 : 1; }\n");
+  Write("p.h", header);
+  const std::string at = folder_.string();
+  EXPECT_EQ(std::system(("cc -std=c99 -Wall -Werror -o " + at + "/p " + at + "/p.c && " + at + "/p").c_str()), 0);
+}
+
+TEST_F(Export, OfBaseParametersOnly_IsRefused) {
+  given_.bodies.resize(0);
+  EXPECT_THROW(Describe(*model_, given_, "fit.json"), io::InputError);
+}
+
+}  // namespace
+}  // namespace armcal::description

@@ -112,6 +112,8 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   nlohmann::ordered_json& json = run->json;
   json = verdict::DiagnosisJson(run->view);
   json["provenance"] = provenance;
+  json["fitted_at_turns"] = nlohmann::ordered_json::array();
+  for (const int j : run->diagnosis->finding().at_turns) json["fitted_at_turns"].push_back(j + 1);
   // Averages of a limited band have less noise than the samples that `before` and `after` are about.
   const auto limited = [&train](int j) {
     return std::any_of(train.begin(), train.end(), [j](const auto& log) { return log.averaged(j); });
@@ -124,9 +126,11 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   }
   for (const calibration::Dataset& log : run->train) {
     json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
-    nlohmann::ordered_json& bands = json["band_Hz"].emplace_back(nlohmann::ordered_json::array());
-    for (const double band_Hz : log.band_Hz)
-      bands.push_back(std::isfinite(band_Hz) ? nlohmann::ordered_json(band_Hz) : nlohmann::ordered_json());
+    for (const auto& [key, limits_Hz] : {std::pair{"band_Hz", &log.band_Hz}, std::pair{"saved_Hz", &log.saved_Hz}}) {
+      nlohmann::ordered_json& each = json[key].emplace_back(nlohmann::ordered_json::array());
+      for (const double limit_Hz : *limits_Hz)
+        each.push_back(std::isfinite(limit_Hz) ? nlohmann::ordered_json(limit_Hz) : nlohmann::ordered_json());
+    }
   }
   if (!o.model_out.empty()) {
     // The same schema: a table can switch the terms on. Another one: the model must be generated and the drive built.

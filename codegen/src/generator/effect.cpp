@@ -172,12 +172,13 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
   r.needs = in.Texts("needs");
   if (in.Has("search")) {
     const io::TomlReader s = in.Table("search");
-    s.AllowOnly({"how", "signal", "grid", "minimum_s", "after"});
+    s.AllowOnly({"how", "signal", "grid", "minimum_s", "after", "at_turns"});
     r.search.how = static_cast<SearchWay>(ReadChoice(s, "how", s.Text("how"), kSearchWords));
     r.search.signal = s.Text("signal", "");
     r.search.grid = static_cast<int>(s.Number("grid", 10));
     r.search.minimum_s = s.Number("minimum_s", 0);
     r.search.after = s.Text("after", "");
+    r.search.at_turns = s.Flag("at_turns", false);
   }
   return r;
 }

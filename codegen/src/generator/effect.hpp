@@ -51,10 +51,11 @@ struct Apply {
 
 struct Search {
   SearchWay how = SearchWay::kLinear;
-  std::string signal;    // spectral, spline: over which signal
-  int grid = 10;         // profile: points per nonlinear parameter
-  double minimum_s = 0;  // onset: shortest stretch
-  std::string after;     // a simpler record: tried only where that one finds something on the same joints
+  std::string signal;     // spectral, spline: over which signal
+  int grid = 10;          // profile: points per nonlinear parameter
+  double minimum_s = 0;   // onset: shortest stretch
+  std::string after;      // a simpler record: tried only where that one finds something on the same joints
+  bool at_turns = false;  // tried on the rows near turns and at rest, too, before all others
 };
 
 struct EffectRecord {

@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kMaxTerms = 16;  // far beyond what logs have shown: the search must end
+constexpr int kMaxTerms = 24;  // far beyond what logs have shown: the search must end
 constexpr double kTried = 10;  // members of a usual grid, for what would just have been seen
 
 // Delays the logs by what the latest term says of them.
@@ -91,12 +91,19 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
     w.narrow->all_reads = w.all_reads;
   }
   Selector select(w);
+  // What friction does near turns and at rest is larger there than most of what else is missing, so it comes first.
+  w.chosen = select.AtTurns();
+  if (!w.chosen.empty()) w.Polish();
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);
     ApplyDelay(w);
     // A term that was found while another one was still unknown is a little wrong, and its error looks like further
-    // terms.
-    for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k) w.chosen[k].earns = StaysIn(w, select, w.chosen[k]);
+    // terms. What shows near turns and at rest is slow to search, and other joints hardly move it.
+    for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k) {
+      const Candidate& known = *w.chosen[k].candidate;
+      if (!known.record().search.at_turns || SharesJoint(known, *next.candidate))
+        w.chosen[k].earns = StaysIn(w, select, w.chosen[k]);
+    }
     w.Polish();
   }
   const int most = static_cast<int>(w.chosen.size()) == kMaxTerms ? kMaxTerms : 0;
@@ -116,6 +123,8 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   finding_.declared = w.declared;
   LeaveOutUndetermined(w, finding_);
   finding_.most_terms = most;
+  for (int j = 0; j < model.joints(); ++j)
+    if (w.turns[static_cast<std::size_t>(j)]) finding_.at_turns.push_back(j);
   finding_.smallest.resize(model.joints());
   for (int j = 0; j < model.joints(); ++j) {
     const double rows = std::max(2, w.evidence.index[j].size());
@@ -219,6 +228,21 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
   return left;
 }
 
+// What a log leaves, RMS of each joint: where it slides, and on the rows that are fitted. Those are all samples where
+// rest and turns are fitted, too.
+struct Errors {
+  VectorXd sliding, fitted;
+};
+
+Errors ErrorsOf(const Diagnosis::Work& w, const calibration::Dataset& log, const MatrixXd& residual) {
+  Errors out{calibration::RmsInBand(log, residual), {}};
+  out.fitted = out.sliding;
+  const VectorXd all = calibration::Rms(log, residual, false);
+  for (std::size_t j = 0; j < w.turns.size(); ++j)
+    if (w.turns[j]) out.fitted[static_cast<Eigen::Index>(j)] = all[static_cast<Eigen::Index>(j)];
+  return out;
+}
+
 // Compares the errors with a term to those without it. One of its own joints can refute it, or all joints together.
 std::optional<Refutation> Worse(const Chosen& term, const VectorXd& with, const VectorXd& without) {
   const VectorXd change = (with.array().max(1e-12) / without.array().max(1e-12)).log();
@@ -231,17 +255,22 @@ std::optional<Refutation> Worse(const Chosen& term, const VectorXd& with, const 
   return {};
 }
 
+std::optional<Refutation> Worse(const Chosen& term, const Errors& with, const Errors& without) {
+  if (const auto why = Worse(term, with.sliding, without.sliding)) return why;
+  return Worse(term, with.fitted, without.fitted);
+}
+
 // The weakest term that predicts one of its joints, or all joints together, worse than the declared model does, or
 // worse than the other terms do without it. A delay is not compared with the other terms: they were found on logs that
 // it had aligned.
-Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const VectorXd& before, const VectorXd& after,
+Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const Errors& before, const Errors& after,
                 std::optional<Refutation>& why) {
   for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
     if (!c->confirmed || c->candidate->is_event()) continue;
     if ((why = Worse(*c, after, before))) return &*c;
     const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
     if (others.empty() || c->delay_s != 0) continue;
-    if ((why = Worse(*c, after, calibration::RmsInBand(log, Leaves(w, others, log))))) {
+    if ((why = Worse(*c, after, ErrorsOf(w, log, Leaves(w, others, log))))) {
       why->beside_others = true;
       return &*c;
     }
@@ -273,14 +302,14 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
   Work& w = *work_;
   HeldOut out;
   out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
-  const VectorXd before = calibration::RmsInBand(test, out.before);
+  const Errors before = ErrorsOf(w, test, out.before);
   std::vector<std::optional<Refutation>> why;
   for (const Term& t : finding_.terms) why.push_back(t.refuted);
   for (;;) {
     out.after = Leaves(w, Confirmed(w.chosen), test, &out.tracking);
     Work::Estimate with_all = w.estimate;
     std::optional<Refutation> reason;
-    Chosen* refuted = Refuted(w, test, before, calibration::RmsInBand(test, out.after), reason);
+    Chosen* refuted = Refuted(w, test, before, ErrorsOf(w, test, out.after), reason);
     w.estimate = std::move(with_all);
     if (!refuted) break;
     const auto at = refuted - w.chosen.data();

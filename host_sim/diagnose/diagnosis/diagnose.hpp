@@ -57,6 +57,7 @@ struct Finding {
   Eigen::VectorXd x;                  // filter coordinates and gains with the terms in
   Eigen::VectorXd sigma, innovation;  // [n] residual and innovation standard deviation with the terms in
   Eigen::VectorXd smallest;           // [n] RMS of the smallest effect that would have been seen
+  std::vector<int> at_turns;          // joints whose rows near turns and at rest were fitted, too
   int most_terms = 0;                 // the search ended at so many, and did not ask for another; 0: it did
 };
 

@@ -67,7 +67,9 @@ std::string EffectTable(const codegen::Model& model, const Finding& finding, con
   }
   for (std::size_t k = 0; k < t.eta.size(); ++k)
     nonlinear += fmt::format("{}{} = {:.9e}", nonlinear.empty() ? "" : ", ", t.unknowns[k].key, t.eta[k]);
-  std::string text = fmt::format("[[effect]]\nname = \"{}\"\nstate = \"estimated\"\n", t.record->name);
+  // An estimate on sliding rows alone cannot see what shows near turns and at rest: it stays as it was found.
+  std::string text = fmt::format("[[effect]]\nname = \"{}\"\nstate = \"{}\"\n", t.record->name,
+                                 t.record->search.at_turns ? "fixed" : "estimated");
   if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
   if (!mean.empty()) text += fmt::format("mean = {{ {} }}\n", mean);
   if (!nonlinear.empty()) text += fmt::format("nonlinear = {{ {} }}\n", nonlinear);

@@ -55,6 +55,7 @@ void RowIndex::Take(int log, const Eigen::Ref<const VectorXd>& column, Eigen::Re
   if (own) rows.segment(first, last - first) = *own * column;
   else
     for (int k = first; k < last; ++k) rows[k] = column[sample[static_cast<std::size_t>(k)]];
+  if (weight.size()) rows.segment(first, last - first).array() *= weight.segment(first, last - first).array();
 }
 
 bool IsWhite(const NoiseModel& noise) { return noise.a.squaredNorm() == 0; }

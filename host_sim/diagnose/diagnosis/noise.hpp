@@ -15,6 +15,7 @@ struct RowIndex {
   std::vector<int> dataset, sample;
   std::vector<char> segment_begin;
   std::vector<const Average*> average;  // one a log; null: its rows are samples
+  Eigen::VectorXd weight;               // of each row, columns and torque alike; empty: 1
   int size() const { return static_cast<int>(sample.size()); }
   bool averaged() const;
   // Rows [first, last) of a log.

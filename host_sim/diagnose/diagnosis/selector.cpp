@@ -31,14 +31,16 @@ constexpr double kAsLarge = 0.5;           // of what it would gain there if it 
 constexpr int kSharpenings = 3;
 constexpr double kNothing = 10;         // a gain that no score above zero can come from
 constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms differ a little from any record
+constexpr int kFewTurns = 100;          // rows
+constexpr double kTurnShare = 0.03;     // of a joint's rows
 constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
+
+}  // namespace
 
 bool SharesJoint(const Candidate& a, const Candidate& b) {
   return std::any_of(a.rows().begin(), a.rows().end(),
                      [&](int j) { return std::find(b.rows().begin(), b.rows().end(), j) != b.rows().end(); });
 }
-
-}  // namespace
 
 // What the candidates of one pass are tried on: the base with the terms so far, whole and thinned.
 class Grounds {
@@ -109,7 +111,7 @@ bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
   Grounds grounds(w_, terms);
   std::vector<Candidate*> causes, events;
   for (const auto& c : w_.candidates)
-    if (!AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence))
+    if (!c->record().search.at_turns && !AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence))
       (c->is_event() ? events : causes).push_back(c.get());
   bursts_.clear();
   if (Best(causes, terms, grounds, out)) return true;
@@ -117,6 +119,42 @@ bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
   // fold only is tried among them.
   events.insert(events.end(), bursts_.begin(), bursts_.end());
   return Best(events, terms, grounds, out);
+}
+
+// So many of the joint's rows are near turns or at rest that they are worth a look.
+bool Selector::StandsOrTurns(int j) const {
+  int slides = 0, sound = 0;
+  for (const auto* log : w_.logged) {
+    if (log->sound.size() == 0) return false;
+    slides += log->used.col(j).sum(), sound += log->sound.col(j).sum();
+  }
+  return sound - slides > std::max(kFewTurns, static_cast<int>(kTurnShare * sound));
+}
+
+std::vector<Chosen> Selector::AtTurns() {
+  std::vector<Candidate*> candidates;
+  std::vector<char> shown(static_cast<std::size_t>(w_.model.joints()), 0);
+  for (const auto& c : w_.candidates) {
+    if (!c->record().search.at_turns || !StandsOrTurns(c->rows()[0])) continue;
+    candidates.push_back(c.get());
+    shown[static_cast<std::size_t>(c->rows()[0])] = 1;
+  }
+  std::vector<Chosen> out;
+  if (candidates.empty()) return out;
+  w_.ShowTurns(shown);
+  w_.WeighTurns({});
+  Grounds grounds(w_, {});
+  shown.assign(shown.size(), 0);
+  for (Candidate* c : candidates) {
+    char& known = shown[static_cast<std::size_t>(c->rows()[0])];
+    Chosen next;
+    if (known || !IsExcited(*c, w_.evidence) || !Best({c}, {}, grounds, next)) continue;
+    out.push_back(next);
+    known = 1;
+  }
+  w_.ShowTurns(shown);
+  if (!out.empty()) w_.WeighTurns(Confirmed(out));
+  return out;
 }
 
 bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chosen*>& terms, Grounds& grounds,

@@ -10,12 +10,19 @@ namespace armcal::diagnosis {
 
 class Grounds;  // what the candidates of one pass are tried on
 
+// They have a torque on the same joint.
+bool SharesJoint(const Candidate& a, const Candidate& b);
+
 class Selector {
  public:
   explicit Selector(Diagnosis::Work& work) : w_(work) {}
 
   // The best further term given those chosen; false if none is worth it.
   bool Next(const std::vector<const Chosen*>& terms, Chosen& out);
+
+  // The first terms of all: of the records that count the rows near turns and at rest, at most one a joint. The joints
+  // that got one are fitted there from now on.
+  std::vector<Chosen> AtTurns();
 
   // Searches a chosen term again with the others in; false if it no longer earns its place.
   bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others);
@@ -27,6 +34,7 @@ class Selector {
   std::vector<Found> Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds);
   void Rescore(const Grounds& grounds, Found& f) const;
   bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const;
+  bool StandsOrTurns(int joint) const;
   bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   // Best first: by score, but a named cause before a curve that explains little more.
   void Sort(std::vector<Found>& ranked);

@@ -10,6 +10,7 @@
 #include "codegen/src/generator/state_path.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/diagnose/diagnosis/noise.hpp"
+#include "host_sim/identify/calibration/band.hpp"
 #include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::diagnosis {
@@ -18,6 +19,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
+// Of the ratio of mean squares in sliding to those near turns and at rest. With 0.5 these rows would leave as much as
+// those in sliding, and the terms that are about them would hardly be fitted. With 0 what is not known of rest would
+// bend the parameters of sliding.
+constexpr double kTurnWeight = 0.25;
 constexpr int kPasses = 3;
 constexpr double kSettled = 1e-3;  // relative change of the residuals' spread after which nothing else moves
 }  // namespace
@@ -71,7 +76,7 @@ MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantitie
   for (int c = 0; c < candidate.columns(eta); ++c)
     for (std::size_t r = 0; r < candidate.rows().size(); ++r)
       if (value[c][r].size()) tau.col(candidate.rows()[r]) += amplitude[c] * value[c][r];
-  return tau;
+  return calibration::AsSaved(*quantities.data, std::move(tau));
 }
 
 Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalogue,
@@ -91,6 +96,8 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
       if (p.effect == e.record->name && p.state == "standby") standby.push_back(p.effect);
   for (const auto& c : candidates) all_reads.merge(c->inputs());
   evidence.model = &model;
+  turns.assign(static_cast<std::size_t>(model.joints()), 0);
+  turn_weight.setOnes(model.joints());
   IndexRows();
 }
 
@@ -120,6 +127,40 @@ void Diagnosis::Work::IndexRows() {
       }
     }
   }
+  WeighRows();
+}
+
+// Weighs the rows of the joints that are fitted near turns and at rest, too.
+void Diagnosis::Work::WeighRows() {
+  sliding.assign(turns.size(), {});
+  for (int j = 0; j < model.joints(); ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    RowIndex& index = evidence.index[at];
+    if (!turns[at]) continue;
+    sliding[at].resize(index.size());
+    for (std::size_t log = 0; log < train.size(); ++log)
+      index.Take(static_cast<int>(log), train[log]->slides.col(j).cast<double>(), sliding[at]);
+    index.weight = sliding[at].array() + (1 - sliding[at].array()) * turn_weight[j];
+  }
+}
+
+void Diagnosis::Work::WeighTurns(const std::vector<const Chosen*>& terms) {
+  Solve(terms);
+  const Metric metric(rows, WhiteNoise());
+  for (int j = 0; j < model.joints(); ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    if (!turns[at]) continue;
+    const VectorXd e = metric.RawResidual(j).cwiseQuotient(evidence.index[at].weight);
+    double square[2] = {}, count[2] = {};
+    for (Eigen::Index k = 0; k < e.size(); ++k) {
+      const int slides = sliding[at][k] > 0.5;
+      square[slides] += e[k] * e[k], count[slides] += 1;
+    }
+    if (count[0] > 0 && count[1] > 0 && square[0] > 0)
+      turn_weight[j] = std::clamp(std::pow(square[1] / count[1] / (square[0] / count[0]), kTurnWeight), 1e-3, 1.0);
+  }
+  MakeTrain();
+  if (narrow) narrow->turn_weight = turn_weight, narrow->MakeTrain();
 }
 
 void Diagnosis::Work::AlignLogs() {
@@ -130,13 +171,30 @@ void Diagnosis::Work::AlignLogs() {
 
 void Diagnosis::Work::SetDelay(double by_s) {
   delay_s = by_s;
-  delayed.clear();
-  for (const auto* d : logged) delayed.push_back(calibration::Delayed(*d, by_s));
-  for (std::size_t k = 0; k < train.size(); ++k) train[k] = &delayed[k];
+  MakeTrain();
+  if (narrow) narrow->SetDelay(by_s);
+}
+
+void Diagnosis::Work::ShowTurns(const std::vector<char>& joints) {
+  if (joints == turns) return;
+  turns = joints;
+  turn_weight.setOnes();
+  MakeTrain();
+  if (narrow) narrow->ShowTurns(joints);
+}
+
+// The logs as delay and turns ask for them.
+void Diagnosis::Work::MakeTrain() {
+  changed.clear();
+  for (const auto* log : logged) {
+    changed.push_back(delay_s != 0 ? calibration::Delayed(*log, delay_s) : *log);
+    for (int j = 0; j < model.joints(); ++j)
+      if (turns[static_cast<std::size_t>(j)]) calibration::UseTurns(changed.back(), j);
+  }
+  for (std::size_t k = 0; k < train.size(); ++k) train[k] = &changed[k];
   regressor.clear();
   evidence.logs.clear();
   IndexRows();
-  if (narrow) narrow->SetDelay(by_s);
 }
 
 std::vector<NoiseModel> Diagnosis::Work::WhiteNoise() const {
@@ -282,7 +340,9 @@ VectorXd Diagnosis::Work::SlopeOverModelTorque(const std::vector<const Chosen*>&
       for (std::size_t l = 0; l < kept.size(); ++l) evidence.logs[l].tau_model.col(j) = kept[l];
       return out;
     };
-    const VectorXd slope = (torque(step) - torque(-step)) / (2 * step);
+    VectorXd slope = (torque(step) - torque(-step)) / (2 * step);
+    if (const VectorXd& weight = evidence.index[static_cast<std::size_t>(j)].weight; weight.size())
+      slope = slope.cwiseQuotient(weight);
     sum = sum.size() ? VectorXd(sum + slope) : slope;
   }
   return sum;

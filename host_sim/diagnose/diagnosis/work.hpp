@@ -71,6 +71,12 @@ struct Diagnosis::Work {
   // From now on, shifts the motion of the logs against their torque by the delay that the confirmed terms found.
   void AlignLogs();
   void SetDelay(double by_s);
+  // From now on, fits these joints also near turns and at rest. (1: yes)
+  void ShowTurns(const std::vector<char>& joints);
+  // Weighs the rows near turns and at rest by what these terms leave there.
+  void WeighTurns(const std::vector<const Chosen*>& terms);
+  void MakeTrain();
+  void WeighRows();
   void IndexRows();
   void StartRows();
   void FillDeclared(int j);
@@ -83,8 +89,11 @@ struct Diagnosis::Work {
   codegen::ArmTorque arm;
   std::vector<const calibration::Dataset*> train;
   std::vector<const calibration::Dataset*> logged;  // as given
-  std::vector<calibration::Dataset> delayed;        // train points here once a delay has been applied
+  std::vector<calibration::Dataset> changed;        // train points here once a delay or turns have been applied
   double delay_s = 0;                               // applied
+  std::vector<char> turns;                          // [joint] 1: rows near turns and at rest are fitted, too
+  Eigen::VectorXd turn_weight;                      // [joint] of these rows
+  std::vector<Eigen::VectorXd> sliding;             // [joint] share of each row's samples that are not such rows
   calibration::Prior prior;
   calibration::Fit declared;
   std::vector<std::unique_ptr<Candidate>> candidates;

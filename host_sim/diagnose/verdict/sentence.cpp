@@ -88,16 +88,19 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   if (!v.train || v.train->empty()) return out;
   const int n = v.model->joints();
   std::string band, left_out;
-  double slowest = 0, fastest = 0;
+  double slowest = 0, fastest = 0, saved_Hz = INFINITY;
   std::vector<int> standing;
   for (int j = 0; j < n; ++j) {
     double lowest = 0, used = 0, samples = 0, moving = 0;
     for (const calibration::Dataset& d : *v.train) {
       if (j < d.cutoff_Hz.size()) {
         const double reach_Hz = j < d.band_Hz.size() ? std::min(d.cutoff_Hz[j], d.band_Hz[j]) : d.cutoff_Hz[j];
+        if (j < d.saved_Hz.size()) saved_Hz = std::min(saved_Hz, d.saved_Hz[j]);
         lowest = lowest > 0 ? std::min(lowest, reach_Hz) : reach_Hz;
       }
-      used += d.used.col(j).sum(), moving += d.moving.col(j).sum(), samples += d.samples();
+      const auto& turned = v.finding->at_turns;
+      const bool all = std::find(turned.begin(), turned.end(), j) != turned.end();
+      used += (all ? d.sound : d.used).col(j).sum(), moving += d.moving.col(j).sum(), samples += d.samples();
     }
     slowest = j == 0 ? lowest : std::min(slowest, lowest), fastest = std::max(fastest, lowest);
     band += fmt::format("{}{:.3g}", j == 0 ? "" : ", ", lowest);
@@ -109,6 +112,8 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
         "motion faster than {} Hz (joints 1 to {}): above that the derived speeds and accelerations are filtered or "
         "mostly noise",
         band, n));
+  if (std::isfinite(saved_Hz))
+    out.push_back(fmt::format("torque above {:.3g} Hz: it was filtered away before the logs were saved", saved_Hz));
   out.push_back(
       fmt::format("rows at rest, near a turn and beside gaps: {} % of the samples of joints 1 to {}; presliding "
                   "and breakaway show there",

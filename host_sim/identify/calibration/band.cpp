@@ -8,6 +8,8 @@
 #include <complex>
 #include <numbers>
 
+#include "host_sim/data/logs/butterworth.hpp"
+
 namespace armcal::calibration {
 
 using Eigen::Index;
@@ -41,11 +43,66 @@ VectorXd Bridged(VectorXd y, const Eigen::VectorXi& used) {
   return y;
 }
 
+constexpr int kBins = 64;               // of a spectrum up to half the sample rate
+constexpr double kFilteredAway = 1e-2;  // of the torque's power over the prediction's
+constexpr double kSteep = 1.5;          // the factor in frequency within which that happens
+constexpr double kHalfway = 0.25;       // of that ratio at the edge
+
+// Power of the first kBins bins in evenly spaced samples, by Welch's method with Blackman and Harris' window: what
+// leaks is 92 dB down. Empty: too few samples.
+VectorXd Power(const VectorXd& y) {
+  const Index size = 2 * kBins;
+  VectorXd out = VectorXd::Zero(kBins);
+  Eigen::FFT<double> fft;
+  std::vector<double> part(static_cast<std::size_t>(size));
+  std::vector<std::complex<double>> spectrum;
+  int segments = 0;
+  for (Index first = 0; first + size <= y.size(); first += size / 2, ++segments) {
+    const double mean = y.segment(first, size).mean();
+    for (Index k = 0; k < size; ++k) {
+      const double x = 2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(size);
+      part[static_cast<std::size_t>(k)] =
+          (y[first + k] - mean) *
+          (0.35875 - 0.48829 * std::cos(x) + 0.14128 * std::cos(2 * x) - 0.01168 * std::cos(3 * x));
+    }
+    fft.fwd(spectrum, part);
+    for (Index k = 0; k < kBins; ++k) out[k] += std::norm(spectrum[static_cast<std::size_t>(k)]);
+  }
+  return segments < kFewSegments ? VectorXd() : out;
+}
+
+double Rate_Hz(const VectorXd& t) { return static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]); }
+
 }  // namespace
+
+double FilteredAbove_Hz(const Dataset& data, int joint, const VectorXd& predicted) {
+  const VectorXd torque = Power(data.tau.col(joint)), model = Power(predicted);
+  if (torque.size() == 0) return INFINITY;
+  // Three bins at a time: a single one may be empty by chance.
+  const auto ratio = [&](Index k) { return torque.segment(k - 1, 3).sum() / (model.segment(k - 1, 3).sum() + 1e-300); };
+  for (Index k = 2; kSteep * static_cast<double>(k) + 1 < kBins; ++k) {
+    const auto above = static_cast<Index>(kSteep * static_cast<double>(k));
+    if (ratio(above) > kFilteredAway * ratio(k)) continue;
+    double highest = 0;
+    for (Index i = above; i + 1 < kBins; ++i) highest = std::max(highest, ratio(i));
+    if (highest > kFilteredAway * ratio(k)) continue;
+    Index edge = k;
+    while (ratio(edge) > kHalfway * ratio(k)) ++edge;
+    return static_cast<double>(edge) * Rate_Hz(data.s.t) / (2 * kBins);
+  }
+  return INFINITY;
+}
+
+Eigen::MatrixXd AsSaved(const Dataset& data, Eigen::MatrixXd torque) {
+  for (Index j = 0; j < data.saved_Hz.size(); ++j)
+    if (const double rate_Hz = Rate_Hz(data.s.t); data.saved_Hz[j] < 0.5 * rate_Hz)
+      torque.col(j) = logs::ZeroPhaseLowPass(torque.col(j), data.saved_Hz[j], rate_Hz);
+  return torque;
+}
 
 std::vector<TransferBand> Transfer(const Dataset& data, int joint, const VectorXd& predicted) {
   const VectorXd& t = data.s.t;
-  const double rate_Hz = static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]);
+  const double rate_Hz = Rate_Hz(t);
   const Index size = static_cast<Index>(kSegment_s * rate_Hz) / 2 * 2;
   std::vector<TransferBand> out;
   if (size < 16 || t.size() < size) return out;

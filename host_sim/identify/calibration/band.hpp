@@ -22,6 +22,13 @@ std::vector<TransferBand> Transfer(const Dataset& data, int joint, const Eigen::
 // below half the sample rate.
 double AgreedBand_Hz(const std::vector<TransferBand>& transfer);
 
+// The frequency above which the torque of a log was filtered away before it was saved: there it falls by two decades
+// of power or more against the prediction, within half an octave. Infinity: nowhere.
+double FilteredAbove_Hz(const Dataset& data, int joint, const Eigen::VectorXd& predicted);
+
+// A predicted torque [N x n] as the log's torque channels would have saved it.
+Eigen::MatrixXd AsSaved(const Dataset& data, Eigen::MatrixXd torque);
+
 // One row a half period of band_Hz: the Gaussian average, 3 dB down at band_Hz, of the used samples about it. Columns
 // and torque pass the same average, so a model that holds at every sample holds for the rows. [rows x samples]
 Eigen::SparseMatrix<double, Eigen::RowMajor> AverageRows(const Dataset& data, int joint);

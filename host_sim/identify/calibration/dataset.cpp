@@ -16,6 +16,7 @@ constexpr int kFlagSaturated = 2, kFlagStale = 4;
 // close to a slower or opposite speed are not fitted. The drive's signal path asks the same of its five averages.
 constexpr int kTurn = 2;
 constexpr double kWholeBand = 0.2;  // of the sample rate: averages down to it would hold two samples each
+constexpr double kBelowEdge = 1.5;  // edge over band: what the two filters do differently at the edge is 7 dB down then
 constexpr double kOfAPeriod = 10;   // samples of a period of the band that a thinned log keeps
 constexpr double kAboveBand = 1.5;  // cut-off over band: the filter then takes 4 % of what is at the band's edge
 constexpr int kPoses = 8;           // at a single one an entry of the mass matrix may vanish
@@ -30,11 +31,11 @@ Dataset Derive(const codegen::Model& model, const logs::Log& log, const logs::Se
   d.s.q = derived.q, d.s.qd = derived.qd, d.s.qdd = derived.qdd;
   d.s.temp = log.temp;
   d.cutoff_Hz = derived.cutoff_Hz;
-  d.band_Hz.setConstant(n, INFINITY);
+  d.band_Hz.setConstant(n, INFINITY), d.saved_Hz.setConstant(n, INFINITY);
   d.reference = log.qref;
   d.tau = log.tau;
   if (log.ext.cols() == n) d.tau += log.ext;  // an external force along +q does part of the motor's work
-  d.moving.setZero(samples, n), d.used.setZero(samples, n), d.scored.setZero(samples);
+  d.moving.setZero(samples, n), d.used.setZero(samples, n), d.sound.setZero(samples, n), d.scored.setZero(samples);
   const auto turning = [&](int k, int j) {
     for (int m = std::max(0, k - kTurn); m <= std::min(samples - 1, k + kTurn); ++m)
       if (d.s.qd(m, j) * d.s.qd(k, j) <= 0 || std::abs(d.s.qd(m, j)) <= model.robot().joint[j].v_min_radps) return true;
@@ -51,7 +52,8 @@ Dataset Derive(const codegen::Model& model, const logs::Log& log, const logs::Se
     for (int j = 0; j < n; ++j) {
       d.moving(k, j) = std::abs(d.s.qd(k, j)) > model.robot().joint[j].v_min_radps;
       const bool flagged = log.flags.cols() == n && (log.flags(k, j) & (kFlagSaturated | kFlagStale));
-      d.used(k, j) = derived.settled[k] && !flagged && (!sticks(j) || (d.moving(k, j) && !turning(k, j)));
+      d.sound(k, j) = derived.settled[k] && !flagged;
+      d.used(k, j) = d.sound(k, j) && (!sticks(j) || (d.moving(k, j) && !turning(k, j)));
     }
   }
   return d;
@@ -73,11 +75,34 @@ void LimitBands(Dataset& d, const Eigen::VectorXd& band_Hz) {
     if (std::isfinite(band_Hz[j])) d.average[static_cast<std::size_t>(j)] = AverageRows(d, j);
 }
 
-// [n] The log itself shows up to which frequency torque follows the prediction. Noise of one joint's acceleration is in
-// every row: no joint's band goes beyond the median of those that end.
-Eigen::VectorXd SeenBands_Hz(const codegen::Model& model, const Dataset& d) {
-  const Fit fit = WeightedFit(model, {&d});
-  const Eigen::MatrixXd predicted = Predict(model, d, fit.x, fit.eta);
+}  // namespace
+
+void UseTurns(Dataset& d, int joint) {
+  if (d.slides.size() == 0) d.slides = d.used;
+  d.used.col(joint) = d.sound.col(joint);
+  if (d.averaged(joint)) d.average[static_cast<std::size_t>(joint)] = AverageRows(d, joint);
+}
+
+namespace {
+
+// Where the torque was filtered before it was saved, the change of friction's sign at a turn was, too. The averages
+// pass over a turn: the samples near it count. A joint that stands does not.
+void PassTurns(Dataset& d, int j) {
+  const double step_s = (d.s.t[d.samples() - 1] - d.s.t[0]) / (d.samples() - 1);
+  const int reach = static_cast<int>(std::ceil(0.5 / (d.saved_Hz[j] * step_s)));
+  for (int k = 0; k < d.samples(); ++k) {
+    const int first = std::max(0, k - reach), last = std::min(d.samples() - 1, k + reach);
+    d.used(k, j) = d.sound(k, j) && d.moving.col(j).segment(first, last - first + 1).any();
+  }
+}
+
+// The log itself shows up to which frequency torque follows the prediction.
+struct SeenBands {
+  Eigen::VectorXd agreed_Hz, saved_Hz;  // [n]
+};
+
+// Noise of one joint's acceleration is in every row: no joint's band goes beyond the median of those that end.
+Eigen::VectorXd Agreed_Hz(const Dataset& d, const Eigen::MatrixXd& predicted) {
   Eigen::VectorXd out(d.joints());
   for (int j = 0; j < d.joints(); ++j) out[j] = AgreedBand_Hz(Transfer(d, j, predicted.col(j)));
   std::vector<double> seen;
@@ -89,6 +114,16 @@ Eigen::VectorXd SeenBands_Hz(const codegen::Model& model, const Dataset& d) {
   const double rate_Hz = static_cast<double>(d.samples() - 1) / (d.s.t[d.samples() - 1] - d.s.t[0]);
   for (double& band_Hz : out)
     if (band_Hz > kWholeBand * rate_Hz) band_Hz = INFINITY;
+  return out;
+}
+
+SeenBands SeeBands(const codegen::Model& model, Dataset& d) {
+  const Fit fit = WeightedFit(model, {&d});
+  const Eigen::MatrixXd predicted = Predict(model, d, fit.x, fit.eta);
+  SeenBands out{{}, Eigen::VectorXd(d.joints())};
+  for (int j = 0; j < d.joints(); ++j) out.saved_Hz[j] = FilteredAbove_Hz(d, j, predicted.col(j));
+  d.saved_Hz = out.saved_Hz;
+  out.agreed_Hz = Agreed_Hz(d, AsSaved(d, predicted));
   return out;
 }
 
@@ -145,10 +180,14 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
   if (bandwidth.cutoff_Hz > 0) return Derive(model, log, sensitivity, bandwidth);
   const Eigen::VectorXd chosen_Hz = logs::ChooseCutoffs_Hz(log, sensitivity);
   Dataset out = Derive(model, log, sensitivity, {0, 1, chosen_Hz});
-  const Eigen::VectorXd band_Hz = SeenBands_Hz(model, out), each_Hz = chosen_Hz.cwiseMin(kAboveBand * band_Hz);
+  const SeenBands seen = SeeBands(model, out);
+  const Eigen::VectorXd each_Hz = chosen_Hz.cwiseMin(kAboveBand * seen.agreed_Hz);
   if (bandwidth.scale != 1 || each_Hz != chosen_Hz)
     out = Derive(model, log, sensitivity, {0, bandwidth.scale, each_Hz});
-  LimitBands(out, band_Hz);
+  out.saved_Hz = seen.saved_Hz;
+  for (int j = 0; j < n; ++j)
+    if (std::isfinite(out.saved_Hz[j])) PassTurns(out, j);
+  LimitBands(out, seen.agreed_Hz.cwiseMin(out.saved_Hz / kBelowEdge));
   return out;
 }
 
@@ -165,7 +204,9 @@ Dataset ThinToBand(const Dataset& d) {
        {std::pair{&d.s.q, &out.s.q}, std::pair{&d.s.qd, &out.s.qd}, std::pair{&d.s.qdd, &out.s.qdd},
         std::pair{&d.s.temp, &out.s.temp}, std::pair{&d.reference, &out.reference}})
     if (from->rows() > 0) *to = (*from)(kept, Eigen::all);
-  out.moving = d.moving(kept, Eigen::all), out.used = d.used(kept, Eigen::all), out.scored = d.scored(kept);
+  out.moving = d.moving(kept, Eigen::all), out.used = d.used(kept, Eigen::all);
+  if (d.sound.size() > 0) out.sound = d.sound(kept, Eigen::all);
+  out.scored = d.scored(kept);
   out.tau.resize(samples, d.joints());
   for (int k = 0; k < samples; ++k) {
     const auto about = Eigen::seqN(k * every, 2 * reach + 1);
@@ -226,6 +267,8 @@ Dataset Delayed(const Dataset& data, double delay_s) {
     k = std::min(k, last - 1);
     while (k + 1 < last && t[k + 1] <= time) ++k;
     while (k > 0 && t[k] > time) --k;
+    if (data.sound.size() > 0)
+      out.sound.row(i) = data.sound.row(i).cwiseMin(data.sound.row(k).cwiseMin(data.sound.row(k + 1)));
     out.used.row(i) = data.used.row(i).cwiseMin(data.used.row(k).cwiseMin(data.used.row(k + 1)));
     const Eigen::Index first = std::clamp<Eigen::Index>(k - 1, 0, last - 3);
     double weight[4];

@@ -18,9 +18,12 @@ struct Dataset {
   Eigen::MatrixXd tau;        // [N x n] measured torque minus known external torque
   Eigen::MatrixXi moving;     // [N x n] 1: |qd| > v_min of that joint
   Eigen::MatrixXi used;       // [N x n] 1: row may be fitted (moving, signals settled, drive did not flag it)
+  Eigen::MatrixXi slides;     // [N x n] 1: used before UseTurns
+  Eigen::MatrixXi sound;      // [N x n] 1: signals settled and not flagged, also near turns and at rest
   Eigen::VectorXi scored;     // [N] 1: at least 0.5 s away from both ends of the log
   Eigen::VectorXd cutoff_Hz;  // [n]
   Eigen::VectorXd band_Hz;    // [n] up to which torque and model are compared; infinity: as far as the log goes
+  Eigen::VectorXd saved_Hz;   // [n] above it the torque was filtered away before it was saved; infinity: nowhere
   // [n] where the band is limited: the averages of samples that are fitted. Elsewhere empty: each used sample is a row.
   std::vector<Eigen::SparseMatrix<double, Eigen::RowMajor>> average;
   Eigen::MatrixXd reference;  // [N x n] commanded position; empty where the log has none
@@ -34,6 +37,9 @@ struct Dataset {
 // The cut-off and the band depend on the arm's inertia. That comes from the prior or, without one, from a first fit of
 // this log.
 Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::Bandwidth& bandwidth = {});
+
+// From now on this joint's rows near turns and at rest are used, too.
+void UseTurns(Dataset& data, int joint);
 
 // The log with so few samples that its averages still hold ten a period of the widest band; torque is the mean about
 // each kept sample. The same log where a joint's band is not limited.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "host_sim/identify/calibration/band.hpp"
 #include "host_sim/identify/calibration/gram_kernel.hpp"
 
 namespace armcal::calibration {
@@ -147,7 +148,7 @@ Eigen::MatrixXd Predict(const codegen::Model& model, const Dataset& data, const 
     }
   };
   model.ForEachBlock(data.s, {x.data(), static_cast<std::size_t>(columns)}, eta, add);
-  return tau;
+  return AsSaved(data, std::move(tau));
 }
 
 }  // namespace armcal::calibration

@@ -70,6 +70,7 @@ class SyntheticArm {
     for (const int j : still) d.s.qd.col(j).setZero(), d.s.qdd.col(j).setZero(), d.s.q.col(j).setConstant(0.3);
     KdlArm arm(robot, bodies_);
     d.moving.setZero(samples, n), d.used.setZero(samples, n), d.scored.setZero(samples);
+    d.sound.setOnes(samples, n);
     for (int k = 0; k < samples; ++k) {
       const Eigen::VectorXd rigid = arm.Torque(d.s.q.row(k), d.s.qd.row(k), d.s.qdd.row(k));
       d.scored[k] = d.s.t[k] >= 0.5 && d.s.t[k] <= d.s.t[samples - 1] - 0.5;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <memory>
 #include <numbers>
 
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
@@ -47,6 +48,29 @@ Effect Resonance(int joint, double size_Nm) {
   };
 }
 
+// Springs that slip, each at its own force: what bristles and gear teeth do near a turn. A log is one run: the springs
+// start anew where the position jumps.
+Effect Springs(int joint, double level_Nm) {
+  struct Memory {
+    double q = NAN, force[3] = {};
+  };
+  const auto memory = std::make_shared<Memory>();
+  return [=](const State& s) {
+    if (s.joint != joint - 1) return 0.0;
+    constexpr double kLength_rad[] = {0.004, 0.015, 0.05}, kShare[] = {0.4, 0.35, 0.25};
+    double sum = 0;
+    const bool starts = !(std::abs(s.q - memory->q) < 0.1);
+    for (int c = 0; c < 3; ++c) {
+      double& force = memory->force[c];
+      const double most = kShare[c] * level_Nm;
+      force = starts ? most * Sign(s.qd) : std::clamp(force + most * (s.q - memory->q) / kLength_rad[c], -most, most);
+      sum += force;
+    }
+    memory->q = s.q;
+    return sum - level_Nm * Sign(s.qd);  // the declared Coulomb friction holds what is left in sliding
+  };
+}
+
 codegen::Robot TwoLink() { return codegen::ReadRobot("codegen/robots/two_link.toml"); }
 
 struct Case {
@@ -84,6 +108,23 @@ struct Case {
     return calibration::Rms(test, held_out.after, true)[joint - 1];
   }
 };
+
+// Slow motion with many turns, and rows near them that count.
+TEST(Diagnosis, SpringsThatSlip_AreNamedHysteresis_AndSlidingFrictionIsNot) {
+  const auto slow = [](Dataset& d) {
+    for (int j = 0; j < d.joints(); ++j)
+      for (int k = 0; k < d.samples(); ++k) d.used(k, j) &= std::abs(d.s.qd(k, j)) > 0.06;
+  };
+  Case c(Springs(1, 3), 7, slow);
+  ASSERT_FALSE(c.finding().terms.empty());
+  EXPECT_TRUE(c.Names("hysteresis", 1)) << c.Said();
+  const HeldOut held_out = c.diagnosis->Judge(c.test);
+  const double before = calibration::Rms(c.test, held_out.before, false)[0],
+               after = calibration::Rms(c.test, held_out.after, false)[0];
+  EXPECT_LT(after, 0.5 * before);
+  Case nothing({}, 8, slow);
+  EXPECT_TRUE(nothing.finding().terms.empty()) << nothing.Said();
+}
 
 TEST(Diagnosis, RationalStribeck_IsNamedAtItsJoint) {
   Case c(RationalStribeck(2, 0.4), 1);

@@ -77,7 +77,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   for (const calibration::Dataset& log : read.Narrow(o.train)) narrow.push_back(calibration::ThinToBand(log));
   const auto start = std::chrono::steady_clock::now();
   run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, calibration::Pointers(run->train),
-                                                          calibration::Pointers(narrow));
+                                                          calibration::Pointers(narrow), o.at_turns);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const diagnosis::Finding& finding = run->diagnosis->finding();
 
@@ -182,6 +182,9 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
   AddCutoff(*verb, o->cutoff_Hz);
+  verb->add_flag(
+      "--turns", o->at_turns,
+      "look at the rows near turns and at rest, too: friction that builds up over a displacement, or sticks");
   verb->add_option("--json", o->json, "write the verdict here");
   verb->add_option("--report", o->report, "write a self-contained page here");
   verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");

@@ -13,6 +13,7 @@ namespace armcal::tool {
 struct DiagnoseOptions {
   std::string robot, channels, test, json, report, model_out;
   std::vector<std::string> train;
+  bool at_turns = false;
   double cutoff_Hz = 0;
 };
 

@@ -55,6 +55,7 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& o
     add("--train", c.train), add("--test", c.test);
     add("--json", {file(".json")}), add("--report", {file(".html")}), add("--model-out", {file(".toml")});
     if (!one.channels.empty()) add("--channels", {one.channels});
+    if (one.at_turns) add("--turns", {});
     if (one.cutoff_Hz > 0) add("--cutoff", {fmt::format("{}", one.cutoff_Hz)});
     const int code = RunProgram(words, file(".log"));
     if (code == kOk) return verdict::ReadVerdict(file(".json"));

@@ -116,8 +116,8 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
     out.push_back(fmt::format("torque above {:.3g} Hz: it was filtered away before the logs were saved", saved_Hz));
   out.push_back(
       fmt::format("rows at rest, near a turn and beside gaps: {} % of the samples of joints 1 to {}; presliding "
-                  "and breakaway show there",
-                  left_out, n));
+                  "and breakaway show there{}",
+                  left_out, n, v.finding->at_turns.empty() ? " (--turns looks at them)" : ""));
   if (!standing.empty())
     out.push_back(
         fmt::format("joint{} {}: at rest in the training logs", standing.size() > 1 ? "s" : "", JointGroup(standing)));

@@ -46,7 +46,8 @@ VectorXd Bridged(VectorXd y, const Eigen::VectorXi& used) {
 constexpr int kBins = 64;               // of a spectrum up to half the sample rate
 constexpr double kFilteredAway = 1e-2;  // of the torque's power over the prediction's
 constexpr double kSteep = 1.5;          // the factor in frequency within which that happens
-constexpr double kHalfway = 0.25;       // of that ratio at the edge
+constexpr Index kAboveMotion = 14;  // bin: who brings a log to a lower rate filters at an eighth of that rate or above
+constexpr double kHalfway = 0.25;   // of that ratio at the edge
 
 // Power of the first kBins bins in evenly spaced samples, by Welch's method with Blackman and Harris' window: what
 // leaks is 92 dB down. Empty: too few samples.
@@ -80,7 +81,7 @@ double FilteredAbove_Hz(const Dataset& data, int joint, const VectorXd& predicte
   if (torque.size() == 0) return INFINITY;
   // Three bins at a time: a single one may be empty by chance.
   const auto ratio = [&](Index k) { return torque.segment(k - 1, 3).sum() / (model.segment(k - 1, 3).sum() + 1e-300); };
-  for (Index k = 2; kSteep * static_cast<double>(k) + 1 < kBins; ++k) {
+  for (Index k = kAboveMotion; kSteep * static_cast<double>(k) + 1 < kBins; ++k) {
     const auto above = static_cast<Index>(kSteep * static_cast<double>(k));
     if (ratio(above) > kFilteredAway * ratio(k)) continue;
     double highest = 0;

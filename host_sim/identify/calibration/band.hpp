@@ -22,8 +22,9 @@ std::vector<TransferBand> Transfer(const Dataset& data, int joint, const Eigen::
 // below half the sample rate.
 double AgreedBand_Hz(const std::vector<TransferBand>& transfer);
 
-// The frequency above which the torque of a log was filtered away before it was saved: there it falls by two decades
-// of power or more against the prediction, within half an octave. Infinity: nowhere.
+// The frequency above which the torque of a log was filtered away when it was brought to its rate: there it falls by two
+// decades of power or more against the prediction, within half an octave. Lower edges than a ninth of the rate are not
+// looked for: motion ends there, and what is left of the prediction is noise. Infinity: nowhere.
 double FilteredAbove_Hz(const Dataset& data, int joint, const Eigen::VectorXd& predicted);
 
 // A predicted torque [N x n] as the log's torque channels would have saved it.

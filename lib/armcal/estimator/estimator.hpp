@@ -80,6 +80,8 @@ class Estimator {
     estimates_.generation = table.committed.generation;
     statistics_.Restart(adopted_tick);
     gate_.Restart();
+    moved_ = 0;
+    known_due_ = true;
     if constexpr (Filter::kExtended) live_.Restart();
     stage_ = Stage::kIdle;
     credit_ = 0;
@@ -205,15 +207,14 @@ class Estimator {
     return true;
   }
 
-  // Decides which rows of the sample are outside the gate, from what was known before the sample: the last read-out,
-  // and the rows before.
+  // Decides which rows of the sample are outside the gate, from what was known before the sample.
   void JudgeRows() {
     outside_ = 0;
     for (int i = 0; i < n; ++i) {
       const float tau_Nm = intake_.sample().tau[i], whiten = 1.0f / table_->sigma_Nm[i];
       load_Nm_[i] = model::LoadTorque(table_->committed.p, intake_.rows(), i);
       tau_model_Nm_[i] = model::RowTorque(table_->committed.p, intake_.rows(), i, load_Nm_[i]);
-      const float known_Nm = model::RowTorque(estimates_.value, FilterRows(), i);
+      const float known_Nm = model::RowTorque(known_, FilterRows(), i);
       const bool moves = ((intake_.moving() >> i) & 1u) != 0u;
       const bool inside = gate_.Admit(i, (tau_Nm - tau_model_Nm_[i]) * whiten, (tau_Nm - known_Nm) * whiten, moves,
                                       intake_.sample().qd[i] > 0.0f, table_->gate_sigma[i]);
@@ -272,6 +273,7 @@ class Estimator {
 
   void FinishSample() {
     const std::uint32_t tick = intake_.sample().tick;
+    if (intake_.moving() != 0u && ++moved_ % publish_every_ == 0u) read_out_due_ = known_due_ = true;
     statistics_.EndSample(tick);
     estimates_.tick = tick;
     if (observer_ != nullptr) Observe();
@@ -292,6 +294,8 @@ class Estimator {
 
   void Publish() {
     FromPriorUnits(*table_, read_out_, estimates_);
+    for (int c = 0; c < Model::kColumns && known_due_; ++c) known_[c] = estimates_.value[c];
+    known_due_ = false;
     if constexpr (Filter::kExtended) estimates_.clamps = filter_.clamp_count();
     statistics_.Publish(estimates_);
     estimates_.stale = intake_.stale();
@@ -313,6 +317,10 @@ class Estimator {
   RowGate<n> gate_;
   Estimates<Model> estimates_;
   float load_Nm_[n] = {}, tau_model_Nm_[n] = {};
+  // What the gate knows: the estimates after every so many samples in motion, whoever else asks for a read-out. So the
+  // same motion gives the same rows, also to a program on a PC that has not seen the rest before it.
+  float known_[Model::kColumns] = {};
+  std::uint32_t moved_ = 0;  // samples in motion since the adoption
   int credit_ = 0, slice_ = filter::kSliceCredit;
   const std::uint32_t reader_ = intake_.Join();  // this estimator's bit
   std::uint32_t updating_ = 0, used_ = 0;        // joints, a bit each: rows that may change the estimate, and that did
@@ -324,6 +332,7 @@ class Estimator {
   int joint_ = 0;
   Stage stage_ = Stage::kIdle;
   bool read_out_due_ = false;
+  bool known_due_ = false;  // the next read-out is the gate's
   bool hold_ = false;
   bool stands_ = false;  // nothing has changed since the read-out
 };

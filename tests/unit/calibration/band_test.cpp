@@ -95,7 +95,7 @@ VectorXd Decimation(const VectorXd& x, double edge_Hz) {
 TEST(Band, AFilterBeforeTheLogWasSaved_IsFoundAtItsEdge) {
   const VectorXd motion = LowPass(White(8, 1), 3);
   // The spectrum has a bin every 0.8 Hz, and three are taken together.
-  for (const double edge_Hz : {8.0, 15.0, 28.0})
+  for (const double edge_Hz : {15.0, 20.0, 28.0})
     EXPECT_NEAR(FilteredAbove_Hz(OneJoint(Decimation(motion + White(9, 0.1), edge_Hz)), 0, motion), edge_Hz, 1.6);
 }
 

@@ -79,10 +79,12 @@ struct Case {
   std::unique_ptr<Diagnosis> diagnosis;
 
   // change: what happens to a log beside the effect.
-  Case(const Effect& effect, std::uint64_t seed, const std::function<void(Dataset&)>& change = {})
+  Case(const Effect& effect, std::uint64_t seed, const std::function<void(Dataset&)>& change = {},
+       bool at_turns = false)
       : arm(TwoLink(), seed), train(arm.Run(20, 10 * seed, effect)), test(arm.Run(20, 10 * seed + 1, effect)) {
     if (change) change(train), change(test);
-    diagnosis = std::make_unique<Diagnosis>(arm.model(), tests::Records(), std::vector<const Dataset*>{&train});
+    diagnosis = std::make_unique<Diagnosis>(arm.model(), tests::Records(), std::vector<const Dataset*>{&train},
+                                            std::vector<const Dataset*>{}, at_turns);
   }
   const Finding& finding() const { return diagnosis->finding(); }
   std::string Said() const {
@@ -115,14 +117,14 @@ TEST(Diagnosis, SpringsThatSlip_AreNamedHysteresis_AndSlidingFrictionIsNot) {
     for (int j = 0; j < d.joints(); ++j)
       for (int k = 0; k < d.samples(); ++k) d.used(k, j) &= std::abs(d.s.qd(k, j)) > 0.06;
   };
-  Case c(Springs(1, 3), 7, slow);
+  Case c(Springs(1, 3), 7, slow, true);
   ASSERT_FALSE(c.finding().terms.empty());
   EXPECT_TRUE(c.Names("hysteresis", 1)) << c.Said();
   const HeldOut held_out = c.diagnosis->Judge(c.test);
   const double before = calibration::Rms(c.test, held_out.before, false)[0],
                after = calibration::Rms(c.test, held_out.after, false)[0];
   EXPECT_LT(after, 0.5 * before);
-  Case nothing({}, 8, slow);
+  Case nothing({}, 8, slow, true);
   EXPECT_TRUE(nothing.finding().terms.empty()) << nothing.Said();
 }
 

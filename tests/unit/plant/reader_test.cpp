@@ -48,7 +48,7 @@ TEST(RobotReader, OfABadFile_NamesFileKeyAndWhatWasExpected) {
   EXPECT_MESSAGE(error("\"prismatic\"", "\"screw\""), "joint[2].type", "revolute");
   EXPECT_MESSAGE(error("torque_limit_N = ", "torque_limit_Nm = "), "joint[2].torque_limit_N");
   EXPECT_MESSAGE(error("[0.2, 0.05, -0.1]", "[0.2, 0.05]"), "joint[1].link.center_m", "3 numbers");
-  EXPECT_MESSAGE(error("mass_kg = 3.0", "mass_kg = \"heavy\""), "joint[1].link.mass_kg", "a finite number");
+  EXPECT_MESSAGE(error("mass_kg = 3.0", "mass_kg = \"heavy\""), "joint[1].link.mass_kg", "a number above zero");
   EXPECT_MESSAGE(error("dh = \"modified\"", "dh = \"mine\""), "dh: expected", "standard");
   EXPECT_MESSAGE(error("name = \"test_arm\"", "name = "), "bad.toml: line 1, ");
   EXPECT_MESSAGE(ErrorOf([] { ReadRobotFile("no/such/robot.toml"); }), "no/such/robot.toml");
@@ -59,7 +59,7 @@ TEST(ScenarioReader, OfABadFile_NamesFileKeyAndWhatWasExpected) {
   const std::string ripple = "[[effect]]\nkind = \"torque_ripple\"\njoint = 1\n";
   EXPECT_EQ(error(ripple + "per_motor_turn = 1\nfirst_Nm = 1\n"), "");
   EXPECT_MESSAGE(error("colour = 3\n"), "scenario.toml: colour: unknown key", "stick_ratio");
-  EXPECT_MESSAGE(error(ripple + "per_motor_turn = 1\n"), "effect[1].first_Nm", "a finite number");
+  EXPECT_MESSAGE(error(ripple + "per_motor_turn = 1\n"), "effect[1].first_Nm", "missing, expected a number");
   EXPECT_MESSAGE(error(ripple + "per_motor_turn = 1\nfirst_Nm = 1\nfirst = 2\n"), "effect[1].first: unknown key");
   EXPECT_MESSAGE(error("[[effect]]\nkind = \"magic\"\njoint = 1\n"), "effect[1].kind", "stribeck", "payload_step");
   EXPECT_MESSAGE(error("[[effect]]\nkind = \"stribeck\"\njoint = 0\n"), "effect[1].joint", "an integer from 1");

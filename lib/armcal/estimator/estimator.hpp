@@ -80,7 +80,7 @@ class Estimator {
     estimates_.generation = table.committed.generation;
     statistics_.Restart(adopted_tick);
     gate_.Restart();
-    moved_ = 0;
+    period_ = adopted_tick / Model::kSampleTicks / publish_every_;
     known_due_ = true;
     if constexpr (Filter::kExtended) live_.Restart();
     stage_ = Stage::kIdle;
@@ -273,7 +273,9 @@ class Estimator {
 
   void FinishSample() {
     const std::uint32_t tick = intake_.sample().tick;
-    if (intake_.moving() != 0u && ++moved_ % publish_every_ == 0u) read_out_due_ = known_due_ = true;
+    const std::uint32_t period = tick / Model::kSampleTicks / publish_every_;
+    if (period != period_) read_out_due_ = known_due_ = true;
+    period_ = period;
     statistics_.EndSample(tick);
     estimates_.tick = tick;
     if (observer_ != nullptr) Observe();
@@ -317,10 +319,10 @@ class Estimator {
   RowGate<n> gate_;
   Estimates<Model> estimates_;
   float load_Nm_[n] = {}, tau_model_Nm_[n] = {};
-  // What the gate knows: the estimates after every so many samples in motion, whoever else asks for a read-out. So the
-  // same motion gives the same rows, also to a program on a PC that has not seen the rest before it.
+  // What the gate knows: the estimates at the first sample of each period of ticks, whoever else asks for a read-out.
+  // So the same motion gives the same rows, also to a program on a PC that has not seen the rest before it.
   float known_[Model::kColumns] = {};
-  std::uint32_t moved_ = 0;  // samples in motion since the adoption
+  std::uint32_t period_ = 0;
   int credit_ = 0, slice_ = filter::kSliceCredit;
   const std::uint32_t reader_ = intake_.Join();  // this estimator's bit
   std::uint32_t updating_ = 0, used_ = 0;        // joints, a bit each: rows that may change the estimate, and that did

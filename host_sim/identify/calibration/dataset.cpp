@@ -212,6 +212,7 @@ Dataset ThinToBand(const Dataset& d) {
     const auto about = Eigen::seqN(k * every, 2 * reach + 1);
     out.tau.row(k) = d.tau(about, Eigen::all).colwise().mean();
     out.used.row(k) = d.used(about, Eigen::all).colwise().minCoeff();
+    if (d.sound.size() > 0) out.sound.row(k) = d.sound(about, Eigen::all).colwise().minCoeff();
   }
   LimitBands(out, d.band_Hz);
   return out;

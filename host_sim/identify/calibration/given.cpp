@@ -124,8 +124,7 @@ Given GivenByRobot(const codegen::Model& model) {
   Given given = Empty(model);
   given.x.head(model.columns()) = MakePrior(model).mean.head(model.columns());
   given.bodies = BodyMean(model);
-  for (int k = 0; k < model.nonlinear(); ++k)
-    given.eta.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
+  given.eta = MeanUnknowns(model);
   return given;
 }
 

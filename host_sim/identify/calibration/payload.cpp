@@ -35,8 +35,7 @@ class LoadFit {
         Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(model.robot().tool_rotation.data());
     flange.topRightCorner<3, 1>() = Eigen::Map<const Eigen::Vector3d>(model.robot().tool_xyz_m.data());
     to_link_ = BodyMap(flange);
-    for (int k = 0; k < model.nonlinear(); ++k)
-      eta_.push_back(model.table()[model.parameters() - model.nonlinear() + k].mean);
+    eta_ = MeanUnknowns(model);
     sum_.assign(n_, MatrixXd::Zero(columns_ + kLoad + 1, columns_ + kLoad + 1));
     rows_.setZero(n_), sigma_.resize(n_), inflation_.setOnes(n_);
     for (int j = 0; j < n_; ++j) sigma_[j] = model.robot().joint[j].torque_noise_Nm;

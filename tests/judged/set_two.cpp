@@ -239,22 +239,27 @@ std::optional<plant::Body> DrawPayload(const Arm& arm, const std::string& group,
   return body;
 }
 
-// Jitter: stamps off the samples, or samples off the even times with stamps that say so.
-void WriteJittered(const fs::path& path, const Run& run, MatrixXd q, MatrixXd tau, bool temperature, Random& random) {
-  const Channel& c = run.channel;
-  const double step = run.m.t[1] - run.m.t[0];
+// Writes what the arm's whole torque along the fine motion shows. Jitter: stamps off the samples, or samples off the
+// even times with stamps that say so.
+void WriteRun(const fs::path& path, const Arm& arm, const Setup& setup, const Run& run, const MatrixXd& torque,
+              const MatrixXd& noise, Random& random) {
+  const Channel& c = setup.channel;
+  const double fine_s = run.fine.t[1] - run.fine.t[0], step = fine_s * run.every;
+  const MatrixXd passed = Passed(c, torque, fine_s);
+  Motion m = run.m;
+  MatrixXd tau = run.Logged(torque);
   VectorXd stamps;
-  if (c.stamp_jitter > 0 || c.sample_jitter > 0) {
-    stamps = run.m.t;
-    for (Eigen::Index k = 1; k + 1 < stamps.size(); ++k) {
-      const double off = std::clamp(random.Normal(), -1.5, 1.5) * (c.stamp_jitter + c.sample_jitter);
-      stamps[k] += step * off;
-      if (c.sample_jitter == 0) continue;
-      q.row(k) += run.m.qd.row(k) * step * off;
-      tau.row(k) += off * (off > 0 ? tau.row(k + 1) - tau.row(k) : tau.row(k) - tau.row(k - 1)).eval();
-    }
+  if (c.stamp_jitter > 0 || c.sample_jitter > 0) stamps = m.t;
+  for (Eigen::Index k = 1; k + 1 < stamps.size(); ++k) {
+    const double off_s = step * std::clamp(random.Normal(), -1.5, 1.5) * (c.stamp_jitter + c.sample_jitter);
+    stamps[k] += off_s;
+    if (c.sample_jitter == 0) continue;
+    const auto at = static_cast<Eigen::Index>(stamps[k] / fine_s);  // of the fine motion, the sample before
+    const double rest = stamps[k] - fine_s * static_cast<double>(at), share = rest / fine_s;
+    m.q.row(k) = run.fine.q.row(at) + rest * run.fine.qd.row(at) + 0.5 * rest * rest * run.fine.qdd.row(at);
+    tau.row(k) = (1 - share) * passed.row(at) + share * passed.row(at + 1);
   }
-  WriteLog(path, run.m, q, tau, temperature, c.hold, stamps);
+  WriteLog(path, run.m, Encoded(arm, setup, m), tau + noise, setup.temperature, c.hold, stamps);
 }
 
 bool MakeCase(const fs::path& folder, const std::string& group, int number, bool report, Random& random) {
@@ -266,7 +271,7 @@ bool MakeCase(const fs::path& folder, const std::string& group, int number, bool
   const int edge = static_cast<int>(kIgnored_s * setup.true_rate_Hz());
   const Run train(arm, setup, DrawMotion(arm, kTrain_s, FineRate(setup), random));
   const MatrixXd noise = NoiseOf(arm, setup, train.m.samples(), random), q = Encoded(arm, setup, train.m);
-  MatrixXd tau = train.Logged(BaseTorque(arm, setup.channel, train.fine, train.links)) + noise;
+  MatrixXd train_all = BaseTorque(arm, setup.channel, train.fine, train.links);
   const auto model = [&](const Motion& m, bool in_test) {
     const MatrixXd links = LinkTorque(arm, m);
     MatrixXd sum = BaseTorque(arm, setup.channel, m, links);
@@ -277,23 +282,24 @@ bool MakeCase(const fs::path& folder, const std::string& group, int number, bool
   };
   json effects = json::array();
   if (!planted.empty()) {
-    const MatrixXd left = Rest(train.m, q, tau, edge, [&](const Motion& m) { return model(m, false); });
+    const MatrixXd left =
+        Rest(train.m, q, train.Logged(train_all) + noise, edge, [&](const Motion& m) { return model(m, false); });
     const Detector detector(arm, train.fine, train.m, setup.channel, left, random);
     for (Planted& p : planted) {
       json truth;
       if (!Plant(p, train, detector, planted.size() == 1, random, truth)) return false;
-      tau += p.gain * train.Logged(p.effect.torque(train.fine, train.links));
+      train_all += p.gain * p.effect.torque(train.fine, train.links);
       setup.temperature = setup.temperature || p.effect.needs_temperature;
       effects.push_back(truth);
     }
   }
   const Run test(arm, setup, DrawTest(arm, train.fine, FineRate(setup), random));
-  MatrixXd all = BaseTorque(arm, setup.channel, test.fine, test.links);
-  for (const Planted& p : planted) all += p.gain * p.effect.torque(test.fine, test.links);
-  if (payload) all += PayloadTorque(arm, test.fine, *payload);
-  const MatrixXd test_tau = test.Logged(all) + NoiseOf(arm, setup, test.m.samples(), random);
-  const MatrixXd test_q = Encoded(arm, setup, test.m);
-  const MatrixXd left = Rest(test.m, test_q, test_tau, edge, [&](const Motion& m) { return model(m, true); });
+  MatrixXd test_all = BaseTorque(arm, setup.channel, test.fine, test.links);
+  for (const Planted& p : planted) test_all += p.gain * p.effect.torque(test.fine, test.links);
+  if (payload) test_all += PayloadTorque(arm, test.fine, *payload);
+  const MatrixXd test_noise = NoiseOf(arm, setup, test.m.samples(), random);
+  const MatrixXd left = Rest(test.m, Encoded(arm, setup, test.m), test.Logged(test_all) + test_noise, edge,
+                             [&](const Motion& m) { return model(m, true); });
   const auto scored = left.middleRows(edge, left.rows() - 2 * edge);
   const VectorXd floor = (scored.colwise().squaredNorm() / static_cast<double>(scored.rows())).cwiseSqrt();
 
@@ -301,8 +307,8 @@ bool MakeCase(const fs::path& folder, const std::string& group, int number, bool
   fs::create_directories(home);
   fs::create_directories(folder / "robots");
   WriteJson(folder / "robots" / (arm.name + ".json"), RobotJson(arm));
-  WriteJittered(home / "train.csv.gz", train, q, tau, setup.temperature, random);
-  WriteJittered(home / "test.csv.gz", test, test_q, test_tau, setup.temperature, random);
+  WriteRun(home / "train.csv.gz", arm, setup, train, train_all, noise, random);
+  WriteRun(home / "test.csv.gz", arm, setup, test, test_all, test_noise, random);
   json truth{{"set", 2},
              {"group", group},
              {"verdict", effects.empty() ? "none" : "effect"},

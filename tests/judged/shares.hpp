@@ -62,11 +62,15 @@ struct Tally {
   int missing = 0;
 };
 
-// The term reads one of the signals that the truth reads (sgn(qd3) counts as qd3).
+// The term reads one of the signals that the truth reads (sgn(qd3) counts as qd3, and so does qd[j]3).
 inline bool SameSignal(const json& term, const json& effect) {
+  const auto plain = [](std::string text) {
+    const std::size_t from = text.find('['), to = text.find(']');
+    return to == text.npos || from == text.npos ? text : text.erase(from, to - from + 1);
+  };
   for (const json& signal : effect.at("depends_on"))
     for (const json& said : term.at("signals")) {
-      const std::string a = signal.get<std::string>(), b = said.get<std::string>();
+      const std::string a = signal.get<std::string>(), b = plain(said.get<std::string>());
       if (a.find(b) != a.npos || b.find(a) != b.npos) return true;
     }
   return false;

@@ -17,6 +17,8 @@ using Eigen::VectorXd;
 
 constexpr double kRate_Hz = 250;
 constexpr int kSamples = 20 * 250;
+// An autoregression of order 30 from 5000 samples knows its spectrum to sqrt(2 * 30 / 5000): three standard deviations.
+constexpr double kSpectrumError = 0.33;
 
 struct Bench {
   plant::Random random{7};
@@ -36,8 +38,7 @@ TEST(Detection, ScoreOfATone_InWhiteNoise_IsItsEnergyOverTheVariance) {
   constexpr double kSigma = 2;
   for (int j = 0; j < 6; ++j) b.noise.col(j) = DrawNoise("white", kSamples, kSigma, kRate_Hz, b.random);
   const Seen seen = Detector(b.arm, b.m, b.m, Channel{}, b.noise, b.random).Look(b.Tone(40));
-  // Thirty estimated coefficients of the whitening filter: each adds a part of 1 / kSamples.
-  EXPECT_NEAR(seen.score, kSamples / 2 / (kSigma * kSigma), 0.1 * kSamples / 2 / (kSigma * kSigma));
+  EXPECT_NEAR(seen.score / (kSamples / 2 / (kSigma * kSigma)), 1, kSpectrumError);
   // 10 of 125 Hz of the noise are in the band; a tone's RMS is 1 / sqrt 2.
   EXPECT_NEAR(seen.size[1], std::sqrt(0.5) / (kSigma * std::sqrt(10.0 / 125)), 0.15 * seen.size[1]);
 }
@@ -51,7 +52,7 @@ TEST(Detection, ScoreOfATone_InSlowNoise_IsDividedByTheSpectrumThere) {
   const double w = 2 * kPi * kFrequency_Hz / kRate_Hz;
   const double white = 1 + kPole * kPole - 2 * kPole * std::cos(w), expected = kSamples / 2 * white;
   const Seen seen = Detector(b.arm, b.m, b.m, Channel{}, b.noise, b.random).Look(b.Tone(kFrequency_Hz));
-  EXPECT_NEAR(seen.score, expected, 0.25 * expected);  // a spectrum from 5000 samples, at one frequency
+  EXPECT_NEAR(seen.score / expected, 1, kSpectrumError);
 }
 
 TEST(Detection, ScoreOfWhatTheDeclaredModelHolds_IsNothing) {

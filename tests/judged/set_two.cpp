@@ -169,6 +169,10 @@ bool Plant(Planted& p, const Run& train, const Detector& detector, bool may_hide
   Effect& e = p.effect;
   const auto look = [&] { return detector.Look(train.Logged(e.torque(train.fine, train.links))); };
   Seen seen = look();
+  while (e.strength && !(SizeOf(e, seen) > 0) && *e.strength < e.most) {  // no torque reaches a limit yet
+    *e.strength = std::min(1.5 * *e.strength, e.most);
+    seen = look();
+  }
   if (!(SizeOf(e, seen) > 0) || !std::isfinite(seen.score)) return false;
   double limit = SizeOf(e, seen) * std::sqrt(kDetectable / seen.score);
   const double size = DrawSize(limit, may_hide, random);

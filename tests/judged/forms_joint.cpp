@@ -25,7 +25,7 @@ void Make(Effect& e, Names accept, Names signals, int joint, const Curve& curve)
 }
 
 // Loads over the largest of training; kept by the effect.
-struct Share {
+struct LoadShare {
   std::function<double(const ArrayXd&)> largest = LargestLoad();
   ArrayXd operator()(const MatrixXd& links, int j) const {
     const ArrayXd load = links.col(j);
@@ -92,7 +92,7 @@ std::vector<Form> FrictionForms() {
        [](const Arm&, Random& r, Effect& e) {
          const double back = r.Uniform(0.15, 0.4);
          Make(e, {"load_friction", "position_friction"}, {"load", "sgn(qd)"}, AnyJoint(r, 3),
-              [back, share = Share{}](const Motion& m, const MatrixXd& links, int i) -> ArrayXd {
+              [back, share = LoadShare{}](const Motion& m, const MatrixXd& links, int i) -> ArrayXd {
                 const ArrayXd load = share(links, i);
                 return load.abs() * S(m, i) * (1 - back * (load * V(m, i) * 50).tanh());
               });
@@ -101,14 +101,14 @@ std::vector<Form> FrictionForms() {
        [](const Arm&, Random& r, Effect& e) {
          const double power = r.Uniform(0.6, 0.8);
          Make(e, {"load_friction", "position_friction"}, {"load", "sgn(qd)"}, AnyJoint(r, 3),
-              [power, share = Share{}](const Motion& m, const MatrixXd& links, int i) -> ArrayXd {
+              [power, share = LoadShare{}](const Motion& m, const MatrixXd& links, int i) -> ArrayXd {
                 return share(links, i).abs().pow(power) * S(m, i);
               });
        }},
       {"load_viscous", false, false,
        [](const Arm&, Random& r, Effect& e) {
          Make(e, {}, {"load", "qd"}, AnyJoint(r, 3),
-              [share = Share{}](const Motion& m, const MatrixXd& links, int i) -> ArrayXd {
+              [share = LoadShare{}](const Motion& m, const MatrixXd& links, int i) -> ArrayXd {
                 return share(links, i).abs() * V(m, i);
               });
        }},
@@ -205,7 +205,7 @@ std::vector<Form> PositionForms() {
        [](const Arm&, Random& r, Effect& e) {
          const double k = r.Uniform(15, 140), phase = r.Uniform(0, 6);
          Make(e, {"torque_ripple", "unknown"}, {"q"}, AnyJoint(r, 3),
-              [=, share = Share{}](const Motion& m, const MatrixXd& links, int i) -> ArrayXd {
+              [=, share = LoadShare{}](const Motion& m, const MatrixXd& links, int i) -> ArrayXd {
                 return (0.3 + share(links, i).abs()) * (k * Q(m, i) + phase).cos();
               });
        }},
@@ -267,7 +267,7 @@ std::vector<Form> PositionForms() {
       {"gain_by_sign", false, true,  // an amplifier whose halves differ
        [](const Arm&, Random& r, Effect& e) {
          Make(e, {}, {"load"}, AnyJoint(r, 3),
-              [share = Share{}](const Motion&, const MatrixXd& links, int i) -> ArrayXd {
+              [share = LoadShare{}](const Motion&, const MatrixXd& links, int i) -> ArrayXd {
                 return share(links, i).abs();
               });
        }},

@@ -70,7 +70,7 @@ std::string Text(const json& term) {
   return out;
 }
 
-std::string Line(const std::string& name, const char* what, const json& truth, const json& verdict,
+std::string Line(const std::string& name, const std::string& what, const json& truth, const json& verdict,
                  const std::string& said) {
   std::string out = fmt::format("{} | {} | {}, {}, {} Hz | ", name, what, truth.at("noise_class").get<std::string>(),
                                 truth.at("channel").get<std::string>(), truth.at("rate_Hz").get<double>());
@@ -94,105 +94,136 @@ std::string ScoreBin(double score) {
                        : "above 500";
 }
 
+class Judge {
+ public:
+  Judge(const std::string& name, const json& truth, const json& verdict, const std::string& said, Tally& tally)
+      : name_(name),
+        truth_(truth),
+        verdict_(verdict),
+        said_(said),
+        tally_(tally),
+        effects_(truth.at("effects")),
+        group_(truth.at("group")) {}
+
+  void Whole() {
+    if (group_ == "negative") return Negative();
+    Count("II logs that are read", !verdict_.is_null());
+    if (verdict_.is_null()) Fail("refused");
+    if (verdict_.is_null() && effects_.empty()) return;
+    Terms();
+    if (effects_.empty()) return Control();
+    bool all = true;
+    for (const json& e : effects_) all = Effect(e) && all;
+    if (group_ == "several") Count("II several: all named", all);
+    Floors();
+  }
+
+ private:
+  bool Count(const std::string& share, bool ok) {
+    tally_.shares[share].Add(ok);
+    return ok;
+  }
+  void Fail(const std::string& what) { tally_.failures.push_back(Line(name_, what, truth_, verdict_, said_)); }
+
+  void Negative() {
+    const std::string joint = std::to_string(truth_.at("fed_joint").get<int>());
+    const bool told = said_.find("joint " + joint) != said_.npos || said_.find("joint" + joint) != said_.npos;
+    if (!Count("II negative: the joint is named as suspect", told)) Fail("not told");
+  }
+
+  // Sorts out the confirmed terms that claim something of the arm, and what of it is true.
+  void Terms() {
+    const std::vector<json> terms = verdict_.is_null() ? std::vector<json>{} : practice::Confirmed(verdict_);
+    for (const json& t : terms)
+      if (!TrueAsWell(t, truth_)) own_.push_back(t);
+    const bool told = own_.size() < terms.size();
+    if (group_ == "controls_late") Count("II late channel: named as such", told);
+    if (group_ == "payload" && !Count("II payload of the held-out run: named at the flange", told))
+      Fail("payload not named");
+    int spurious = 0;
+    for (const json& t : own_) {
+      const auto any = [&](auto test) {
+        return std::any_of(effects_.begin(), effects_.end(), [&](const json& e) { return test(t, e); });
+      };
+      spurious += !any(Touches);
+      Count("II confirmed terms that are right", any(Right) || any(Localised));
+    }
+    ++tally_.judged;
+    tally_.spurious += spurious;
+    if (spurious > 0 && !effects_.empty()) Fail("spurious term");
+  }
+
+  void Control() {
+    const bool payload = group_ == "payload";
+    const bool silent =
+        Count(payload ? "II controls, payload: silent of the arm" : "II " + group_ + ": silent", own_.empty());
+    if (!payload) Count("II controls: silent", silent);
+    if (!silent) Fail("false alarm");
+  }
+
+  // False: it could be seen and was not named.
+  bool Effect(const json& e) {
+    const auto test = [&](auto what) {
+      if (effects_.size() == 1) return !own_.empty() && what(own_[0], e);
+      return std::any_of(own_.begin(), own_.end(), [&](const json& t) { return what(t, e); });
+    };
+    const bool joint = test(OnJointOf), right = test(Right), local = test(Localised);
+    for (const json& t : own_)
+      if (OnJointOf(t, e)) Cover(t, e, tally_.shares["II parameters: 95 % interval holds the truth"]);
+    if (!e.at("detectable").get<bool>()) {
+      Count("II not detectable: silent", own_.empty());
+      Count("II not detectable: right all the same", right || local);
+      return true;
+    }
+    const bool unrecorded = e.at("accept_kinds").empty(), ok = unrecorded ? local : right;
+    if (group_ == "several" && !Count("II several: effect named", ok))
+      Fail("several: missed " + e.at("kind").get<std::string>());
+    if (group_ == "payload") Count("II payload: effect named", ok);
+    if (group_ == "several" || group_ == "payload") return ok;
+    Alone(e, joint, ok, unrecorded);
+    if (!ok) Fail(own_.empty() ? "missed" : joint ? "another kind" : "another joint");
+    return ok;
+  }
+
+  void Alone(const json& e, bool joint, bool ok, bool unrecorded) {
+    const std::string what = unrecorded ? "II unrecorded" : "II single";
+    Count(what + (unrecorded ? ": joint and signal" : ": kind or class, and joint"), ok);
+    Count(what + ": joint", joint);
+    Count(what + ", score " + ScoreBin(e.at("score")), ok);
+    Count(what + ", channel " + truth_.at("channel").get<std::string>(), ok);
+    Count(what + ", noise " + truth_.at("noise_class").get<std::string>(), ok);
+    Count(what + fmt::format(", {} Hz", truth_.at("rate_Hz").get<double>()), ok);
+    if (e.at("lowest_fifth").get<bool>()) Count(what + ", lowest fifth of the detectable range", ok);
+    if (e.at("report_only").get<bool>()) Count(what + ", form of the report part alone", ok);
+    if (!unrecorded)
+      Count(what + (e.at("held_by_a_record").get<bool>() ? ", form of a record" : ", form of no record"), ok);
+    Count("II form " + e.at("kind").get<std::string>(), ok);
+  }
+
+  void Floors() {
+    if (verdict_.is_null() || group_ == "payload" || truth_.at("channel") == "jittered samples") return;
+    for (const json& e : effects_)
+      if (e.at("run_state").get<bool>()) return;
+    for (std::size_t j = 0; j < verdict_.at("after").size(); ++j)
+      if (std::any_of(effects_.begin(), effects_.end(),
+                      [&](const json& e) { return e.at("visible_ratio")[j].get<double>() > practice::kAffected; }))
+        tally_.over.push_back(verdict_.at("after")[j].get<double>() / truth_.at("test_floor_derived")[j].get<double>());
+  }
+
+  const std::string& name_;
+  const json &truth_, &verdict_;
+  const std::string& said_;
+  Tally& tally_;
+  const json& effects_;
+  const std::string group_;
+  std::vector<json> own_;
+};
+
 }  // namespace
 
 void JudgeSetTwo(const std::string& name, const json& truth, const json& verdict, const std::string& said,
                  Tally& tally) {
-  auto& shares = tally.shares;
-  const std::string group = truth.at("group"), channel = truth.at("channel");
-  const json& effects = truth.at("effects");
-  const auto fail = [&](const char* what) { tally.failures.push_back(Line(name, what, truth, verdict, said)); };
-  const auto count = [&](const std::string& share, bool ok) {
-    shares[share].Add(ok);
-    return ok;
-  };
-  if (group == "negative") {
-    const bool told = said.find(fmt::format("joint {}", truth.at("fed_joint").get<int>())) != said.npos ||
-                      said.find(fmt::format("joint{}", truth.at("fed_joint").get<int>())) != said.npos;
-    if (!count("II negative: the joint is named as suspect", told)) fail("not told");
-    return;
-  }
-  count("II logs that are read", !verdict.is_null());
-  if (verdict.is_null()) {
-    fail("refused");
-    if (effects.empty()) return;
-  }
-  const std::vector<json> terms = verdict.is_null() ? std::vector<json>{} : practice::Confirmed(verdict);
-  std::vector<json> own;  // that claim something of the arm
-  for (const json& t : terms)
-    if (!TrueAsWell(t, truth)) own.push_back(t);
-  if (group == "controls_late") count("II late channel: named as such", own.size() < terms.size());
-  if (group == "payload" && !count("II payload of the held-out run: named at the flange", own.size() < terms.size()))
-    fail("payload not named");
-  ++tally.judged;
-  int spurious = 0;
-  for (const json& t : own) {
-    const auto any = [&](auto test) {
-      return std::any_of(effects.begin(), effects.end(), [&](const json& e) { return test(t, e); });
-    };
-    spurious += !any(Touches);
-    count("II confirmed terms that are right", any(Right) || any(Localised));
-  }
-  tally.spurious += spurious;
-  if (effects.empty()) {
-    const std::string of = group == "payload" ? "II controls, payload: silent of the arm" : "II " + group + ": silent";
-    const bool silent = count(of, own.empty());
-    if (group != "payload") count("II controls: silent", silent);
-    if (!silent) fail("false alarm");
-    return;
-  }
-  if (spurious > 0) fail("spurious term");
-  bool all = true;
-  for (const json& e : effects) {
-    const bool detectable = e.at("detectable"), alone = effects.size() == 1;
-    const auto test = [&](auto what) {
-      if (alone) return !own.empty() && what(own[0], e);
-      return std::any_of(own.begin(), own.end(), [&](const json& t) { return what(t, e); });
-    };
-    const bool joint = test(OnJointOf), right = test(Right), local = test(Localised);
-    for (const json& t : own)
-      if (OnJointOf(t, e)) Cover(t, e, shares["II parameters: 95 % interval holds the truth"]);
-    if (!detectable) {
-      count("II not detectable: silent", own.empty());
-      count("II not detectable: right all the same", right || local);
-      continue;
-    }
-    const bool unrecorded = e.at("accept_kinds").empty();
-    const bool ok = unrecorded ? local : right;
-    if (group == "several") {
-      if (!count("II several: effect named", ok)) fail(("several: missed " + e.at("kind").get<std::string>()).c_str());
-      all = all && ok;
-      continue;
-    }
-    if (group == "payload") {
-      count("II payload: effect named", ok);
-      continue;
-    }
-    const std::string what = unrecorded ? "II unrecorded" : "II single";
-    count(what + (unrecorded ? ": joint and signal" : ": kind or class, and joint"), ok);
-    count(what + ": joint", joint);
-    count(what + ", score " + ScoreBin(e.at("score")), ok);
-    count(what + ", channel " + channel, ok);
-    count(what + ", noise " + truth.at("noise_class").get<std::string>(), ok);
-    count(what + fmt::format(", {} Hz", truth.at("rate_Hz").get<double>()), ok);
-    if (e.at("lowest_fifth").get<bool>()) count(what + ", lowest fifth of the detectable range", ok);
-    if (e.at("report_only").get<bool>()) count(what + ", form of the report part alone", ok);
-    if (!unrecorded)
-      count(what + (e.at("held_by_a_record").get<bool>() ? ", form of a record" : ", form of no record"), ok);
-    count("II form " + e.at("kind").get<std::string>(), ok);
-    if (!ok) fail(own.empty() ? "missed" : joint ? "another kind" : "another joint");
-  }
-  if (group == "several" && all) count("II several: all named", true);
-  if (group == "several" && !all) count("II several: all named", false);
-  for (std::size_t j = 0; !verdict.is_null() && j < verdict.at("after").size(); ++j) {
-    bool affected = false, run_state = false;
-    for (const json& e : effects) {
-      affected = affected || e.at("visible_ratio")[j].get<double>() > practice::kAffected;
-      run_state = run_state || e.at("run_state").get<bool>();
-    }
-    if (affected && !run_state && group != "payload" && channel != "jittered samples")
-      tally.over.push_back(verdict.at("after")[j].get<double>() / truth.at("test_floor_derived")[j].get<double>());
-  }
+  Judge(name, truth, verdict, said, tally).Whole();
 }
 
 }  // namespace armcal::judged

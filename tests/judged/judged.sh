@@ -20,7 +20,9 @@ case $part in
   tuning) counts="controls 120 singles 280 pairs 40 unknowns 40 detection 140" ;;
   report) counts="controls 600 singles 420 pairs 100 unknowns 100 detection 580" ;;
   sample2)
-    counts="controls_plain 3 controls_slow 3 controls_quiet 3 controls_late 3 controls_stamps 3 singles_ii 20 unrecorded 6 several 3 payload 2 negative 2" ;;
+    counts="controls_plain 3 controls_slow 3 controls_quiet 3 controls_late 3 controls_stamps 3 singles_ii 20 unrecorded 6 several 3 payload 2 negative 2"
+    # what must not change even in a tenth of it
+    shares=("II controls: silent=80" "II logs that are read=100" "II negative: the joint is named as suspect=100") ;;
   tuning2)
     counts="controls_plain 24 controls_slow 24 controls_quiet 24 controls_late 24 controls_stamps 24 singles_ii 120 unrecorded 36 several 24 payload 12 negative 12" ;;
   report2)

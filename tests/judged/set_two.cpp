@@ -266,53 +266,31 @@ void WriteRun(const fs::path& path, const Arm& arm, const Setup& setup, const Ru
   WriteLog(path, run.m, Encoded(arm, setup, m), tau + noise, setup.temperature, c.hold, stamps);
 }
 
-bool MakeCase(const fs::path& folder, const std::string& group, int number, bool report, Random& random) {
-  Arm arm = DrawArm(random, 0.15);
-  arm.name += fmt::format("_{}_{}", group, number);
-  Setup setup = DrawSetup(group, number, arm, random);
-  std::vector<Planted> planted = DrawEffects(group, number, report, arm, random);
-  const std::optional<plant::Body> payload = DrawPayload(arm, group, random);
-  const int edge = static_cast<int>(kIgnored_s * setup.true_rate_Hz());
-  const Run train(arm, setup, DrawMotion(arm, kTrain_s, FineRate(setup), random));
-  const MatrixXd noise = NoiseOf(arm, setup, train.m.samples(), random), q = Encoded(arm, setup, train.m);
-  MatrixXd train_all = BaseTorque(arm, setup.channel, train.fine, train.links);
-  const auto model = [&](const Motion& m, bool in_test) {
-    const MatrixXd links = LinkTorque(arm, m);
-    MatrixXd sum = BaseTorque(arm, setup.channel, m, links);
-    for (const Planted& p : planted)
-      if (in_test) sum += p.gain * p.effect.torque(m, links);
-    if (in_test && payload) sum += PayloadTorque(arm, m, *payload);
-    return Passed(setup.channel, sum, m.t[1] - m.t[0]);
-  };
-  json effects = json::array();
-  if (!planted.empty()) {
-    const MatrixXd left =
-        Rest(train.m, q, train.Logged(train_all) + noise, edge, [&](const Motion& m) { return model(m, false); });
-    const Detector detector(arm, train.fine, train.m, setup.channel, left, random);
-    for (Planted& p : planted) {
-      json truth;
-      if (!Plant(p, train, detector, planted.size() == 1, random, truth)) return false;
-      train_all += p.gain * p.effect.torque(train.fine, train.links);
-      setup.temperature = setup.temperature || p.effect.needs_temperature;
-      effects.push_back(truth);
-    }
-  }
-  const Run test(arm, setup, DrawTest(arm, train.fine, FineRate(setup), random));
-  MatrixXd test_all = BaseTorque(arm, setup.channel, test.fine, test.links);
-  for (const Planted& p : planted) test_all += p.gain * p.effect.torque(test.fine, test.links);
-  if (payload) test_all += PayloadTorque(arm, test.fine, *payload);
-  const MatrixXd test_noise = NoiseOf(arm, setup, test.m.samples(), random);
-  const MatrixXd left = Rest(test.m, Encoded(arm, setup, test.m), test.Logged(test_all) + test_noise, edge,
-                             [&](const Motion& m) { return model(m, true); });
-  const auto scored = left.middleRows(edge, left.rows() - 2 * edge);
-  const VectorXd floor = (scored.colwise().squaredNorm() / static_cast<double>(scored.rows())).cwiseSqrt();
+// An arm, how its logs are taken, and what its declared model lacks.
+struct Plan {
+  Arm arm;
+  Setup setup;
+  std::vector<Planted> planted;
+  std::optional<plant::Body> payload;  // in the held-out run
 
-  const fs::path home = folder / fmt::format("{}_{:04}", group, number);
-  fs::create_directories(home);
-  fs::create_directories(folder / "robots");
-  WriteJson(folder / "robots" / (arm.name + ".json"), RobotJson(arm));
-  WriteRun(home / "train.csv.gz", arm, setup, train, train_all, noise, random);
-  WriteRun(home / "test.csv.gz", arm, setup, test, test_all, test_noise, random);
+  // Its whole torque; bare: of the declared model alone.
+  MatrixXd Torque(const Motion& m, const MatrixXd& links, bool bare) const {
+    MatrixXd sum = BaseTorque(arm, setup.channel, m, links);
+    if (bare) return sum;
+    for (const Planted& p : planted) sum += p.gain * p.effect.torque(m, links);
+    return payload ? MatrixXd(sum + PayloadTorque(arm, m, *payload)) : sum;
+  }
+  // What the true model leaves of a logged run, and how many samples at either end do not count.
+  MatrixXd Left(const Run& run, const MatrixXd& tau, bool bare) const {
+    return Rest(run.m, Encoded(arm, setup, run.m), tau, edge(), [&](const Motion& m) {
+      return Passed(setup.channel, Torque(m, LinkTorque(arm, m), bare), m.t[1] - m.t[0]);
+    });
+  }
+  int edge() const { return static_cast<int>(kIgnored_s * setup.true_rate_Hz()); }
+};
+
+json TruthOf(const Plan& plan, const std::string& group, const json& effects, const VectorXd& floor) {
+  const Setup& setup = plan.setup;
   json truth{{"set", 2},
              {"group", group},
              {"verdict", effects.empty() ? "none" : "effect"},
@@ -323,20 +301,63 @@ bool MakeCase(const fs::path& folder, const std::string& group, int number, bool
              {"test_floor_derived", std::vector<double>(floor.begin(), floor.end())}};
   // A late channel is a fact, no fault of the arm.
   if (setup.channel.late()) truth["true_as_well"] = {{{"kinds", {"time_delay"}}, {"joint", "any"}}};
-  if (payload) truth["true_as_well"] = {{{"kinds", {"payload_step"}}, {"joint", "flange"}}};
-  if (payload) truth["payload_kg"] = payload->mass_kg;
+  if (plan.payload) truth["true_as_well"] = {{{"kinds", {"payload_step"}}, {"joint", "flange"}}};
+  if (plan.payload) truth["payload_kg"] = plan.payload->mass_kg;
   if (setup.channel.fed_joint >= 0) truth["fed_joint"] = setup.channel.fed_joint + 1;
-  WriteJson(home / "truth.json", truth);
-  WriteJson(home / "case.json", {{"robot", arm.name},
-                                 {"fs", setup.rate_Hz},
-                                 {"declared_model",
-                                  {{"rigid_body", true},
-                                   {"coulomb", true},
-                                   {"viscous", true},
-                                   {"offset", false},
-                                   {"rotor_inertia", true},
-                                   {"coulomb_smoothing_velocity", 0.005}}},
-                                 {"files", {{"train", "train.csv.gz"}, {"test", "test.csv.gz"}}}});
+  return truth;
+}
+
+json CaseOf(const Plan& plan) {
+  return {{"robot", plan.arm.name},
+          {"fs", plan.setup.rate_Hz},
+          {"declared_model",
+           {{"rigid_body", true},
+            {"coulomb", true},
+            {"viscous", true},
+            {"offset", false},
+            {"rotor_inertia", true},
+            {"coulomb_smoothing_velocity", 0.005}}},
+          {"files", {{"train", "train.csv.gz"}, {"test", "test.csv.gz"}}}};
+}
+
+bool MakeCase(const fs::path& folder, const std::string& group, int number, bool report, Random& random) {
+  Plan plan{DrawArm(random, 0.15), {}, {}, std::nullopt};
+  Arm& arm = plan.arm;
+  Setup& setup = plan.setup;
+  arm.name += fmt::format("_{}_{}", group, number);
+  setup = DrawSetup(group, number, arm, random);
+  plan.planted = DrawEffects(group, number, report, arm, random);
+  plan.payload = DrawPayload(arm, group, random);
+  const Run train(arm, setup, DrawMotion(arm, kTrain_s, FineRate(setup), random));
+  const MatrixXd noise = NoiseOf(arm, setup, train.m.samples(), random);
+  MatrixXd train_all = plan.Torque(train.fine, train.links, true);
+  json effects = json::array();
+  if (!plan.planted.empty()) {
+    const Detector detector(arm, train.fine, train.m, setup.channel,
+                            plan.Left(train, train.Logged(train_all) + noise, true), random);
+    for (Planted& p : plan.planted) {
+      json truth;
+      if (!Plant(p, train, detector, plan.planted.size() == 1, random, truth)) return false;
+      train_all += p.gain * p.effect.torque(train.fine, train.links);
+      setup.temperature = setup.temperature || p.effect.needs_temperature;
+      effects.push_back(truth);
+    }
+  }
+  const Run test(arm, setup, DrawTest(arm, train.fine, FineRate(setup), random));
+  const MatrixXd test_all = plan.Torque(test.fine, test.links, false);
+  const MatrixXd test_noise = NoiseOf(arm, setup, test.m.samples(), random);
+  const MatrixXd left = plan.Left(test, test.Logged(test_all) + test_noise, false);
+  const auto scored = left.middleRows(plan.edge(), left.rows() - 2 * plan.edge());
+  const VectorXd floor = (scored.colwise().squaredNorm() / static_cast<double>(scored.rows())).cwiseSqrt();
+
+  const fs::path home = folder / fmt::format("{}_{:04}", group, number);
+  fs::create_directories(home);
+  fs::create_directories(folder / "robots");
+  WriteJson(folder / "robots" / (arm.name + ".json"), RobotJson(arm));
+  WriteRun(home / "train.csv.gz", arm, setup, train, train_all, noise, random);
+  WriteRun(home / "test.csv.gz", arm, setup, test, test_all, test_noise, random);
+  WriteJson(home / "truth.json", TruthOf(plan, group, effects, floor));
+  WriteJson(home / "case.json", CaseOf(plan));
   return true;
 }
 

@@ -191,6 +191,14 @@ MatrixXd PayloadTorque(const Arm& arm, const Motion& m, const plant::Body& paylo
   return TorqueOf(arm, OnlyLink(arm, arm.joints() - 1, payload), m, arm.robot.gravity_mps2);
 }
 
+MatrixXd DeclaredTorque(const Arm& arm, const Motion& m, const MatrixXd& links) {
+  MatrixXd tau = links;
+  for (int j = 0; j < arm.joints(); ++j)
+    tau.col(j).array() +=
+        arm.rotor[j] * m.qdd.col(j).array() + arm.coulomb[j] * Sign(m.qd.col(j)) + arm.viscous[j] * m.qd.col(j).array();
+  return tau;
+}
+
 std::vector<MatrixXd> DeclaredRows(const Arm& arm, const Motion& m, plant::Random& random) {
   const int n = arm.joints(), bodies = 10 * n;
   std::vector<MatrixXd> rows(static_cast<std::size_t>(n), MatrixXd::Zero(m.samples(), bodies + 3 * n));

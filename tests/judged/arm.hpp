@@ -44,6 +44,9 @@ Eigen::MatrixXd LinkTorque(const Arm& arm, const Motion& motion);
 // What a body at the last link adds, in that link's frame.
 Eigen::MatrixXd PayloadTorque(const Arm& arm, const Motion& motion, const plant::Body& payload);
 
+// Links, rotors, Coulomb and viscous friction, as they are.
+Eigen::MatrixXd DeclaredTorque(const Arm& arm, const Motion& motion, const Eigen::MatrixXd& links);
+
 // All that the declared model can give, joint by joint: rows [samples x columns]; bodies, rotors, Coulomb, viscous.
 std::vector<Eigen::MatrixXd> DeclaredRows(const Arm& arm, const Motion& motion, plant::Random& random);
 

@@ -14,40 +14,11 @@ using Eigen::MatrixXd;
 namespace {
 
 using Maker = std::function<void(const Arm& arm, plant::Random& random, Effect& effect)>;
-using Curve = std::function<ArrayXd(const Motion& m, const MatrixXd& links, int j)>;
-
-std::string Signal(const char* name, int j) { return name + std::to_string(j + 1); }
-
 constexpr int kHeavy = 3;  // joints that carry more than noise
 
-// An effect on one joint (one of the first `joints`) that reads that joint alone.
+// On one joint by chance, one of the first `joints`.
 void OnJoint(const Arm& arm, plant::Random& random, Effect& e, const Curve& curve, int joints = 0) {
-  const int j = static_cast<int>(random.Uniform(0, (joints ? joints : arm.joints()) - 1e-9));
-  e.joint = j + 1, e.seen_on = j;
-  for (std::string& s : e.signals)
-    s = s.find('(') == s.npos ? s + std::to_string(j + 1) : "sgn(qd" + std::to_string(j + 1) + ")";
-  e.torque = [curve, j](const Motion& m, const MatrixXd& links) {
-    MatrixXd tau = MatrixXd::Zero(m.samples(), links.cols());
-    tau.col(j) = curve(m, links, j);
-    return tau;
-  };
-}
-
-ArrayXd Q(const Motion& m, int j) { return m.q.col(j); }
-ArrayXd V(const Motion& m, int j) { return m.qd.col(j); }
-ArrayXd S(const Motion& m, int j) { return Sign(m.qd.col(j)); }
-
-// A smooth function of a joint's position that no single record holds: three bumps.
-std::function<ArrayXd(const ArrayXd&)> Bumps(const Arm& arm, plant::Random& random) {
-  double at[3], height[3];
-  const double width = random.Uniform(0.25, 0.6);
-  for (int k = 0; k < 3; ++k) at[k] = random.Uniform(-1.2, 1.2), height[k] = random.Uniform(-1, 1);
-  (void)arm;
-  return [=](const ArrayXd& q) {
-    ArrayXd out = ArrayXd::Zero(q.size());
-    for (int k = 0; k < 3; ++k) out += height[k] * (-((q - at[k]) / width).square()).exp();
-    return out;
-  };
+  OnJoint(e, static_cast<int>(random.Uniform(0, (joints ? joints : arm.joints()) - 1e-9)), curve);
 }
 
 // Dahl's bristles: dz/dt = v (1 - sgn(v) z), z in units of the sliding level.
@@ -87,14 +58,6 @@ ArrayXd OnSpring(const ArrayXd& u, double step_s, double w, double d) {
     if (k >= 0) y[k] = x;
   }
   return y;
-}
-
-// A joint's largest load on the first motion that is asked for, the training's: a property of the gear from then on.
-std::function<double(const ArrayXd& load)> LargestLoad() {
-  return [most = std::make_shared<double>(0)](const ArrayXd& load) {
-    if (*most == 0) *most = load.abs().maxCoeff();
-    return *most;
-  };
 }
 
 const std::map<std::string, Maker>& Makers() {
@@ -237,21 +200,21 @@ const std::map<std::string, Maker>& Makers() {
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.accept = {"position_torque", "cable_pack", "gravity_spring", "unknown"}, e.signals = {"q"};
          e.held_by_a_record = false;
-         const auto bumps = Bumps(a, r);
+         const auto bumps = Bumps(r);
          OnJoint(a, r, e, [bumps](const Motion& m, const MatrixXd&, int j) -> ArrayXd { return bumps(Q(m, j)); });
        }},
       {"position_friction",
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.accept = {"position_friction", "load_friction", "unknown"}, e.signals = {"q", "sgn(qd)"};
          e.held_by_a_record = false;
-         const auto bumps = Bumps(a, r);
+         const auto bumps = Bumps(r);
          OnJoint(a, r, e,
                  [bumps](const Motion& m, const MatrixXd&, int j) -> ArrayXd { return bumps(Q(m, j)) * S(m, j); });
        }},
       {"position_viscous",
        [](const Arm& a, plant::Random& r, Effect& e) {
          e.accept = {"position_viscous", "unknown"}, e.signals = {"q", "qd"}, e.held_by_a_record = false;
-         const auto bumps = Bumps(a, r);
+         const auto bumps = Bumps(r);
          OnJoint(a, r, e,
                  [bumps](const Motion& m, const MatrixXd&, int j) -> ArrayXd { return bumps(Q(m, j)) * V(m, j); });
        }},
@@ -394,6 +357,35 @@ const std::map<std::string, Maker>& Makers() {
 
 }  // namespace
 
+void OnJoint(Effect& e, int j, const Curve& curve) {
+  e.joint = j + 1, e.seen_on = j;
+  for (std::string& s : e.signals)
+    s = s == "sgn(qd)" ? Signal("sgn(qd", j) + ")" : std::isalpha(s.back()) ? Signal(s, j) : s;
+  e.torque = [curve, j](const Motion& m, const MatrixXd& links) {
+    MatrixXd tau = MatrixXd::Zero(m.samples(), links.cols());
+    tau.col(j) = curve(m, links, j);
+    return tau;
+  };
+}
+
+std::function<ArrayXd(const ArrayXd&)> Bumps(plant::Random& random) {
+  double at[3], height[3];
+  const double width = random.Uniform(0.25, 0.6);
+  for (int k = 0; k < 3; ++k) at[k] = random.Uniform(-1.2, 1.2), height[k] = random.Uniform(-1, 1);
+  return [=](const ArrayXd& q) {
+    ArrayXd out = ArrayXd::Zero(q.size());
+    for (int k = 0; k < 3; ++k) out += height[k] * (-((q - at[k]) / width).square()).exp();
+    return out;
+  };
+}
+
+std::function<double(const ArrayXd& load)> LargestLoad() {
+  return [most = std::make_shared<double>(0)](const ArrayXd& load) {
+    if (*most == 0) *most = load.abs().maxCoeff();
+    return *most;
+  };
+}
+
 const std::vector<std::string>& Kinds() {
   static const std::vector<std::string> kinds = [] {
     std::vector<std::string> out;
@@ -425,7 +417,7 @@ Effect DrawUnknown(const Arm& arm, plant::Random& random) {
       break;
     case 1: {  // what one joint's pose does to another's torque
       const int j = static_cast<int>(random.Uniform(0, 5.999)), of = (j + 2) % 6;
-      const auto bumps = Bumps(arm, random);
+      const auto bumps = Bumps(random);
       e.joint = j + 1, e.seen_on = j, e.signals = {Signal("q", of)};
       e.torque = [j, of, bumps](const Motion& m, const MatrixXd& links) {
         MatrixXd tau = MatrixXd::Zero(m.samples(), links.cols());
@@ -436,7 +428,7 @@ Effect DrawUnknown(const Arm& arm, plant::Random& random) {
     }
     case 2: {  // friction that another joint's pose changes: a squeezed cable
       const int j = static_cast<int>(random.Uniform(0, 5.999)), of = (j + 1) % 6;
-      const auto bumps = Bumps(arm, random);
+      const auto bumps = Bumps(random);
       e.joint = j + 1, e.seen_on = j, e.signals = {Signal("q", of), "sgn(" + Signal("qd", j) + ")"};
       e.torque = [j, of, bumps](const Motion& m, const MatrixXd& links) {
         MatrixXd tau = MatrixXd::Zero(m.samples(), links.cols());

@@ -14,9 +14,10 @@ namespace armcal::judged {
 // One effect of one draw: its torque along any motion of the arm, before it is scaled to a size.
 struct Effect {
   std::string kind;
-  nlohmann::json joint;                      // 3, "5-6", "all", "flange", "base"
-  std::vector<std::string> accept, signals;  // names that say the same; what it depends on
-  bool held_by_a_record = true;              // false: no record has this form exactly
+  nlohmann::json joint;                                  // 3, "5-6", "all", "flange", "base"
+  nlohmann::json also_joints = nlohmann::json::array();  // that say the same
+  std::vector<std::string> accept, signals;              // names that say the same; what it depends on
+  bool held_by_a_record = true;                          // false: no record has this form exactly
   bool needs_temperature = false, run_state = false;
   int seen_on = 0;  // the joint whose visible part is scaled
   // Where a record has exactly this form: its parameter that is the factor of this torque, and its other ones.
@@ -32,6 +33,20 @@ struct Effect {
   // links: LinkTorque of the motion, [samples x joints].
   std::function<Eigen::MatrixXd(const Motion& motion, const Eigen::MatrixXd& links)> torque;
 };
+
+using Curve = std::function<Eigen::ArrayXd(const Motion& motion, const Eigen::MatrixXd& links, int joint)>;
+// Makes an effect that acts on joint `joint` (from 0). Signals end in its number, sgn(qd) becomes sgn(qd3).
+void OnJoint(Effect& effect, int joint, const Curve& curve);
+
+inline std::string Signal(const std::string& name, int j) { return name + std::to_string(j + 1); }
+inline Eigen::ArrayXd Q(const Motion& m, int j) { return m.q.col(j); }
+inline Eigen::ArrayXd V(const Motion& m, int j) { return m.qd.col(j); }
+inline Eigen::ArrayXd S(const Motion& m, int j) { return Sign(m.qd.col(j)); }
+
+// A smooth function of a joint's position that no single record holds: three bumps.
+std::function<Eigen::ArrayXd(const Eigen::ArrayXd&)> Bumps(plant::Random& random);
+// A joint's largest load on the first motion that is asked for, the training's: a property of the gear from then on.
+std::function<double(const Eigen::ArrayXd& load)> LargestLoad();
 
 // Kinds that DrawEffect knows.
 const std::vector<std::string>& Kinds();

@@ -1,18 +1,20 @@
 // judged set - writes cases with a known truth: CASES/robots/*.json, CASES/<case>/{case.json,truth.json,*.csv.gz}.
-//   judged_set FOLDER SEED controls|singles|pairs|unknowns|detection COUNT
+//   judged_set FOLDER SEED GROUP COUNT [tuning|report FIRST]; GROUP of set I: controls, singles, pairs, unknowns,
+//   detection; of set II: those of GroupsOfSetTwo(). FIRST: the number of the first case.
 // Shares nothing with the records and the regressor that a diagnosis uses: KDL, finite physics, its own random numbers.
 #include <fmt/core.h>
-#include <zlib.h>
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
 #include <utility>
 
 #include "tests/judged/effects.hpp"
+#include "tests/judged/log.hpp"
 #include "tests/judged/noise.hpp"
+#include "tests/judged/set_two.hpp"
 
 namespace {
 
@@ -70,80 +72,16 @@ class Declared {
   MatrixXd basis_;
 };
 
-MatrixXd DeclaredTorque(const Arm& arm, const Motion& m, const MatrixXd& links) {
-  MatrixXd tau = links;
-  for (int j = 0; j < arm.joints(); ++j)
-    tau.col(j).array() +=
-        arm.rotor[j] * m.qdd.col(j).array() + arm.coulomb[j] * Sign(m.qd.col(j)) + arm.viscous[j] * m.qd.col(j).array();
-  return tau;
-}
-
-void WriteLog(const fs::path& path, const Motion& m, const MatrixXd& q, const MatrixXd& tau, bool temperature) {
-  const auto n = q.cols();
-  std::string text = "t";
-  const auto header = [&](const char* name) {
-    for (Eigen::Index j = 1; j <= n; ++j) text += fmt::format(",{}{}", name, j);
-  };
-  header("q"), header("tau");
-  if (temperature) header("temp");
-  text += "\n";
-  for (int k = 0; k < m.samples(); ++k) {
-    text += fmt::format("{:.6f}", m.t[k]);
-    for (Eigen::Index j = 0; j < n; ++j) text += fmt::format(",{:.9f}", q(k, j));
-    for (Eigen::Index j = 0; j < n; ++j) text += fmt::format(",{:.6g}", tau(k, j));
-    for (Eigen::Index j = 0; temperature && j < n; ++j) text += fmt::format(",{:.3f}", m.temp(k, j));
-    text += "\n";
-  }
-  gzFile file = gzopen(path.c_str(), "wb1");
-  if (!file || gzwrite(file, text.data(), static_cast<unsigned>(text.size())) == 0 || gzclose(file) != Z_OK)
-    throw std::runtime_error(path.string() + ": cannot be written");
-}
-
-void Write(const fs::path& path, const json& content) { std::ofstream(path) << content.dump(1) << "\n"; }
-
-// The logged position derived by a cubic fitted to the samples around each one.
-Motion Derived(const Motion& m, const MatrixXd& q, int half) {
-  const int n = 2 * half + 1;
-  const double h = m.t[1] - m.t[0];
-  MatrixXd powers(n, 4);
-  for (int i = 0; i < n; ++i)
-    for (int p = 0; p < 4; ++p) powers(i, p) = std::pow((i - half) * h, p);
-  const MatrixXd fit = (powers.transpose() * powers).ldlt().solve(powers.transpose());
-  Motion out = m;
-  for (int k = half; k + half < m.samples(); ++k) {
-    const MatrixXd c = fit * q.middleRows(k - half, n);
-    out.q.row(k) = c.row(0), out.qd.row(k) = c.row(1), out.qdd.row(k) = 2 * c.row(2);
-  }
-  return out;
-}
-
-// RMS that the true model leaves a joint of a log whose speeds and accelerations come from its logged position, with
-// the half width (of those tried) that serves each joint best.
 VectorXd DerivedFloor(const Case& c, const std::vector<double>& gain, const Arm& arm, const Motion& m,
                       const MatrixXd& q, const MatrixXd& tau) {
-  VectorXd best = VectorXd::Constant(arm.joints(), INFINITY);
-  for (const int half : {2, 4, 7, 11, 16, 22, 30}) {
-    const Motion derived = Derived(m, q, half);
+  const int edge = static_cast<int>(kIgnored_s * kRate_Hz), scored = m.samples() - 2 * edge;
+  const MatrixXd rest = Rest(m, q, tau, edge, [&](const Motion& derived) {
     const MatrixXd links = LinkTorque(arm, derived);
-    MatrixXd rest = tau - DeclaredTorque(arm, derived, links);
-    for (std::size_t e = 0; e < gain.size(); ++e) rest -= gain[e] * c.effects[e].torque(derived, links);
-    const int edge = static_cast<int>(kIgnored_s * kRate_Hz), scored = m.samples() - 2 * edge;
-    for (int j = 0; j < arm.joints(); ++j)
-      best[j] = std::min(best[j], std::sqrt(rest.col(j).segment(edge, scored).squaredNorm() / scored));
-  }
-  return best;
-}
-
-// Share of samples in which a joint is where, or as fast as, it never was in training: nobody can say what happens
-// there.
-double Unseen(const Motion& train, const Motion& test) {
-  double sum = 0;
-  for (const auto& [seen, now] : {std::pair{&train.q, &test.q}, std::pair{&train.qd, &test.qd}})
-    for (Eigen::Index j = 0; j < now->cols(); ++j) {
-      const double low = seen->col(j).minCoeff(), high = seen->col(j).maxCoeff();
-      sum += ((now->col(j).array() < low) || (now->col(j).array() > high)).cast<double>().mean();
-    }
-  return sum;
+    MatrixXd sum = DeclaredTorque(arm, derived, links);
+    for (std::size_t e = 0; e < gain.size(); ++e) sum += gain[e] * c.effects[e].torque(derived, links);
+    return sum;
+  });
+  return (rest.middleRows(edge, scored).colwise().squaredNorm() / scored).cwiseSqrt();
 }
 
 Motion DrawTest(const Arm& arm, const Motion& train, Random& random) {
@@ -156,7 +94,7 @@ Motion DrawTest(const Arm& arm, const Motion& train, Random& random) {
 }
 
 // False, and nothing is written, if an effect stays below the smallest size at its largest strength.
-bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& random) {
+bool MakeCaseOfSetOne(const fs::path& folder, const Case& c, const Arm& arm, Random& random) {
   const Motion train = DrawMotion(arm, kTrain_s, kRate_Hz, random);
   const VectorXd sigma = arm.sigma_Nm * (c.noise_class == "quiet" ? 0.1 : 1.0);
   const MatrixXd train_links = LinkTorque(arm, train);
@@ -207,7 +145,7 @@ bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
   const fs::path home = folder / c.name;
   fs::create_directories(home);
   fs::create_directories(folder / "robots");
-  Write(folder / "robots" / (arm.name + ".json"), RobotJson(arm));
+  WriteJson(folder / "robots" / (arm.name + ".json"), RobotJson(arm));
   std::vector<double> floor;
   VectorXd derived_floor;
   const char* const file[] = {"train.csv.gz", "test.csv.gz"};
@@ -227,21 +165,22 @@ bool MakeCase(const fs::path& folder, const Case& c, const Arm& arm, Random& ran
     if (part == 1) derived_floor = DerivedFloor(c, gain, arm, m, q, tau);
     WriteLog(home / file[part], m, q, tau, temperature);
   }
-  Write(home / "truth.json", {{"verdict", effects.empty() ? "none" : "effect"},
-                              {"effects", effects},
-                              {"noise_class", c.noise_class},
-                              {"test_floor_noise", floor},
-                              {"test_floor_derived", std::vector<double>(derived_floor.begin(), derived_floor.end())}});
-  Write(home / "case.json", {{"robot", arm.name},
-                             {"fs", kRate_Hz},
-                             {"declared_model",
-                              {{"rigid_body", true},
-                               {"coulomb", true},
-                               {"viscous", true},
-                               {"offset", false},
-                               {"rotor_inertia", true},
-                               {"coulomb_smoothing_velocity", 0.005}}},
-                             {"files", {{"train", file[0]}, {"test", file[1]}}}});
+  WriteJson(home / "truth.json",
+            {{"verdict", effects.empty() ? "none" : "effect"},
+             {"effects", effects},
+             {"noise_class", c.noise_class},
+             {"test_floor_noise", floor},
+             {"test_floor_derived", std::vector<double>(derived_floor.begin(), derived_floor.end())}});
+  WriteJson(home / "case.json", {{"robot", arm.name},
+                                 {"fs", kRate_Hz},
+                                 {"declared_model",
+                                  {{"rigid_body", true},
+                                   {"coulomb", true},
+                                   {"viscous", true},
+                                   {"offset", false},
+                                   {"rotor_inertia", true},
+                                   {"coulomb_smoothing_velocity", 0.005}}},
+                                 {"files", {{"train", file[0]}, {"test", file[1]}}}});
   return true;
 }
 
@@ -269,7 +208,7 @@ Case DrawCase(const std::string& what, int number, const Arm& arm, Random& rando
     }
     c.size = {0.3 * std::pow(5, random.Uniform(0, 1)), 0.3 * std::pow(5, random.Uniform(0, 1))};
   } else if (what != "controls") {
-    throw std::runtime_error(what + ": expected controls, singles, pairs, unknowns or detection");
+    throw std::runtime_error(what + ": no such group");
   }
   return c;
 }
@@ -277,16 +216,22 @@ Case DrawCase(const std::string& what, int number, const Arm& arm, Random& rando
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 5)
-    throw std::runtime_error("usage: judged_set FOLDER SEED controls|singles|pairs|unknowns|detection COUNT");
+  if (argc != 5 && argc != 7)
+    throw std::runtime_error("usage: judged_set FOLDER SEED GROUP COUNT [tuning|report FIRST]");
   const std::string what = argv[3];
-  for (int k = 0; k < std::stoi(argv[4]); ++k) {
+  const bool second = std::ranges::count(GroupsOfSetTwo(), what) > 0;
+  const int first = argc == 7 ? std::stoi(argv[6]) : 0;
+  for (int k = first; k < first + std::stoi(argv[4]); ++k) {
+    if (second) {
+      MakeCaseOfSetTwo(argv[1], what, k, argc == 7 && argv[5] == std::string("report"), std::stoull(argv[2]));
+      continue;
+    }
     Random random(1000003ULL * std::stoull(argv[2]) + 7919ULL * static_cast<unsigned>(k) +
                   std::hash<std::string>{}(what));
     for (bool made = false; !made;) {
       Arm arm = DrawArm(random, 0.15);
       arm.name += fmt::format("_{}_{}", what, k);  // numbers repeat
-      made = MakeCase(argv[1], DrawCase(what, k, arm, random), arm, random);
+      made = MakeCaseOfSetOne(argv[1], DrawCase(what, k, arm, random), arm, random);
     }
   }
   return 0;

@@ -1,81 +1,27 @@
 // judged set - compares verdicts with the truth, and gives shares with their intervals.
-//   judged_score CASES VERDICTS [OUT.json [NAME=PERCENT...]]: CASES/<case>/truth.json against VERDICTS/<case>.json
+//   judged_score CASES VERDICTS [OUT.json [NAME=PERCENT...]]: CASES/<case>/truth.json against VERDICTS/<case>.json;
+// beside OUT.json, failures.md lists the cases of set II that are not right, and what was said of them.
 // Exit code 1: a case without a verdict, or a share of that name below the percentage.
 #include <fmt/core.h>
 
-#include <cmath>
-#include <map>
+#include <sstream>
 
-#include "tests/practice/verdict.hpp"
+#include "tests/judged/shares.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
 using namespace armcal::practice;
+using namespace armcal::judged;
 
-// The joint, and one of the signals that the truth reads (sgn(qd3) counts as qd3).
-bool Localised(const json& term, const json& effect) {
-  if (!SameJoint(term, effect)) return false;
-  for (const json& signal : effect.at("depends_on"))
-    for (const json& said : term.at("signals")) {
-      const std::string a = signal.get<std::string>(), b = said.get<std::string>();
-      if (a.find(b) != a.npos || b.find(a) != b.npos) return true;
-    }
-  return false;
-}
-
-// P(at most k of n) with probability p each.
-double AtMost(int k, int n, double p) {
-  if (k >= n) return 1;
-  double sum = 0;
-  for (int i = 0; i <= k; ++i)
-    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(i + 1.0) - std::lgamma(n - i + 1.0) + i * std::log(p) +
-                    (n - i) * std::log1p(-p));
-  return sum;
-}
-
-struct Share {
-  int good = 0, all = 0;
-  void Add(bool ok) { good += ok, ++all; }
-  double value() const { return all ? static_cast<double>(good) / all : 0; }
-  // Clopper and Pearson: 95 %.
-  double Limit(bool upper) const {
-    if (all == 0 || (upper && good == all)) return all == 0 ? 0 : 1;
-    if (!upper && good == 0) return 0;
-    double low = 1e-12, high = 1 - 1e-12;
-    for (int i = 0; i < 60; ++i) {
-      const double p = (low + high) / 2, tail = upper ? AtMost(good, all, p) : 1 - AtMost(good - 1, all, p);
-      ((tail > 0.025) == upper ? low : high) = p;
-    }
-    return low;
-  }
-  std::string Text() const {
-    return fmt::format("{:4d} of {:4d}  {:5.1f} %  [{:5.1f}, {:5.1f}]", good, all, 100 * value(), 100 * Limit(false),
-                       100 * Limit(true));
-  }
-  json Json() const { return {{"good", good}, {"all", all}, {"low", Limit(false)}, {"high", Limit(true)}}; }
-};
-
-using Shares = std::map<std::string, Share>;
-
-// Intervals of 95 % that the verdict gives for parameters which the truth states.
-void Cover(const json& term, const json& effect, Share& share) {
-  if (term.at("kind") != effect.at("kind") || !effect.contains("parameters")) return;
-  for (const auto& [name, value] : effect.at("parameters").items())
-    for (const auto& [said, sd] : term.at("parameter_sd").items()) {
-      const std::string of = said.substr(said.find('.') + 1);  // the name, then the joints
-      if (!of.starts_with(name) || of.substr(name.size()).find_first_not_of("0123456789_") != of.npos) continue;
-      const double error = term.at("parameters").at(said).get<double>() - value.get<double>();
-      share.Add(std::abs(error) < 1.96 * sd.get<double>());
-      break;
-    }
-}
+bool Localised(const json& term, const json& effect) { return SameJoint(term, effect) && SameSignal(term, effect); }
 
 std::string SizeBin(double size) {
   return size < 0.2 ? "size 0.1-0.2" : size < 0.5 ? "size 0.2-0.5" : size < 1 ? "size 0.5-1" : "size 1-2";
 }
 
-void Judge(const std::string& name, const json& truth, const json& verdict, Shares& shares, std::vector<double>& over) {
+void JudgeSetOne(const std::string& name, const json& truth, const json& verdict, Tally& tally) {
+  auto& shares = tally.shares;
   const std::vector<json> terms = Confirmed(verdict);
   const json& effects = truth.at("effects");
   const std::string noise = "noise " + truth.at("noise_class").get<std::string>();
@@ -120,52 +66,66 @@ void Judge(const std::string& name, const json& truth, const json& verdict, Shar
       run_state = run_state || e.at("run_state").get<bool>();
     }
     if (affected && !run_state)
-      over.push_back(verdict.at("after")[j].get<double>() / truth.at("test_floor_derived")[j].get<double>());
+      tally.over.push_back(verdict.at("after")[j].get<double>() / truth.at("test_floor_derived")[j].get<double>());
   }
+}
+
+std::string Text(const fs::path& path) {
+  std::ostringstream out;
+  out << std::ifstream(path).rdbuf();
+  return out.str();
 }
 
 }  // namespace
 
 int main(int argc, char** argv) try {
   if (argc < 3) throw std::runtime_error("usage: judged_score CASES VERDICTS [OUT.json [NAME=PERCENT...]]");
-  Shares shares;
-  std::vector<double> over, seconds;
-  int missing = 0;
-  for (const auto& entry : fs::directory_iterator(argv[1])) {
-    const fs::path truth = entry.path() / "truth.json",
-                   verdict = fs::path(argv[2]) / (entry.path().filename() += ".json");
-    if (!fs::exists(truth)) continue;
-    if (!fs::exists(verdict)) {
-      ++missing;
-      continue;
+  Tally tally;
+  std::vector<double> seconds;
+  std::vector<fs::path> cases;
+  for (const auto& entry : fs::directory_iterator(argv[1]))
+    if (fs::exists(entry.path() / "truth.json")) cases.push_back(entry.path());
+  std::sort(cases.begin(), cases.end());
+  for (const fs::path& one : cases) {
+    const std::string name = one.filename();
+    const fs::path verdict = fs::path(argv[2]) / (name + ".json"), said = fs::path(argv[2]) / (name + ".txt");
+    const json truth = Read(one / "truth.json"), v = fs::exists(verdict) ? Read(verdict) : json();
+    if (!v.is_null()) seconds.push_back(v.at("seconds"));
+    if (truth.value("set", 1) == 2) {
+      if (fs::exists(said)) JudgeSetTwo(name, truth, v, Text(said), tally);
+    } else if (v.is_null()) {
+      ++tally.missing;
+    } else {
+      JudgeSetOne(name, truth, v, tally);
     }
-    const json v = Read(verdict);
-    Judge(entry.path().filename(), Read(truth), v, shares, over);
-    seconds.push_back(v.at("seconds"));
   }
   json out;
-  for (const auto& [name, share] : shares) {
-    fmt::print("{:<44} {}\n", name, share.Text());
+  for (const auto& [name, share] : tally.shares) {
+    fmt::print("{:<52} {}\n", name, share.Text());
     out["shares"][name] = share.Json();
   }
-  const auto quantile = [](std::vector<double> v, double p) {
-    if (v.empty()) return std::nan("");
-    std::sort(v.begin(), v.end());
-    return v[std::min(v.size() - 1, static_cast<std::size_t>(p * static_cast<double>(v.size())))];
-  };
-  fmt::print("after / floor on affected joints: median {:.4f}, 90 % {:.4f} ({} joints)\n", quantile(over, 0.5),
-             quantile(over, 0.9), over.size());
-  fmt::print("seconds a case: median {:.2f}, longest {:.2f}\n", quantile(seconds, 0.5), quantile(seconds, 1));
-  if (missing) fmt::print("{} cases have no verdict: the diagnosis failed on them\n", missing);
-  if (argc >= 4) {
-    out["after_over_floor"] = {{"median", quantile(over, 0.5)}, {"p90", quantile(over, 0.9)}, {"joints", over.size()}};
-    out["missing"] = missing;
-    std::ofstream(argv[3]) << out.dump(1) << "\n";
+  if (tally.judged) {
+    const double per_case = static_cast<double>(tally.spurious) / tally.judged;
+    fmt::print("II confirmed terms that touch no effect: {} in {} cases, {:.3f} a case\n", tally.spurious, tally.judged,
+               per_case);
+    out["spurious_a_case"] = per_case;
   }
-  bool good = missing == 0;
+  fmt::print("after / floor on affected joints: median {:.4f}, 90 % {:.4f} ({} joints)\n", Quantile(tally.over, 0.5),
+             Quantile(tally.over, 0.9), tally.over.size());
+  fmt::print("seconds a case: median {:.2f}, longest {:.2f}\n", Quantile(seconds, 0.5), Quantile(seconds, 1));
+  if (tally.missing) fmt::print("{} cases have no verdict: the diagnosis failed on them\n", tally.missing);
+  if (argc >= 4) {
+    out["after_over_floor"] = {
+        {"median", Quantile(tally.over, 0.5)}, {"p90", Quantile(tally.over, 0.9)}, {"joints", tally.over.size()}};
+    out["missing"] = tally.missing;
+    std::ofstream(argv[3]) << out.dump(1) << "\n";
+    std::ofstream failures(fs::path(argv[3]).replace_filename("failures.md"));
+    for (const std::string& line : tally.failures) failures << "- " << line << "\n";
+  }
+  bool good = tally.missing == 0;
   for (int k = 4; k < argc; ++k) {
     const std::string text = argv[k], name = text.substr(0, text.rfind('='));
-    if (100 * shares[name].value() >= std::stod(text.substr(name.size() + 1))) continue;
+    if (100 * tally.shares[name].value() >= std::stod(text.substr(name.size() + 1))) continue;
     fmt::print("below what is asked for: {}\n", text);
     good = false;
   }

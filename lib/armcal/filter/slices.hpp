@@ -32,16 +32,23 @@ struct UpdateReport {
 
 // The calls without slices, made of those in slices. Base of a Filter that has BeginRow, StepRow, report, BeginEnd and
 // StepEnd. Context: background.
+//
+// A sample: BeginRow, then StepRow until it answers true, for each row; then StepRows until it answers true. Now the
+// report of each row stands. Then BeginEnd, and StepEnd until it answers true. A filter that works rows in one by one
+// has nothing to do in StepRows.
 template <class Filter>
 class WholeRows {
  public:
-  // A whole row. Arguments as of BeginRow.
+  bool StepRows(int&) { return true; }
+
+  // A sample of one row. Arguments as of BeginRow.
   template <class... Row>
   UpdateReport Update(int joint, const Row&... row) {
     self().BeginRow(joint, row...);
     int all = kNoSlices;
     (void)self().StepRow(all);
-    return self().report();
+    (void)self().StepRows(all);
+    return self().report(joint);
   }
   // The whole end of a sample. Arguments as of BeginEnd.
   void EndSample(std::uint32_t moving) {

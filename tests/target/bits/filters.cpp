@@ -29,7 +29,10 @@ void Run(const FilterCalls& filter) {
     for (int joint = 0; joint < 6; ++joint) {
       filter.begin_row(rows.Next(joint, rows.Draw()));
       while (!filter.step_row(credit)) credit += slice;
-      const auto& report = filter.report();
+    }
+    while (!filter.step_rows(credit)) credit += slice;
+    for (int joint = 0; joint < 6; ++joint) {
+      const auto& report = filter.report(joint);
       digest.Add(report.innovation);
       digest.Add(report.variance);
       digest.Add(static_cast<std::uint32_t>(report.status) << 1 | report.accepted);

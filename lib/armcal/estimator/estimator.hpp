@@ -21,8 +21,8 @@ struct Row {
   float y = 0.0f;
 };
 
-// Fills in front, dense and y = residual_Nm / sigma, where residual_Nm is the measured torque minus the one at b0. seen:
-// the regressor that the filter sees. One copy serves all estimators of a model. Context: background.
+// Fills in front, dense and y = residual_Nm / sigma, where residual_Nm is the measured torque minus the one at b0.
+// seen: the regressor that the filter sees. One copy serves all estimators of a model. Context: background.
 template <class Model>
 ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows<Model>& seen, int joint,
                              float residual_Nm, Row<Model>& row) {
@@ -161,13 +161,14 @@ class Estimator {
         BeginRow();
         return true;
       case Stage::kUpdate:
-        if (filter_.StepRow(credit_)) stage_ = ++joint_ == n ? Stage::kRows : Stage::kRow;
+        if (filter_.StepRow(credit_)) FinishRow();
         return true;
       case Stage::kRows:
         if (filter_.StepRows(credit_)) joint_ = 0, stage_ = Stage::kReport;
         return true;
       case Stage::kReport:
         ReportRow();
+        if (++joint_ == n) EndRows();
         return true;
       case Stage::kEnd:
         if (filter_.StepEnd(credit_)) FinishSample();
@@ -254,6 +255,12 @@ class Estimator {
     else return intake_.rows();
   }
 
+  void FinishRow() {
+    if (!Filter::kTogether) ReportRow();
+    stage_ = ++joint_ < n ? Stage::kRow : Stage::kRows;
+    if (!Filter::kTogether && joint_ == n) EndRows();
+  }
+
   void ReportRow() {
     const int i = joint_;
     const filter::UpdateReport& report = filter_.report(i);
@@ -261,9 +268,6 @@ class Estimator {
     const bool moves = ((intake_.moving() >> i) & 1u) != 0u;
     estimates_.rows_outside[i] += (outside_ >> i) & 1u;
     statistics_.Add(i, report, residual_Nm_[i], load_Nm_[i], intake_.sample(), moves, estimates_);
-    if (++joint_ < n) return;
-    EndRows();
-    stage_ = Stage::kEnd;
   }
 
   void EndRows() {
@@ -271,6 +275,7 @@ class Estimator {
       for (int e = 0; e < Model::kNonlinear; ++e)
         filter_.Clamp(Model::kColumns + e, table_->eta_low[e], table_->eta_high[e]);
     filter_.BeginEnd(updating_);
+    stage_ = Stage::kEnd;
   }
 
   void FinishSample() {

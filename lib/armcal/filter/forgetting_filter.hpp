@@ -18,7 +18,7 @@ template <class Layout>
 class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
  public:
   static constexpr int kColumns = Layout::kColumns;
-  static constexpr bool kExtended = false;
+  static constexpr bool kExtended = false, kTogether = true;
   static constexpr float kFloor = 1e-6f;
   using Columns = Order<Layout, Form::kBlock, Beside::kNothing>;
 
@@ -127,7 +127,8 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   // all joints move. A joint at rest brings no new data, so what is known of it must not fade.
   void BeginEnd(std::uint32_t moving) {
     constexpr std::uint32_t kAll = (1u << Layout::kJoints) - 1u;
-    for (int i = 0; i < Layout::kJoints; ++i) Forget(Layout::kFrontBegin[i], Layout::kFrontBegin[i + 1], moving >> i & 1u);
+    for (int i = 0; i < Layout::kJoints; ++i)
+      Forget(Layout::kFrontBegin[i], Layout::kFrontBegin[i + 1], moving >> i & 1u);
     Forget(Layout::kFront, kColumns, (moving & kAll) == kAll);
   }
   bool StepEnd(int& credit) {
@@ -201,7 +202,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
 
  private:
   static constexpr int kJoints = Layout::kJoints;
-  static constexpr int kRowCost = 24, kEndCost = kColumns;
+  static constexpr int kRowCost = 20 + Layout::kDense, kEndCost = 10 + 3 * kColumns / 2;
 
   // The rows stand side by side. Element k of row i is block_[Slot(k) + i]: k < kDense a dense column, kDense the
   // measurement. The front columns of a row stand just before its first dense column, as in the triangle.
@@ -210,9 +211,11 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   // Some columns whose stored rows take `rows` rows, from row `first` on. length: of the elements after these columns.
   struct Pass {
     std::uint16_t stored, block;  // where the first stored row begins in rows_, and its element in block_
-    std::uint8_t column, columns, first, rows, length, cost;
+    std::uint16_t cost;
+    std::uint8_t column, columns, first, rows, length;
   };
   static constexpr int kMostRows = kJoints < 6 ? kJoints : 6;  // of a pass
+  static constexpr int kFewRows = kJoints < 3 ? kJoints : 3;   // so many are worked into four columns at a time
   template <int most>
   struct Passes {
     Pass at[most] = {};
@@ -225,8 +228,10 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
           k += columns;
         }
       for (int k = 0, rows = 0; k < Layout::kDense;) {
-        const int columns = (Layout::kDense - k) % 2 == 0 ? 2 : 1;
+        int columns = (Layout::kDense - k) % 2 == 0 ? 2 : 1;
         while (rows < kJoints && kStart.at[rows] < k + columns) ++rows;
+        const bool more = rows < kJoints && kStart.at[rows] < k + 4;  // a row begins at the third column or the fourth
+        if (columns == 2 && k + 4 <= Layout::kDense && rows <= kFewRows && !more) columns = 4;
         for (int i = 0; i < rows; i += kMostRows)
           Add(Layout::kFront + k, columns, i, rows - i < kMostRows ? rows - i : kMostRows, k);
         k += columns;
@@ -240,7 +245,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
 
    private:
     constexpr void Add(int column, int columns, int first, int rows, int element) {
-      const int length = Layout::kDense + 1 - element - columns;
+      const int length = Layout::kDense + 1 - element - columns, area = rows * columns;
       if (count < most) {
         Pass& pass = at[count];
         pass.stored = kOffsets.at[column];
@@ -250,7 +255,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
         pass.first = static_cast<std::uint8_t>(first);
         pass.rows = static_cast<std::uint8_t>(rows);
         pass.length = static_cast<std::uint8_t>(length);
-        pass.cost = static_cast<std::uint8_t>(8 + rows * columns * 3 + (rows * columns * 5 * length) / 8);
+        pass.cost = static_cast<std::uint16_t>(16 + area * 3 + area * length * (rows == 1 ? 15 : 12) / 16);
       }
       ++count;
     }
@@ -274,6 +279,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   }
   void Work(const Pass& pass) {
     constexpr auto many = std::make_integer_sequence<int, kMostRows>{};
+    constexpr auto few = std::make_integer_sequence<int, kFewRows>{};
     constexpr auto one = std::make_integer_sequence<int, 1>{};
     if constexpr (kPasses.Has(1))
       if (pass.columns == 1) return WorkColumns<1>(pass, many);
@@ -282,7 +288,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     if constexpr (kPasses.Has(3))
       if (pass.columns == 3) return WorkColumns<3>(pass, one);
     if constexpr (kPasses.Has(4))
-      if (pass.columns == 4) return WorkColumns<4>(pass, one);
+      if (pass.columns == 4) return WorkColumns<4>(pass, few);
   }
 
   ARMCAL_NOINLINE void Forget(int begin, int end, bool moves) {
@@ -350,7 +356,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   float block_[(kStart.width + Layout::kDense + 1) * Layout::kJoints] = {};  // what remains of the rows in work
   float weight_[kJoints] = {};
   std::uint32_t begun_ = 0;  // rows of the sample in work, a bit each
-  int next_ = 0;  // pass
+  int next_ = 0;             // pass
 };
 
 }  // namespace armcal::filter

@@ -57,21 +57,19 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   // (slices.hpp), until it answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
     const int first = Columns::kAt.first[joint];
-    const std::uint32_t taken = FillRow<Layout, Columns>(joint, front, dense, eta, y, use, estimate_.row(), report_[joint]);
-    joint_ = joint;
+    const std::uint32_t taken = FillRow<Layout, Columns>(joint, front, dense, eta, y, use, estimate_.row(), report_);
     estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f, prior_->gate_sigma);
   }
   bool StepRow(int& credit) {
     const std::uint32_t* considered = AnyConsidered() ? considered_ : nullptr;
     if (!estimate_.StepRow(considered, credit)) return false;
-    UpdateReport& report = report_[joint_];
-    report.innovation = estimate_.innovation();
-    report.variance = estimate_.variance();
-    report.accepted &= estimate_.inside();
-    report.status = GatedUnless(report.accepted, report.status);
+    report_.innovation = estimate_.innovation();
+    report_.variance = estimate_.variance();
+    report_.accepted &= estimate_.inside();
+    report_.status = GatedUnless(report_.accepted, report_.status);
     return true;
   }
-  const UpdateReport& report(int joint) const { return report_[joint]; }
+  const UpdateReport& report(int) const { return report_; }  // of the last row
 
   // The cost of the rows and the end of a sample (slices.hpp). A considered column makes it larger.
   int SampleCost() const {
@@ -162,10 +160,10 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
 
   const Prior<Layout>* prior_ = nullptr;
   Estimate estimate_;
-  UpdateReport report_[Layout::kJoints];
+  UpdateReport report_;
   std::uint32_t considered_[(kSize + 31) / 32] = {};
   std::uint8_t turn_[kSize] = {};  // positions with noise
-  int joint_ = 0;  // of the row in work
+  int joint_ = 0;                  // of the row in work
   int turns_ = 0, next_turn_ = 0, last_noise_ = 0;
   ColumnRange reset_ = {};  // what remains of a reset
   std::uint32_t floor_count_ = 0, clamp_count_ = 0;

@@ -132,7 +132,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
   // Calls and slices are those of the other filters. The report's innovation and variance are those of the mixture.
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     joint_ = joint;
-    y_ = math::Masked(y, FillRow<Layout, Columns>(joint, front, dense, nullptr, y, use, row_, report_[joint]));
+    y_ = math::Masked(y, FillRow<Layout, Columns>(joint, front, dense, nullptr, y, use, row_, report_));
     at_ = 0;
     begun_ = false;
   }
@@ -147,14 +147,14 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
       }
       begun_ = !e.StepRow(nullptr, credit);
       if (begun_) return false;
-      weights_.Add(joint_, at_, e.innovation(), e.variance(), report_[joint_].accepted);
+      weights_.Add(joint_, at_, e.innovation(), e.variance(), report_.accepted);
     }
     if (at_ < kMembers) return false;
     credit -= RowCost(joint_);
     Report();
     return true;
   }
-  const UpdateReport& report(int joint) const { return report_[joint]; }
+  const UpdateReport& report(int) const { return report_; }  // of the last row
 
   void BeginEnd(std::uint32_t moving) {
     moving_ = moving;
@@ -255,8 +255,8 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
       const float apart = member_[m].innovation() - mean;
       variance += weight[m] * (member_[m].variance() + apart * apart);
     }
-    report_[joint_].innovation = mean;
-    report_[joint_].variance = variance;
+    report_.innovation = mean;
+    report_.variance = variance;
   }
 
   // Adds the slope to its column, in x and in U. The slope stands after its column, so this adds rows of U and leaves
@@ -308,7 +308,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
   float row_[Columns::kSize] = {}, y_ = 0.0f;
   int drifting_[kJoints] = {};
   std::uint8_t turn_[kJoints] = {};
-  UpdateReport report_[kJoints];
+  UpdateReport report_;
   std::uint32_t moving_ = 0, samples_ = 0, floor_count_ = 0;
   int joint_ = 0, at_ = 0;
   bool begun_ = false;

@@ -34,8 +34,7 @@ inline std::uint32_t Admit(bool use, std::uint32_t largest_magnitude_bits, Updat
 
 // The bits of the largest magnitude of value[k], k < count, and `largest`.
 ARMCAL_NOINLINE inline std::uint32_t LargestOf(const float* value, int count, std::uint32_t largest) {
-  math::internal::ByFours(count,
-                          [&](int k) ARMCAL_INLINE { largest = math::Max(largest, MagnitudeBits(value[k])); });
+  math::internal::ByFours(count, [&](int k) ARMCAL_INLINE { largest = math::Max(largest, MagnitudeBits(value[k])); });
   return largest;
 }
 // h[k * stride] = value[k] for k < count, or zero if the mask is.

@@ -149,9 +149,8 @@ ARMCAL_INLINE inline void FoldTurn(T* __restrict x, T* const* r, const T* c) {
   Each<rows>([&](auto i) ARMCAL_INLINE {
     Each<stored>([&](auto j) ARMCAL_INLINE {
       constexpr int kAt = 2 * (i * stored + j);
-      Each<turns>([&](auto t) ARMCAL_INLINE {
-        FoldElement(own[t * rows + i], kept[t * stored + j], c[kAt], c[kAt + 1]);
-      });
+      Each<turns>([&](auto t)
+                      ARMCAL_INLINE { FoldElement(own[t * rows + i], kept[t * stored + j], c[kAt], c[kAt + 1]); });
     });
   });
   Each<turns>([&](auto t) ARMCAL_INLINE {
@@ -207,8 +206,8 @@ ARMCAL_NOINLINE void GivensCorner(T* d, T* first, T* __restrict x, int length, c
       if (j + 1 == stored || j >= skipped) {
         x0 = own[j];
         remaining = GivensPivot(diagonal[j], x0, remaining, s);
-        Each<stored - j>(
-            [&](auto k) ARMCAL_INLINE { internal::FoldElement(own[j + 1 + k], corner[j * stored + k], x0, s); });
+        Each<stored - j>([&](auto k)
+                             ARMCAL_INLINE { internal::FoldElement(own[j + 1 + k], corner[j * stored + k], x0, s); });
       }
       rotation[2 * j] = x0;
       rotation[2 * j + 1] = s;

@@ -255,8 +255,8 @@ void ExpectSameBits(const ForgettingFilter<Layout>& filter, const RowByRow<Layou
     const int joint = JointOf<Layout>(k);
     for (int c = k + 1; c <= Layout::kColumns; ++c) {
       const bool dense = c >= Layout::kFront;
-      const bool kept = k >= Layout::kFront || (dense ? c - Layout::kFront >= Layout::kRowBegin[joint]
-                                                      : c < Layout::kFrontBegin[joint + 1]);
+      const bool kept = k >= Layout::kFront ||
+                        (dense ? c - Layout::kFront >= Layout::kRowBegin[joint] : c < Layout::kFrontBegin[joint + 1]);
       ASSERT_EQ(kept ? *stored++ : 0.0f, oracle.r[k][c]) << k << ", " << c;
     }
   }
@@ -336,7 +336,8 @@ TYPED_TEST(RowsTogether, InAnySlices_GiveTheBitsOfRowByRow_WhateverIsRefused) {
     const float* stored = filter.triangle();
     for (int k = Layout::kFront; k < Layout::kColumns; ++k)
       ASSERT_NEAR(filter.weights()[k] / oracle.d[k], 1, 1e-4) << sample << ": " << k;
-    ASSERT_NEAR(stored[ForgettingFilter<Layout>::kTriangle - 1], oracle.r[Layout::kColumns - 1][Layout::kColumns], 1e-3);
+    ASSERT_NEAR(stored[ForgettingFilter<Layout>::kTriangle - 1], oracle.r[Layout::kColumns - 1][Layout::kColumns],
+                1e-3);
   }
   EXPECT_GT(slices, Layout::kColumns);
 }

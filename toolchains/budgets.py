@@ -23,9 +23,9 @@ REGRESSOR_KEYS = ["instructions", "text_bytes", "stack_bytes"]
 ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "slice_min", "state_bytes"]
 READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "state_bytes", "stack_bytes"]
 NOT_THE_FILTERS = re.compile(r"Get_|Calls|MakeParts|\.rodata.*\.str")  # the bench's own part of an object
-# One filter's own: code that knows the layout, and the rotation that the forgetting filter alone has. One copy of the rest serves
+# One filter's own: code that knows the layout, and the rotations that the forgetting filter alone has. One copy of the rest serves
 # all filters of a form.
-OWN = re.compile(r"SixJoints|4math4Fold")
+OWN = re.compile(r"SixJoints|4math9FoldBlock|4math12GivensCorner")
 
 
 def read_bench(path):

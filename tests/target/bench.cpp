@@ -32,6 +32,7 @@ void Sample(const FilterCalls& filter, Rows& rows, RowKind kind, std::uint32_t m
     sum += CostOf([&] { filter.begin_row(row); });
     sum += CostOf([&] { (void)filter.step_row(all); });
   }
+  sum += CostOf([&] { (void)filter.step_rows(all); });
   sum += CostOf([&] { filter.begin_end(moving); });
   sum += CostOf([&] { (void)filter.step_end(all); });
   cost.sample.Add(sum);
@@ -70,6 +71,7 @@ void SampleInSlices(const FilterCalls& filter, Rows& rows, FilterCost& cost) {
     slices.Do([&] { filter.begin_row(row); });
     slices.Finish(filter.step_row);
   }
+  slices.Finish(filter.step_rows);
   slices.Do([&] { filter.begin_end(63); });
   slices.Finish(filter.step_end);
   slices.Cut();
@@ -94,6 +96,7 @@ void Deepest(const FilterCalls& filter, Rows& rows, FilterCost& cost) {
     go([&] { filter.begin_row(row); });
     go([&] { (void)filter.step_row(all); });
   }
+  go([&] { (void)filter.step_rows(all); });
   go([&] { filter.begin_end(63); });
   go([&] { (void)filter.step_end(all); });
   go([&] { filter.begin_read_out(); });

@@ -41,7 +41,9 @@ struct FilterCalls {
   int (*slice_credit)();  // that cuts a sample into equal slices
   void (*begin_row)(const Row& row);
   bool (*step_row)(int& credit);
-  const filter::UpdateReport& (*report)();
+  bool together;  // the reports of all rows stand after step_rows; else each after its step_row
+  bool (*step_rows)(int& credit);
+  const filter::UpdateReport& (*report)(int joint);
   void (*begin_end)(std::uint32_t moving);
   bool (*step_end)(int& credit);
   void (*begin_read_out)();
@@ -97,7 +99,8 @@ struct Instance {
     else parts().filter.BeginRow(row.joint, row.front, row.dense, row.y, row.use);
   }
   static bool StepRow(int& credit) { return parts().filter.StepRow(credit); }
-  static const filter::UpdateReport& Report() { return parts().filter.report(); }
+  static bool StepRows(int& credit) { return parts().filter.StepRows(credit); }
+  static const filter::UpdateReport& Report(int joint) { return parts().filter.report(joint); }
   static void BeginEnd(std::uint32_t moving) { parts().filter.BeginEnd(moving); }
   static bool StepEnd(int& credit) { return parts().filter.StepEnd(credit); }
   static void BeginReadOut() { parts().filter.BeginReadOut(parts().read_out); }
@@ -117,6 +120,8 @@ struct Instance {
             SliceCredit,
             BeginRow,
             StepRow,
+            Filter::kTogether,
+            StepRows,
             Report,
             BeginEnd,
             StepEnd,

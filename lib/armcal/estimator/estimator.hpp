@@ -19,15 +19,13 @@ struct Row {
   float dense[Model::kDense] = {};  // from kRowBegin[joint] on; what is before is not of this row
   float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // extended filter only
   float y = 0.0f;
-  float load_Nm = 0.0f, model_Nm = 0.0f;  // committed torque of the dense columns alone, and of all columns
-  float residual_Nm = 0.0f;               // measured minus committed
 };
 
-// Fills in front, dense, residual_Nm and y = (tau - tau at b0) / sigma; row.model_Nm is given. seen: the regressor that
-// the filter sees. One copy serves all estimators of a model. Context: background.
+// Fills in front, dense and y = residual_Nm / sigma, where residual_Nm is the measured torque minus the one at b0.
+// seen: the regressor that the filter sees. One copy serves all estimators of a model. Context: background.
 template <class Model>
-ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows<Model>& seen, int joint, float tau_Nm,
-                             Row<Model>& row) {
+ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows<Model>& seen, int joint,
+                             float residual_Nm, Row<Model>& row) {
   const int first = Model::kFrontBegin[joint], end = Model::kFrontBegin[joint + 1];
   const float whiten = 1.0f / table.sigma_Nm[joint];
   const auto scaled = [&](float value, int column) {
@@ -36,8 +34,7 @@ ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows
   for (int k = first; k < end; ++k) row.front[k - first] = scaled(seen.front[k], k);
   for (int k = Model::kRowBegin[joint]; k < Model::kDense; ++k)
     row.dense[k] = scaled(seen.dense[joint * Model::kDense + k], Model::kFront + k);
-  row.residual_Nm = tau_Nm - row.model_Nm;
-  row.y = row.residual_Nm * whiten;
+  row.y = residual_Nm * whiten;
 }
 
 // Works the samples of an intake into one filter.
@@ -148,7 +145,7 @@ class Estimator {
   const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kEnd, kReset, kReadOut };
+  enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kRows, kReport, kEnd, kReset, kReadOut };
   // Credit of a sample's regressor, and of a row's whitening and statistics: from counts of six-axis models.
   static constexpr int kSampleCost = Intake<Model>::kEvaluationCost, kRowCost = 5 * Model::kDense / 2;
   static constexpr int kGateCost = 5 * n * Model::kDense / 2;  // of both torques of all rows, and of the gate
@@ -165,6 +162,13 @@ class Estimator {
         return true;
       case Stage::kUpdate:
         if (filter_.StepRow(credit_)) FinishRow();
+        return true;
+      case Stage::kRows:
+        if (filter_.StepRows(credit_)) joint_ = 0, stage_ = Stage::kReport;
+        return true;
+      case Stage::kReport:
+        ReportRow();
+        if (++joint_ == n) EndRows();
         return true;
       case Stage::kEnd:
         if (filter_.StepEnd(credit_)) FinishSample();
@@ -214,9 +218,10 @@ class Estimator {
       const float tau_Nm = intake_.sample().tau[i], whiten = 1.0f / table_->sigma_Nm[i];
       load_Nm_[i] = model::LoadTorque(table_->committed.p, intake_.rows(), i);
       tau_model_Nm_[i] = model::RowTorque(table_->committed.p, intake_.rows(), i, load_Nm_[i]);
+      residual_Nm_[i] = tau_Nm - tau_model_Nm_[i];
       const float known_Nm = model::RowTorque(known_, FilterRows(), i);
       const bool moves = ((intake_.moving() >> i) & 1u) != 0u;
-      const bool inside = gate_.Admit(i, (tau_Nm - tau_model_Nm_[i]) * whiten, (tau_Nm - known_Nm) * whiten, moves,
+      const bool inside = gate_.Admit(i, residual_Nm_[i] * whiten, (tau_Nm - known_Nm) * whiten, moves,
                                       intake_.sample().qd[i] > 0.0f, table_->gate_sigma[i]);
       outside_ |= static_cast<std::uint32_t>(moves & !inside) << i;
     }
@@ -233,13 +238,10 @@ class Estimator {
   }
 
   void BeginRow() {
-    const float tau_Nm = intake_.sample().tau[joint_];
     const bool use = ((updating_ >> joint_) & 1u) != 0u;
-    row_.load_Nm = load_Nm_[joint_];
-    row_.model_Nm = tau_model_Nm_[joint_];
-    FillRow(*table_, FilterRows(), joint_, tau_Nm, row_);
+    FillRow(*table_, FilterRows(), joint_, residual_Nm_[joint_], row_);
     if constexpr (Filter::kExtended) {
-      live_.CompleteRow(*table_, joint_, tau_Nm, row_);
+      live_.CompleteRow(*table_, joint_, intake_.sample().tau[joint_], row_);
       filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use, row_.eta);
     } else {
       filter_.BeginRow(joint_, row_.front, row_.dense, row_.y, use);
@@ -254,14 +256,18 @@ class Estimator {
   }
 
   void FinishRow() {
+    if (!Filter::kTogether) ReportRow();
+    stage_ = ++joint_ < n ? Stage::kRow : Stage::kRows;
+    if (!Filter::kTogether && joint_ == n) EndRows();
+  }
+
+  void ReportRow() {
     const int i = joint_;
-    const filter::UpdateReport& report = filter_.report();
+    const filter::UpdateReport& report = filter_.report(i);
     used_ |= static_cast<std::uint32_t>(report.accepted) << i;
     const bool moves = ((intake_.moving() >> i) & 1u) != 0u;
     estimates_.rows_outside[i] += (outside_ >> i) & 1u;
-    statistics_.Add(i, report, row_.residual_Nm, row_.load_Nm, intake_.sample(), moves, estimates_);
-    stage_ = ++joint_ == n ? Stage::kEnd : Stage::kRow;
-    if (stage_ == Stage::kEnd) EndRows();
+    statistics_.Add(i, report, residual_Nm_[i], load_Nm_[i], intake_.sample(), moves, estimates_);
   }
 
   void EndRows() {
@@ -269,6 +275,7 @@ class Estimator {
       for (int e = 0; e < Model::kNonlinear; ++e)
         filter_.Clamp(Model::kColumns + e, table_->eta_low[e], table_->eta_high[e]);
     filter_.BeginEnd(updating_);
+    stage_ = Stage::kEnd;
   }
 
   void FinishSample() {
@@ -318,7 +325,8 @@ class Estimator {
   RowStatistics<Model> statistics_;
   RowGate<n> gate_;
   Estimates<Model> estimates_;
-  float load_Nm_[n] = {}, tau_model_Nm_[n] = {};
+  // Torque that the committed table explains by the dense columns alone, by all columns, and what it leaves.
+  float load_Nm_[n] = {}, tau_model_Nm_[n] = {}, residual_Nm_[n] = {};
   // What the gate knows: the estimates at the first sample of each period of ticks, whoever else asks for a read-out.
   // So the same motion gives the same rows, also to a program on a PC that has not seen the rest before it.
   float known_[Model::kColumns] = {};

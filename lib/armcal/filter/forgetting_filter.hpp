@@ -18,7 +18,7 @@ template <class Layout>
 class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
  public:
   static constexpr int kColumns = Layout::kColumns;
-  static constexpr bool kExtended = false;
+  static constexpr bool kExtended = false, kTogether = true;
   static constexpr float kFloor = 1e-6f;
   using Columns = Order<Layout, Form::kBlock, Beside::kNothing>;
 
@@ -37,13 +37,27 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   static constexpr Offsets kOffsets{};
   static constexpr int kTriangle = kOffsets.at[kColumns];
 
+  // Row i is worked in from dense column at[i] on. That is kRowBegin[i], or less where a later row begins before.
+  struct Starts {
+    std::uint8_t at[Layout::kJoints] = {};
+    bool ordered = true;  // all are kRowBegin
+    int width = 0;        // the most front columns that a row has
+    constexpr Starts() {
+      for (int i = Layout::kJoints - 1, least = Layout::kDense; i >= 0; --i) {
+        const int begin = Layout::kRowBegin[i], fronts = Layout::kFrontBegin[i + 1] - Layout::kFrontBegin[i];
+        ordered &= begin <= least;
+        least = begin < least ? begin : least;
+        at[i] = static_cast<std::uint8_t>(least);
+        width = fronts > width ? fronts : width;
+      }
+    }
+  };
+  static constexpr Starts kStart{};
+
   // The cost of the rows and the end of a sample (slices.hpp).
   static constexpr int SampleCost() {
-    int cost = kEndCost;
-    for (int i = 0; i < Layout::kJoints; ++i) {
-      const int length = Layout::kFrontBegin[i + 1] - Layout::kFrontBegin[i] + Layout::kDense - Layout::kRowBegin[i];
-      cost += kRowCost + length * kColumnCost + length * (length + 1) / 2;
-    }
+    int cost = kEndCost + Layout::kJoints * kRowCost;
+    for (int k = 0; k < kPassCount; ++k) cost += kPasses.at[k].cost;
     return cost;
   }
 
@@ -68,62 +82,54 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   }
 
   // One whitened row of `joint`. Shapes: front [the joint's front columns]; dense [kDense], zero before
-  // kRowBegin[joint]. If use is false or the report is not kOk, no bit of the triangle changes, and the instructions
-  // are the same. After BeginRow call StepRow, which spends credit (slices.hpp), until it answers true; then report().
+  // kRowBegin[joint]. If use is false or the report is not kOk, the row acts as a row of zeros: no bit of the triangle
+  // changes, and the instructions are the same. The rows of a sample are worked in together: after BeginRow and StepRow
+  // of each of them call StepRows, which spends credit (slices.hpp), until it answers true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
-    const int begin = Layout::kRowBegin[joint];
-    first_ = Layout::kFrontBegin[joint];
-    width_ = Layout::kFrontBegin[joint + 1] - first_;
-    length_ = width_ + Layout::kDense - begin;
-    dense_first_ = Layout::kFront + begin;
-    std::uint32_t largest = 0;
-    const auto put = [&](int k, float value) {
-      largest = math::Max(largest, MagnitudeBits(value));
-      row_[k] = value;
-    };
-    for (int k = 0; k < width_; ++k) put(k, front[k]);
-    for (int k = begin; k < Layout::kDense; ++k) put(width_ + k - begin, dense[k]);
-    put(length_, y);
-    const std::uint32_t taken = Admit(use, largest, report_);
-    for (int k = 0; k <= length_; ++k) row_[k] = math::Masked(row_[k], taken);
-    weight_ = 1.0f;
+    const int first = Layout::kRowBegin[joint], width = Layout::kFrontBegin[joint + 1] - Layout::kFrontBegin[joint];
+    const int seen = Layout::kDense - first;
+    const std::uint32_t largest = LargestOf(front, width, LargestOf(dense + first, seen, MagnitudeBits(y)));
+    const std::uint32_t taken = Admit(use, largest, report_[joint]);
+    float* const row = block_ + Slot(first) + joint;
+    CopyMasked<kJoints>(front, width, taken, row - width * kJoints);
+    CopyMasked<kJoints>(dense + first, seen, taken, row);
+    row[seen * kJoints] = math::Masked(y, taken);
+    weight_[joint] = 1.0f;
+    begun_ |= 1u << joint;
     next_ = 0;
   }
-  ARMCAL_NOINLINE bool StepRow(int& credit) {  // out of line, so that no caller takes its registers
+  bool StepRow(int& credit) {
+    credit -= kRowCost;
+    return true;
+  }
+  ARMCAL_NOINLINE bool StepRows(int& credit) {  // out of line, so that no caller takes its registers
+    if (next_ == 0) ClearOthers();
     int k = next_, left = credit;
-    float weight = weight_;
-    float* const row = row_;
-    for (; k < length_ && left > 0; ++k) {
-      const int column = ColumnAt(k), after = ColumnAt(k + 1), rest = length_ - k - 1;
-      weight = math::GivensRows(d_ + column, rows_ + kOffsets.at[column], d_ + after, rows_ + kOffsets.at[after],
-                                row[k], row + k + 1, rest, weight);
-      left -= kColumnCost + rest + 1;
-      if (rest == 0) continue;
-      left -= kColumnCost + rest;
-      ++k;
+    for (; k < kPassCount && left > 0; ++k) {
+      const Pass& pass = kPasses.at[k];
+      if (!kStart.ordered && pass.column == Layout::kFront) ClearBeforeRows();
+      Work(pass);
+      left -= pass.cost;
     }
     credit = left;
     next_ = k;
-    weight_ = weight;
-    if (k < length_) return false;
-    credit -= kRowCost;
-    report_.innovation = row_[length_];
-    weight = math::Max(weight, 1e-30f);
-    report_.variance = 1.0f / weight;
+    if (k < kPassCount) return false;
+    for (int i = 0; i < kJoints; ++i) {
+      report_[i].innovation = block_[Slot(Layout::kDense) + i];
+      report_[i].variance = 1.0f / math::Max(weight_[i], 1e-30f);
+    }
+    begun_ = 0;
     return true;
   }
-  const UpdateReport& report() const { return report_; }
+  const UpdateReport& report(int joint) const { return report_[joint]; }
 
   // Once after the rows of a sample. A front column forgets if its joint moves (bit i of `moving`), a dense column if
   // all joints move. A joint at rest brings no new data, so what is known of it must not fade.
   void BeginEnd(std::uint32_t moving) {
     constexpr std::uint32_t kAll = (1u << Layout::kJoints) - 1u;
-    int k = 0;
-    for (int i = 0; i <= Layout::kJoints; ++i) {
-      const bool moves = i < Layout::kJoints ? (moving >> i & 1u) != 0u : (moving & kAll) == kAll;
-      for (const int end = ColumnsOfBlock<Layout>(i, kColumns).end; k < end; ++k)
-        d_[k] = math::Max(d_[k] * math::Select(moves, prior_->lambda[k], 1.0f), kFloor);
-    }
+    for (int i = 0; i < Layout::kJoints; ++i)
+      Forget(Layout::kFrontBegin[i], Layout::kFrontBegin[i + 1], moving >> i & 1u);
+    Forget(Layout::kFront, kColumns, (moving & kAll) == kAll);
   }
   bool StepEnd(int& credit) {
     credit -= kEndCost;
@@ -195,9 +201,119 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   const float* triangle() const { return rows_; }  // [kTriangle] R and z, row by row
 
  private:
-  int ColumnAt(int k) const { return k < width_ ? first_ + k : dense_first_ + k - width_; }  // of the row in work
+  static constexpr int kJoints = Layout::kJoints;
+  static constexpr int kRowCost = 20 + Layout::kDense, kEndCost = 10 + 3 * kColumns / 2;
 
-  static constexpr int kColumnCost = 6, kRowCost = 24, kEndCost = 2 * kColumns;
+  // The rows stand side by side. Element k of row i is block_[Slot(k) + i]: k < kDense a dense column, kDense the
+  // measurement. The front columns of a row stand just before its first dense column, as in the triangle.
+  static constexpr int Slot(int dense) { return (kStart.width + dense) * kJoints; }
+
+  // Some columns whose stored rows take `rows` rows, from row `first` on. length: of the elements after these columns.
+  struct Pass {
+    std::uint16_t stored, block;  // where the first stored row begins in rows_, and its element in block_
+    std::uint16_t cost;
+    std::uint8_t column, columns, first, rows, length;
+  };
+  static constexpr int kMostRows = kJoints < 6 ? kJoints : 6;  // of a pass
+  static constexpr int kFewRows = kJoints < 3 ? kJoints : 3;   // so many are worked into four columns at a time
+  template <int most>
+  struct Passes {
+    Pass at[most] = {};
+    int count = 0;
+    constexpr Passes() {
+      for (int i = 0; i < kJoints; ++i)
+        for (int k = Layout::kFrontBegin[i], end = Layout::kFrontBegin[i + 1]; k < end;) {
+          const int columns = end - k < 4 ? end - k : 4;
+          Add(k, columns, i, 1, Layout::kRowBegin[i] - (end - k));
+          k += columns;
+        }
+      for (int k = 0, rows = 0; k < Layout::kDense;) {
+        int columns = (Layout::kDense - k) % 2 == 0 ? 2 : 1;
+        while (rows < kJoints && kStart.at[rows] < k + columns) ++rows;
+        const bool more = rows < kJoints && kStart.at[rows] < k + 4;  // a row begins at the third column or the fourth
+        if (columns == 2 && k + 4 <= Layout::kDense && rows <= kFewRows && !more) columns = 4;
+        for (int i = 0; i < rows; i += kMostRows)
+          Add(Layout::kFront + k, columns, i, rows - i < kMostRows ? rows - i : kMostRows, k);
+        k += columns;
+      }
+    }
+    constexpr bool Has(int columns, int rows = 0) const {  // 0: any number
+      for (int k = 0; k < most; ++k)
+        if (at[k].columns == columns && (rows == 0 || at[k].rows == rows)) return true;
+      return false;
+    }
+
+   private:
+    constexpr void Add(int column, int columns, int first, int rows, int element) {
+      const int length = Layout::kDense + 1 - element - columns, area = rows * columns;
+      if (count < most) {
+        Pass& pass = at[count];
+        pass.stored = kOffsets.at[column];
+        pass.block = static_cast<std::uint16_t>(Slot(element) + first);
+        pass.column = static_cast<std::uint8_t>(column);
+        pass.columns = static_cast<std::uint8_t>(columns);
+        pass.first = static_cast<std::uint8_t>(first);
+        pass.rows = static_cast<std::uint8_t>(rows);
+        pass.length = static_cast<std::uint8_t>(length);
+        pass.cost = static_cast<std::uint16_t>(16 + area * 3 + area * length * (rows == 1 ? 15 : 12) / 16);
+      }
+      ++count;
+    }
+  };
+  static constexpr int kPassCount = Passes<1>().count;
+  static constexpr Passes<kPassCount> kPasses{};
+
+  template <int columns, int... row>
+  void WorkColumns(const Pass& pass, std::integer_sequence<int, row...>) {
+    float* const block = block_ + pass.block;
+    float* const stored = rows_ + pass.stored;
+    float rotation[2 * sizeof...(row) * columns];
+    const int front = pass.column < Layout::kFront ? Layout::kDense : pass.column - Layout::kFront;
+    math::GivensCorner<columns, kJoints>(d_ + pass.column, stored, block, pass.length, kStart.at + pass.first, front,
+                                         pass.rows, weight_ + pass.first, rotation);
+    const auto fold = [&](auto rows) {
+      if constexpr (kPasses.Has(columns, rows))
+        if (pass.rows == rows) math::FoldBlock<rows, columns, kJoints>(block, stored, rotation, pass.length);
+    };
+    (fold(std::integral_constant<int, row + 1>{}), ...);
+  }
+  void Work(const Pass& pass) {
+    constexpr auto many = std::make_integer_sequence<int, kMostRows>{};
+    constexpr auto few = std::make_integer_sequence<int, kFewRows>{};
+    constexpr auto one = std::make_integer_sequence<int, 1>{};
+    if constexpr (kPasses.Has(1))
+      if (pass.columns == 1) return WorkColumns<1>(pass, many);
+    if constexpr (kPasses.Has(2))
+      if (pass.columns == 2) return WorkColumns<2>(pass, many);
+    if constexpr (kPasses.Has(3))
+      if (pass.columns == 3) return WorkColumns<3>(pass, one);
+    if constexpr (kPasses.Has(4))
+      if (pass.columns == 4) return WorkColumns<4>(pass, few);
+  }
+
+  ARMCAL_NOINLINE void Forget(int begin, int end, bool moves) {
+    const std::uint32_t mask = math::MaskOf(moves), none = math::BitsOf(1.0f) & ~mask;
+    const float* const lambda = prior_->lambda;
+    float* const d = d_;
+    for (int k = begin; k < end; ++k)
+      d[k] = math::Max(d[k] * math::FloatOf((math::BitsOf(lambda[k]) & mask) | none), kFloor);
+  }
+
+  // A row that the sample does not have is a row of zeros.
+  void ClearOthers() {
+    for (int i = 0; i < kJoints; ++i) {
+      if ((begun_ >> i & 1u) != 0u) continue;
+      for (int k = i; k < Slot(Layout::kDense + 1); k += kJoints) block_[k] = 0.0f;
+      weight_[i] = 1.0f;
+      report_[i] = UpdateReport{};
+    }
+  }
+
+  // Between kStart and the row's own beginning, where its front columns stood.
+  void ClearBeforeRows() {
+    for (int i = 0; i < kJoints; ++i)
+      for (int k = kStart.at[i]; k < Layout::kRowBegin[i]; ++k) block_[Slot(k) + i] = 0.0f;
+  }
 
   // The dense columns of a front column's row may be anywhere in their prior. That acts on the row as additional noise,
   // and this reduces the row's weight accordingly. Returns the work, in elements.
@@ -234,12 +350,13 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   }
 
   const Prior<Layout>* prior_ = nullptr;
-  UpdateReport report_;
+  UpdateReport report_[Layout::kJoints];
   float d_[kColumns] = {};
   float rows_[kTriangle] = {};
-  float row_[kColumns + 1] = {};  // what remains of the row in work
-  float weight_ = 0.0f;
-  int first_ = 0, width_ = 0, length_ = 0, dense_first_ = 0, next_ = 0;
+  float block_[(kStart.width + Layout::kDense + 1) * Layout::kJoints] = {};  // what remains of the rows in work
+  float weight_[kJoints] = {};
+  std::uint32_t begun_ = 0;  // rows of the sample in work, a bit each
+  int next_ = 0;             // pass
 };
 
 }  // namespace armcal::filter

@@ -69,7 +69,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     report_.status = GatedUnless(report_.accepted, report_.status);
     return true;
   }
-  const UpdateReport& report() const { return report_; }
+  const UpdateReport& report(int) const { return report_; }  // of the last row
 
   // The cost of the rows and the end of a sample (slices.hpp). A considered column makes it larger.
   int SampleCost() const {
@@ -163,6 +163,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   UpdateReport report_;
   std::uint32_t considered_[(kSize + 31) / 32] = {};
   std::uint8_t turn_[kSize] = {};  // positions with noise
+  int joint_ = 0;                  // of the row in work
   int turns_ = 0, next_turn_ = 0, last_noise_ = 0;
   ColumnRange reset_ = {};  // what remains of a reset
   std::uint32_t floor_count_ = 0, clamp_count_ = 0;

@@ -154,7 +154,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     Report();
     return true;
   }
-  const UpdateReport& report() const { return report_; }
+  const UpdateReport& report(int) const { return report_; }  // of the last row
 
   void BeginEnd(std::uint32_t moving) {
     moving_ = moving;

@@ -32,6 +32,17 @@ inline std::uint32_t Admit(bool use, std::uint32_t largest_magnitude_bits, Updat
   return math::MaskOf(report.accepted);
 }
 
+// The bits of the largest magnitude of value[k], k < count, and `largest`.
+ARMCAL_NOINLINE inline std::uint32_t LargestOf(const float* value, int count, std::uint32_t largest) {
+  math::internal::ByFours(count, [&](int k) ARMCAL_INLINE { largest = math::Max(largest, MagnitudeBits(value[k])); });
+  return largest;
+}
+// h[k * stride] = value[k] for k < count, or zero if the mask is.
+template <int stride>
+ARMCAL_NOINLINE void CopyMasked(const float* __restrict value, int count, std::uint32_t mask, float* __restrict h) {
+  math::internal::ByFours(count, [&](int k) ARMCAL_INLINE { h[k * stride] = math::Masked(value[k], mask); });
+}
+
 // h[position[k]] = value[k] for k < count. Returns the bits of the largest magnitude.
 ARMCAL_NOINLINE inline std::uint32_t Scatter(const float* value, const std::uint8_t* position, int count, float* h) {
   std::uint32_t largest = 0;

@@ -32,16 +32,25 @@ struct UpdateReport {
 
 // The calls without slices, made of those in slices. Base of a Filter that has BeginRow, StepRow, report, BeginEnd and
 // StepEnd. Context: background.
+//
+// A sample: BeginRow, then StepRow until it answers true, for each row; then StepRows until it answers true. Then
+// BeginEnd, and StepEnd until it answers true. A filter that works rows in one by one (kTogether is false) has nothing
+// to do in StepRows, and its report is that of the row before, until the next BeginRow. Else the reports of all rows
+// stand after StepRows.
 template <class Filter>
 class WholeRows {
  public:
-  // A whole row. Arguments as of BeginRow.
+  static constexpr bool kTogether = false;
+  bool StepRows(int&) { return true; }
+
+  // A sample of one row. Arguments as of BeginRow.
   template <class... Row>
   UpdateReport Update(int joint, const Row&... row) {
     self().BeginRow(joint, row...);
     int all = kNoSlices;
     (void)self().StepRow(all);
-    return self().report();
+    (void)self().StepRows(all);
+    return self().report(joint);
   }
   // The whole end of a sample. Arguments as of BeginEnd.
   void EndSample(std::uint32_t moving) {

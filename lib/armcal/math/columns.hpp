@@ -7,6 +7,9 @@
 // fused operation takes three. Context: any.
 #pragma once
 
+#include <cstdint>
+#include <utility>
+
 #include "armcal/math/elementary.hpp"  // refuses -ffast-math, which would reorder the sums
 
 namespace armcal::math {
@@ -99,31 +102,6 @@ template <class T>
 void Fold(T* __restrict x, T* __restrict r, T x0, T s, int length) {
   for (int k = 0; k < length; ++k) internal::FoldElement(x[k], r[k], x0, s);
 }
-// The same with r1, then with r2. Every load of a turn stands before its first store. Compilers keep that order, and a
-// core that issues in order (Cortex-M7) would otherwise wait for each element's chain before it starts the next one.
-template <class T>
-ARMCAL_NOINLINE void Fold(T* __restrict x, T* __restrict r1, T* __restrict r2, T x1, T s1, T x2, T s2, int length) {
-  int k = 0;
-  for (; k + 3 < length; k += 4) {
-    T x_a = x[k], x_b = x[k + 1], x_c = x[k + 2], x_d = x[k + 3];
-    T a1 = r1[k], b1 = r1[k + 1], c1 = r1[k + 2], d1 = r1[k + 3];
-    T a2 = r2[k], b2 = r2[k + 1], c2 = r2[k + 2], d2 = r2[k + 3];
-    internal::FoldElement(x_a, a1, x1, s1), internal::FoldElement(x_b, b1, x1, s1);
-    internal::FoldElement(x_c, c1, x1, s1), internal::FoldElement(x_d, d1, x1, s1);
-    internal::FoldElement(x_a, a2, x2, s2), internal::FoldElement(x_b, b2, x2, s2);
-    internal::FoldElement(x_c, c2, x2, s2), internal::FoldElement(x_d, d2, x2, s2);
-    r1[k] = a1, r1[k + 1] = b1, r1[k + 2] = c1, r1[k + 3] = d1;
-    r2[k] = a2, r2[k + 1] = b2, r2[k + 2] = c2, r2[k + 3] = d2;
-    x[k] = x_a, x[k + 1] = x_b, x[k + 2] = x_c, x[k + 3] = x_d;
-  }
-  for (; k < length; ++k) {
-    T rest = x[k];
-    internal::FoldElement(rest, r1[k], x1, s1);
-    internal::FoldElement(rest, r2[k], x2, s2);
-    x[k] = rest;
-  }
-}
-
 // A row worked into a unit upper triangle R by Givens rotations without square roots: W. M. Gentleman, Least squares
 // computations by Givens transformations without square roots, 1973. The triangle stands for the information R' diag(d)
 // R. A row of zeros leaves every bit as it was.
@@ -141,19 +119,106 @@ T GivensPivot(T& d, T x0, T weight, T& s) {
   return remaining;
 }
 
-// Works a row (x0, x) of the given weight into two stored rows with d > 0: (1, r1[0..length]), which eliminates x0, and
-// after it (1, r2[0..length - 1]), which eliminates what is left of x[0]. With length 0 there is only the first stored
-// row. Shapes: x and r1 [length + 1], r2 [length]. x becomes what remains of the row. Returns the weight of that.
-template <class T>
-T GivensRows(T* d1, T* __restrict r1, T* d2, T* __restrict r2, T x0, T* __restrict x, int length, T weight) {
-  T s1, s2;
-  weight = GivensPivot(*d1, x0, weight, s1);
-  internal::FoldElement(x[0], r1[0], x0, s1);
-  if (length == 0) return weight;
-  const T x1 = x[0];
-  weight = GivensPivot(*d2, x1, weight, s2);
-  Fold(x + 1, r1 + 1, r2, x0, s1, x1, s2, length);
-  return weight;
+// A block of rows is worked in together: element k of row i is x[k * stride + i]. Several stored rows take them at a
+// time. Each stored row takes the rows in their order, so the bits are those of one row after the other. But each
+// element is loaded once for all stored rows, and each stored element once for all rows.
+// Stored rows stand one behind the other: (1, r[0..]) for element 0, then (1, ...) for element 1, and so on; each of
+// them has one element less than the one before. All have d > 0. `length`: the elements of a row after those that are
+// eliminated.
+
+namespace internal {
+// Calls f for 0 .. count - 1, each a constant. Unrolled by hand: at -O2 a compiler keeps such loops and their arrays.
+template <class F, int... k>
+ARMCAL_INLINE inline void EachOf([[maybe_unused]] F f, std::integer_sequence<int, k...>) {
+  (f(std::integral_constant<int, k>{}), ...);
+}
+template <int count, class F>
+ARMCAL_INLINE inline void Each(F f) {
+  EachOf(f, std::make_integer_sequence<int, count>{});
+}
+
+// `turns` elements of each row. They are loaded before the first store: a core that issues in order (Cortex-M7) would
+// otherwise wait for each element's chain before it starts the next one.
+template <int rows, int stored, int stride, int turns, class T>
+ARMCAL_INLINE inline void FoldTurn(T* __restrict x, T* const* r, const T* c) {
+  T own[turns * rows], kept[turns * stored];
+  Each<turns>([&](auto t) ARMCAL_INLINE {
+    Each<rows>([&](auto i) ARMCAL_INLINE { own[t * rows + i] = x[t * stride + i]; });
+    Each<stored>([&](auto j) ARMCAL_INLINE { kept[t * stored + j] = r[j][t]; });
+  });
+  Each<rows>([&](auto i) ARMCAL_INLINE {
+    Each<stored>([&](auto j) ARMCAL_INLINE {
+      constexpr int kAt = 2 * (i * stored + j);
+      Each<turns>([&](auto t)
+                      ARMCAL_INLINE { FoldElement(own[t * rows + i], kept[t * stored + j], c[kAt], c[kAt + 1]); });
+    });
+  });
+  Each<turns>([&](auto t) ARMCAL_INLINE {
+    Each<stored>([&](auto j) ARMCAL_INLINE { r[j][t] = kept[t * stored + j]; });
+    Each<rows>([&](auto i) ARMCAL_INLINE { x[t * stride + i] = own[t * rows + i]; });
+  });
+}
+}  // namespace internal
+
+// Folds all elements of `rows` rows, from the second one after the eliminated ones on, into `stored` stored rows. With
+// more than one row `length` is odd.
+template <int rows, int stored, int stride, class T>
+ARMCAL_NOINLINE void FoldBlock(T* __restrict x, T* __restrict first, const T* __restrict rotation, int length) {
+  constexpr int kTurns = rows * stored <= 10 ? 2 : 1;  // as many as the registers hold
+  T c[2 * rows * stored];
+  T* r[stored];
+  internal::Each<2 * rows * stored>([&](auto k) ARMCAL_INLINE { c[k] = rotation[k]; });
+  r[0] = first + stored;
+  internal::Each<stored - 1>([&](auto j) ARMCAL_INLINE { r[j + 1] = r[j] + (length + stored - 2 - j); });
+  x += (stored + 1) * stride;
+  const T* const end = r[0] + (length - 1);
+  const auto turns = [&](auto many) ARMCAL_INLINE {
+    internal::FoldTurn<rows, stored, stride, many>(x, r, c);
+    internal::Each<stored>([&](auto j) ARMCAL_INLINE { r[j] += many; });
+    x += many * stride;
+  };
+  while (r[0] + (kTurns - 1) < end) turns(std::integral_constant<int, kTurns>{});
+  if constexpr (rows == 1 && kTurns == 2)
+    if (r[0] < end) turns(std::integral_constant<int, 1>{});
+}
+
+// The part of an elimination that goes row by row: all pivots, and the elements up to the first one after them. Row i
+// begins at element first[i] - column if that is positive, else at 0. Changes the rows' weights [rows] to those of what
+// remains. Fills in rotation [rows][stored][2]: x0 and s of Fold.
+template <int stored, int stride, class T>
+ARMCAL_NOINLINE void GivensCorner(T* d, T* first, T* __restrict x, int length, const std::uint8_t* begin, int column,
+                                  int rows, T* __restrict weight, T* __restrict rotation) {
+  using internal::Each;
+  T diagonal[stored], corner[stored * stored];
+  T* r[stored];
+  r[0] = first;
+  Each<stored - 1>([&](auto j) ARMCAL_INLINE { r[j + 1] = r[j] + (length + stored - 1 - j); });
+  Each<stored>([&](auto j) ARMCAL_INLINE {
+    diagonal[j] = d[j];
+    Each<stored - j>([&](auto k) ARMCAL_INLINE { corner[j * stored + k] = r[j][k]; });
+  });
+  for (int i = 0; i < rows; ++i, ++x, rotation += 2 * stored) {
+    T own[stored + 1], remaining = weight[i];
+    Each<stored + 1>([&](auto k) ARMCAL_INLINE { own[k] = x[k * stride]; });
+    const int skipped = begin[i] - column;
+    Each<stored>([&](auto j) ARMCAL_INLINE {
+      T x0 = T(0), s = T(0);
+      if (j + 1 == stored || j >= skipped) {
+        x0 = own[j];
+        remaining = GivensPivot(diagonal[j], x0, remaining, s);
+        Each<stored - j>([&](auto k)
+                             ARMCAL_INLINE { internal::FoldElement(own[j + 1 + k], corner[j * stored + k], x0, s); });
+      }
+      rotation[2 * j] = x0;
+      rotation[2 * j + 1] = s;
+    });
+    weight[i] = remaining;
+    x[stored * stride] = own[stored];
+  }
+  Each<stored>([&](auto j) ARMCAL_INLINE {
+    d[j] = diagonal[j];
+    Each<stored - j>([&](auto k) ARMCAL_INLINE { r[j][k] = corner[j * stored + k]; });
+  });
 }
 
 }  // namespace armcal::math

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "armcal/math/elementary.hpp"
+#include "armcal/math/columns.hpp"
 #include "armcal/model/contract.hpp"
 
 namespace armcal::model {
@@ -54,25 +54,29 @@ void EvaluateRows(const Committed<Model>& committed, const ModelInput<float, Mod
   }
 }
 
-// Torque of one joint from the dense columns alone, without the joint's own friction and effects. Context: any.
-template <class Model>
-float LoadTorque(const float* p, const Rows<Model>& rows, int joint) {
-  float sum = 0.0f;
-  for (int k = Model::kRowBegin[joint]; k < Model::kDense; ++k) {
-    const float parameter = p[Model::kFront + k];
-    sum += parameter * math::Masked(rows.dense[joint * Model::kDense + k], math::MaskOf(parameter != 0.0f));
-  }
+// sum + the sum of p[k] value[k] for k < count. A column whose parameter is zero adds nothing, even if its value is not
+// finite: an effect in standby may read a sensor that the machine does not have. The instructions are the same for any
+// numbers. Context: any.
+ARMCAL_NOINLINE inline float AddTorque(const float* p, const float* value, int count, float sum) {
+  math::internal::ByFours(count, [&](int k) ARMCAL_INLINE {
+    const bool counts = math::BitsOf(p[k]) << 1 != 0u;  // neither 0 nor -0
+    sum += p[k] * math::FloatOf(counts ? math::BitsOf(value[k]) : 0u);
+  });
   return sum;
 }
 
-// Torque of one joint; load_Nm is its LoadTorque. A column whose parameter is zero adds nothing, even if its value is
-// not finite: an effect in standby may read a sensor that the machine does not have. Context: any.
+// Torque of one joint from the dense columns alone, without the joint's own friction and effects. Context: any.
+template <class Model>
+float LoadTorque(const float* p, const Rows<Model>& rows, int joint) {
+  const int first = Model::kRowBegin[joint];
+  return AddTorque(p + Model::kFront + first, rows.dense + joint * Model::kDense + first, Model::kDense - first, 0.0f);
+}
+
+// Torque of one joint; load_Nm is its LoadTorque. Context: any.
 template <class Model>
 float RowTorque(const float* p, const Rows<Model>& rows, int joint, float load_Nm) {
-  float sum = load_Nm;
-  for (int k = Model::kFrontBegin[joint]; k < Model::kFrontBegin[joint + 1]; ++k)
-    sum += p[k] * math::Masked(rows.front[k], math::MaskOf(p[k] != 0.0f));
-  return sum;
+  const int first = Model::kFrontBegin[joint];
+  return AddTorque(p + first, rows.front + first, Model::kFrontBegin[joint + 1] - first, load_Nm);
 }
 template <class Model>
 float RowTorque(const float* p, const Rows<Model>& rows, int joint) {

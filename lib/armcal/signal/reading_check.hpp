@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "armcal/math/elementary.hpp"
+#include "armcal/math/columns.hpp"
 
 namespace armcal::signal {
 
@@ -30,9 +30,9 @@ class CountCheck {
 
   void Start(float counts_to_rad, float tick_rate_Hz) {
     const float counts = math::Divide(1.0f, math::Abs(counts_to_rad) * tick_rate_Hz);
-    fastest_ = kLargestSpeed_radps * counts + kFewCounts;
-    most_ = kLargestAcceleration_radps2 / tick_rate_Hz * counts;
-    least_ = kUsualAcceleration_radps2 / tick_rate_Hz * counts;
+    fastest_ = Whole(kLargestSpeed_radps * counts) + kFewCounts;
+    most_ = Whole(kLargestAcceleration_radps2 / tick_rate_Hz * counts * kSustained);
+    least_ = Whole(kUsualAcceleration_radps2 / tick_rate_Hz * counts * kSustained);
     sustained_ = least_;
     patience_ = static_cast<std::uint32_t>(kPatience_s * tick_rate_Hz);
     Restart();
@@ -44,8 +44,8 @@ class CountCheck {
     sign_run_ = 0;
   }
 
-  // True: the count can be believed. The time depends on the counts by a few instructions.
-  bool Check(std::int32_t counts) {
+  // True: the count can be believed. The time depends on the counts by some instructions.
+  ARMCAL_NOINLINE bool Check(std::int32_t counts) {  // out of line, so that it has the registers
     const std::int32_t step = Less(counts, last_), jump = Less(step, step_), bend = Less(step, before_);
     last_ = counts;
     before_ = step;
@@ -56,51 +56,61 @@ class CountCheck {
       still_ = 0;
       return true;
     }
-    const float limit = Limit(), size = SizeOf(jump);
-    const bool stops = step == 0 && SizeOf(step_) > kFewCounts + kWidth * recent_;
-    const bool fits = size <= limit && SizeOf(step) <= fastest_ && !stops;
+    const std::uint32_t limit = Limit();
+    const bool stops = step == 0 && SizeOf(step_) > kFewCounts + kWidth * recent_ / kRecent;
+    const bool fits = SizeOf(jump) <= limit && SizeOf(step) <= fastest_ && !stops;
     Learn(bend, fits, limit);
     Follow(step, jump, fits, limit);
-    age_ += age_ < kYoung;
+    age_ = age_ == ~0u ? kYoung : age_ + 1u;
     still_ = step == 0 ? math::Min(still_ + 1u, kStill) : 0u;
     return state_ == kGood;
   }
+  bool moved() const { return before_ != 0; }  // from the tick before to this one
 
  private:
-  static constexpr float kFewCounts = 8.0f;  // steps of whole counts differ by up to four
-  static constexpr float kWidth = 4.0f;      // times a mean difference, or the largest one of late
-  static constexpr float kRecent = 0.97f;    // the largest difference of late fades by this a tick
-  static constexpr float kNoiseShare = 1.0f / 16384, kForget = 1.0f - 1.0f / 131072;  // a tick
-  static constexpr float kHardlyAway = 6.0f;                                          // limits
-  static constexpr std::uint8_t kFit = 2, kWild = 8, kFitAfterWild = 16;              // steps
-  static constexpr std::uint32_t kYoung = 4, kStill = 4, kHardlyPatience = 8;         // ticks
+  // All numbers are whole, because an M4F compares these in a third of the instructions. A size is in parts of a count.
+  static constexpr std::uint32_t kSustained = 16, kRecent = 256, kNoise = 16384;
+  static constexpr std::uint32_t kLargest = 1u << 21, kLargestNoise = 1u << 16;  // counts; more is taken for so much
+  static constexpr std::uint32_t kFewCounts = 8;       // steps of whole counts differ by up to four
+  static constexpr std::uint32_t kWidth = 4;           // times a mean difference, or the largest one of late
+  static constexpr int kFade = 5;                      // the largest difference of late fades by 2^-5 a tick
+  static constexpr int kForget = 7;                    // what the axis has shown fades by 2^-7
+  static constexpr std::uint32_t kForgetEvery = 1024;  // ticks
+  static constexpr std::uint32_t kHardlyAway = 6;      // limits
+  static constexpr std::uint8_t kFit = 2, kWild = 8, kFitAfterWild = 16;       // steps
+  static constexpr std::uint32_t kYoung = 4, kStill = 4, kHardlyPatience = 8;  // ticks
 
   enum State : std::uint8_t { kGood, kAway, kSettling };
 
   static std::int32_t Less(std::int32_t a, std::int32_t b) {
     return static_cast<std::int32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b));
   }
-  static float SizeOf(std::int32_t counts) { return math::Abs(static_cast<float>(counts)); }
-  float Limit() const { return kFewCounts + 3.0f * sustained_ + kWidth * noise_; }
+  static std::uint32_t SizeOf(std::int32_t counts) {
+    const auto sign = static_cast<std::uint32_t>(counts >> 31);  // without a branch
+    return (static_cast<std::uint32_t>(counts) ^ sign) - sign;
+  }
+  static std::uint32_t Whole(float x) { return static_cast<std::uint32_t>(math::Min(x, 268435456.0f)); }
+  std::uint32_t Limit() const { return kFewCounts + 3 * sustained_ / kSustained + kWidth * (noise_ / kNoise); }
 
   // bend: the difference of two steps. Noise and a wrong count make it change its sign; an acceleration keeps it for
   // three ticks.
-  void Learn(std::int32_t bend, bool fits, float limit) {
-    const float size = SizeOf(bend);
-    noise_ += kNoiseShare * (math::Min(SizeOf(Less(bend, bend_)), limit) - noise_);
+  void Learn(std::int32_t bend, bool fits, std::uint32_t limit) {
+    const std::uint32_t size = math::Min(SizeOf(bend), kLargest);
+    noise_ += math::Min(SizeOf(Less(bend, bend_)), math::Min(limit, kLargestNoise)) - noise_ / kNoise;
     const bool same = (bend > 0) == (bend_ > 0) && bend != 0;
-    lowest_ = same && sign_run_ > 0 ? math::Min(lowest_, size) : size;
-    sign_run_ = same ? static_cast<std::uint8_t>(math::Min(sign_run_ + 1, 3)) : std::uint8_t{1};
     bend_ = bend;
-    recent_ = math::Max(kRecent * recent_, math::Select(fits, size, 0.0f));
-    const bool real = sign_run_ == 3 && (state_ == kGood || SizeOf(offset_) <= kHardlyAway * limit);
-    const float seen = math::Select(real, math::Min(lowest_, 2.0f * sustained_), 0.0f);
-    sustained_ = math::Min(most_, math::Max(math::Max(least_, kForget * sustained_), seen));
-    sign_run_ = sign_run_ == 3 ? std::uint8_t{2} : sign_run_;
-    lowest_ = size < lowest_ || real ? size : lowest_;
+    recent_ = math::Max(recent_ - (recent_ >> kFade), fits ? size * kRecent : 0u);
+    if (age_ % kForgetEvery == 0u) sustained_ = math::Max(least_, sustained_ - (sustained_ >> kForget));
+    lowest_ = same && sign_run_ > 0 ? math::Min(lowest_, size) : size;
+    sign_run_ = same ? static_cast<std::uint8_t>(sign_run_ + 1) : std::uint8_t{1};
+    if (sign_run_ < 3) return;
+    sign_run_ = 2;
+    if (state_ != kGood && SizeOf(offset_) > kHardlyAway * limit) return;
+    sustained_ = math::Min(most_, math::Max(sustained_, math::Min(lowest_ * kSustained, 2 * sustained_)));
+    lowest_ = size;
   }
 
-  void Follow(std::int32_t step, std::int32_t jump, bool fits, float limit) {
+  void Follow(std::int32_t step, std::int32_t jump, bool fits, std::uint32_t limit) {
     if (state_ == kGood) {
       if (fits) {
         step_ = step;
@@ -115,7 +125,7 @@ class CountCheck {
       }
     } else if (state_ == kAway) {
       const std::int32_t offset = Less(offset_, Less(0, jump));
-      if (step != 0 && SizeOf(offset) <= 2.0f * limit) {
+      if (step != 0 && SizeOf(offset) <= 2 * limit) {
         state_ = kGood;
       } else if (step == 0 && !fits) {
         frozen_ = true;
@@ -142,17 +152,18 @@ class CountCheck {
     step_ = step;
   }
 
-  float fastest_ = 0.0f, most_ = 0.0f, least_ = 0.0f;  // of a step, and of what it differs by, counts
-  float noise_ = 0.0f, recent_ = 0.0f, sustained_ = 0.0f;
-  float lowest_ = 0.0f;                // of the bends of one sign in turn
-  std::uint32_t patience_ = 0;         // ticks
-  std::int32_t last_ = 0;              // count of the tick before
-  std::int32_t before_ = 0;            // its step
-  std::int32_t bend_ = 0;              // and its bend
-  std::int32_t step_ = 0;              // what the next step is compared with
-  std::int32_t offset_ = 0;            // how far the axis is away
-  std::uint32_t since_ = 0;            // ticks that it has been away
-  std::uint32_t age_ = 0, still_ = 0;  // ticks since the restart, and with the same count
+  std::uint32_t fastest_ = 0;                           // step, counts
+  std::uint32_t most_ = 0, least_ = 0, sustained_ = 0;  // what a step differs by; kSustained parts of a count
+  std::uint32_t noise_ = 0, recent_ = 0;                // kNoise and kRecent parts
+  std::uint32_t lowest_ = 0;                            // of the bends of one sign in turn
+  std::uint32_t patience_ = 0;                          // ticks
+  std::int32_t last_ = 0;                               // count of the tick before
+  std::int32_t before_ = 0;                             // its step
+  std::int32_t bend_ = 0;                               // and its bend
+  std::int32_t step_ = 0;                               // what the next step is compared with
+  std::int32_t offset_ = 0;                             // how far the axis is away
+  std::uint32_t since_ = 0;                             // ticks that it has been away
+  std::uint32_t age_ = 0, still_ = 0;                   // ticks since the restart, and with the same count
   State state_ = kGood;
   bool frozen_ = false;
   std::uint8_t calm_ = 0, needed_ = 0, wild_ = 0, sign_run_ = 0;
@@ -163,21 +174,21 @@ class CountCheck {
 // torque that really steps does so once. A reading at the end of its 16 bits says nothing. Context: tick.
 class CurrentCheck {
  public:
-  void Restart() { stuck_ = 0, rough_ = 0.0f, change_ = 0, running_ = false; }
+  void Restart() { stuck_ = 0, rough_ = 0, change_ = 0, running_ = false; }
 
   // moves: the axis's count has moved. True: the reading can be believed.
-  bool Check(std::int16_t current, bool moves) {
-    const std::int32_t change = running_ ? current - last_ : 0;
-    const float size = math::Abs(static_cast<float>(change)), wide = 6.0f * usual_ + 8.0f;
+  ARMCAL_NOINLINE bool Check(std::int16_t current, bool moves) {
+    const std::int32_t change = running_ ? current - last_ : 0, bend = change - change_;
+    const std::uint32_t size = SizeOf(change), wide = 6u * (usual_ / (kPart / 256u)) / 256u + 8u;
     stuck_ = change == 0 && moves && running_ ? math::Min(stuck_ + 1u, kStuck) : 0u;
-    const bool stuck = stuck_ == kStuck && noise_ > kNoisy;
-    const float bend = math::Abs(static_cast<float>(change - change_));
+    const bool stuck = stuck_ == kStuck && noise_ > kNoisy * kPart;
     const bool known = count_ >= kFirst;
-    rough_ += math::Select(known && size > wide, 1.0f, 0.0f) - rough_ / 8.0f;
-    count_ += running_ && !stuck && count_ < kMemory ? 1.0f : 0.0f;
-    const float counted = math::Select(known, math::Min(size, wide), size);
-    usual_ += math::Select(running_ && !stuck, (counted - usual_) / math::Max(count_, 1.0f), 0.0f);
-    noise_ += math::Select(running_ && !stuck, (math::Min(bend, 2.0f * wide) - noise_) / math::Max(count_, 1.0f), 0.0f);
+    rough_ += (known && size > wide ? kRoughPart : 0u) - rough_ / 8u;
+    if (running_ && !stuck) {
+      count_ += count_ < kMemory;
+      usual_ = Mean(usual_, known ? math::Min(size, wide) : size);
+      noise_ = Mean(noise_, math::Min(SizeOf(bend), 2u * wide));
+    }
     last_ = current;
     change_ = change;
     running_ = true;
@@ -185,14 +196,24 @@ class CurrentCheck {
   }
 
  private:
-  static constexpr std::uint32_t kStuck = 8;                  // ticks
-  static constexpr float kNoisy = 4.0f;                       // LSB: below, a reading may well repeat itself
-  static constexpr float kRough = 2.5f;                       // changes among the last eight or so
-  static constexpr float kFirst = 64.0f, kMemory = 16384.0f;  // changes that the mean is made of
+  static constexpr std::uint32_t kPart = 65536, kRoughPart = 256;  // of an LSB, and of a change
+  static constexpr std::uint32_t kStuck = 8;                       // ticks
+  static constexpr std::uint32_t kLargest = 32767;                 // LSB
+  static constexpr std::uint32_t kNoisy = 4;                       // LSB: below, a reading may well repeat itself
+  static constexpr std::uint32_t kRough = 5 * kRoughPart / 2;      // changes among the last eight or so
+  static constexpr std::int32_t kFirst = 64, kMemory = 16384;      // changes that the mean is made of
 
-  float usual_ = 0.0f, count_ = 0.0f;  // mean size of a change, and of how many
-  float noise_ = 0.0f;                 // mean difference of two changes: a slow torque has none
-  float rough_ = 0.0f;
+  static std::uint32_t SizeOf(std::int32_t x) { return static_cast<std::uint32_t>(x < 0 ? -x : x); }
+  // The mean with one more size in it. A size of more than half the range is taken for that.
+  std::uint32_t Mean(std::uint32_t mean, std::uint32_t size) const {
+    const auto apart = static_cast<std::int32_t>(math::Min(size, kLargest) * kPart - mean);
+    return mean + static_cast<std::uint32_t>(apart / count_);
+  }
+
+  std::uint32_t usual_ = 0;  // mean size of a change, kPart parts of an LSB
+  std::uint32_t noise_ = 0;  // mean difference of two changes: a slow torque has none
+  std::uint32_t rough_ = 0;
+  std::int32_t count_ = 0;  // changes in the means
   std::uint32_t stuck_ = 0;
   std::int32_t last_ = 0, change_ = 0;
   bool running_ = false;

@@ -44,8 +44,14 @@ class SignalPath {
   explicit SignalPath(const Axes<n>& axes) : axes_(axes) {
     for (int i = 0; i < n; ++i) counts_[i].Start(axes.counts_to_rad[i], axes.tick_rate_Hz);
     for (int i = 0; i < n; ++i) settings_.torque_scale[i] = 1.0f;
-    for (int i = 0; i < n * n; ++i)
-      if (axes.motor_to_joint[i] != 0.0f || axes.motor_torque_to_joint[i] != 0.0f) axes_of_joint_[i / n] |= 1u << i % n;
+    for (int i = 0; i < n * n; ++i) {
+      const bool coupled = axes.motor_to_joint[i] != 0.0f || axes.motor_torque_to_joint[i] != 0.0f;
+      if (!coupled) continue;
+      const int joint = i / n, axis = i % n;
+      if (axes_of_joint_[joint] == 0u) first_axis_[joint] = static_cast<std::uint8_t>(axis);
+      axes_of_joint_[joint] |= 1u << axis;
+      end_axis_[joint] = static_cast<std::uint8_t>(axis + 1);
+    }
   }
 
   // The history restarts, so that no sample is made with two settings.
@@ -87,8 +93,7 @@ class SignalPath {
     std::uint32_t rest[n];   // sum of (counts - first); unsigned, because a jump of an encoder may make it wrap
     std::int32_t current[n];
     float temperature[n];
-    std::uint8_t spoilt[n];  // not enabled or saturated
-    std::uint8_t stale[n];
+    std::uint32_t spoilt, stale;  // axes, a bit each; spoilt: not enabled, saturated, or a current that cannot be
   };
 
   void Restart() {
@@ -106,20 +111,23 @@ class SignalPath {
       w.tick = raw.tick;
       for (int i = 0; i < n; ++i) w.first[i] = static_cast<std::uint32_t>(raw.counts[i]);
     }
-    bool all_good = true;
     for (int i = 0; i < n; ++i) {
       w.rest[i] += static_cast<std::uint32_t>(raw.counts[i]) - w.first[i];
       w.current[i] += raw.current[i];
       w.temperature[i] += raw.temperature_degC[i];
-      const std::uint8_t usable = static_cast<std::uint8_t>(raw.flags[i] & (model::kEnabled | model::kSaturated));
-      const bool moves = raw.counts[i] != last_counts_[i];
-      const bool count_good = counts_[i].Check(raw.counts[i]), current_good = currents_[i].Check(raw.current[i], moves);
-      last_counts_[i] = raw.counts[i];
-      all_good &= count_good & current_good;
-      w.spoilt[i] |= (usable != model::kEnabled) | !current_good;
-      w.stale[i] |= (raw.flags[i] & model::kStale) != 0 || !count_good;
     }
-    implausible_count_ += !all_good;
+    std::uint32_t spoilt = 0, stale = 0, wrong = 0;
+    for (int i = 0; i < n; ++i) {
+      const int usable = raw.flags[i] & (model::kEnabled | model::kSaturated);
+      const bool count_good = counts_[i].Check(raw.counts[i]);
+      const bool current_good = currents_[i].Check(raw.current[i], counts_[i].moved());
+      wrong |= static_cast<std::uint32_t>(!count_good | !current_good);
+      spoilt |= static_cast<std::uint32_t>((usable != model::kEnabled) | !current_good) << i;
+      stale |= static_cast<std::uint32_t>(((raw.flags[i] & model::kStale) != 0) | !count_good) << i;
+    }
+    w.spoilt |= spoilt;
+    w.stale |= stale;
+    implausible_count_ += wrong;
   }
 
   // kSampleTicks x (average of window a - average of window b), exact.
@@ -156,12 +164,15 @@ class SignalPath {
     const std::uint32_t good = GoodAxes();
     for (int i = 0; i < n; ++i) {
       const float* a = axes_.motor_to_joint + i * n;
-      sample_.q[i] = Dot(a, q);
-      sample_.qd[i] = Dot(a, qd);
-      sample_.qdd[i] = Dot(a, qdd);
-      sample_.tau[i] = settings_.torque_scale[i] * Dot(axes_.motor_torque_to_joint + i * n, tau);
+      const auto joint = [&](const float* row, const float* axis) {
+        return Dot(row, axis, first_axis_[i], end_axis_[i]);
+      };
+      sample_.q[i] = joint(a, q);
+      sample_.qd[i] = joint(a, qd);
+      sample_.qdd[i] = joint(a, qdd);
+      sample_.tau[i] = settings_.torque_scale[i] * joint(axes_.motor_torque_to_joint + i * n, tau);
       bool moving = math::Abs(sample_.qd[i]) > settings_.v_min_radps[i];
-      for (int k = 0; k < 4; ++k) moving &= Dot(a, step[k]) * sample_.qd[i] > 0.0f;
+      for (int k = 0; k < 4; ++k) moving &= joint(a, step[k]) * sample_.qd[i] > 0.0f;
       const bool valid = (axes_of_joint_[i] & ~good) == 0u;
       sample_.flags[i] = static_cast<std::uint8_t>((valid ? model::kValid : 0) | (moving ? model::kMoving : 0));
     }
@@ -169,28 +180,24 @@ class SignalPath {
 
   // A bit for each axis. A stale axis spoils all axes, because every row of a model reads the motion of every joint.
   std::uint32_t GoodAxes() const {
-    std::uint32_t good = ~0u;
-    bool any_stale = false;
-    for (const Window& w : window_)
-      for (int i = 0; i < n; ++i) {
-        good &= ~(static_cast<std::uint32_t>(w.spoilt[i]) << i);
-        any_stale |= w.stale[i] != 0;
-      }
-    return good & ~math::MaskOf(any_stale);
+    std::uint32_t spoilt = 0, stale = 0;
+    for (const Window& w : window_) spoilt |= w.spoilt, stale |= w.stale;
+    return ~spoilt & ~math::MaskOf(stale != 0u);
   }
 
-  static float Dot(const float* row, const float* x) {
+  // Over the axes that a joint is coupled to. The others' elements are zero.
+  static float Dot(const float* row, const float* x, int first, int end) {
     float sum = 0.0f;
-    for (int k = 0; k < n; ++k) sum += row[k] * x[k];
+    for (int k = first; k < end; ++k) sum += row[k] * x[k];
     return sum;
   }
 
   Axes<n> axes_;
   CountCheck counts_[n];
   CurrentCheck currents_[n];
-  std::int32_t last_counts_[n] = {};
   Settings<n> settings_ = {};
   std::uint32_t axes_of_joint_[n] = {};
+  std::uint8_t first_axis_[n] = {}, end_axis_[n] = {};
   Window window_[kWindows] = {};
   model::Sample<n> sample_;
   std::uint32_t last_tick_ = 0;

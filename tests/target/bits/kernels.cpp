@@ -42,16 +42,22 @@ void Ud(Numbers& numbers, int round) {
   Print("solve_upper", round, h, n);
 }
 
+// Three rows at a time into the first two stored rows of a triangle, element by element as they stand in a block.
 void Givens(Numbers& numbers, int round) {
-  float d[3] = {1e-6f, 1e-6f}, first[n] = {}, second[n] = {};
+  constexpr int kRows = 3, kAfter = 33;
+  const std::uint8_t begin[kRows] = {0, 0, 1};
+  float d[2] = {1e-6f, 1e-6f}, stored[2 * kAfter + 1] = {}, block[(kAfter + 2) * kRows], rotation[4 * kRows];
+  float weight[kRows];
   for (int k = 0; k < 50; ++k) {
-    Fill(numbers, h, n);
-    d[2] = math::GivensRows(d, first, d + 1, second, numbers.Signed(), h, n - 1, 1.0f);
+    Fill(numbers, block, (kAfter + 2) * kRows);
+    for (float& v : weight) v = 1.0f;
+    math::GivensCorner<2, kRows>(d, stored, block, kAfter, begin, 0, kRows, weight, rotation);
+    math::FoldBlock<kRows, 2, kRows>(block, stored, rotation, kAfter);
   }
-  Print("givens_first", round, first, n);
-  Print("givens_second", round, second, n - 1);
-  Print("givens_rest", round, h, n);
-  Print("givens_weights", round, d, 3);
+  Print("givens_stored", round, stored, 2 * kAfter + 1);
+  Print("givens_rest", round, block + 2 * kRows, kAfter * kRows);
+  Print("givens_weights", round, weight, kRows);
+  Print("givens_diagonal", round, d, 2);
 }
 
 void Bodies(Numbers& numbers, int round) {

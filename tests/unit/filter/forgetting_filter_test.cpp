@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <random>
+#include <type_traits>
 
 #include "armcal/filter/kalman_filter.hpp"
 #include "tests/unit/filter/rows.hpp"
@@ -205,19 +208,138 @@ TEST(ForgettingFilter, Solve_IsWhatTheDataAloneSay) {
     EXPECT_NEAR(x[k], oracle(k), 1e-4) << k;  // sd about 0.01; float32 loses 1e-6 of 1
 }
 
-TEST(ForgettingFilter, AnySlices_GiveTheSameBits) {
-  Bench bench;
-  SmallForgetting whole, sliced;
-  whole.Restart(bench.prior);
-  sliced.Restart(bench.prior);
-  for (const Row& r : bench.Rows(100)) {
-    const UpdateReport expected = whole.Update(r.joint, r.front, r.dense, r.y, true);
-    sliced.BeginRow(r.joint, r.front, r.dense, r.y, true);
-    for (int credit = 0; (credit += 5, !sliced.StepRow(credit));) {
-    }
-    EXPECT_EQ(sliced.report().variance, expected.variance);
+// The oracle of the next tests: Gentleman's rotations on a full triangle of floats, one row after the other, one
+// column after the other. With the same operations the bits are the same.
+template <class Layout>
+struct RowByRow {
+  static constexpr int n = Layout::kColumns;
+  float d[n], r[n][n + 1] = {}, innovation = 0, variance = 0;
+
+  RowByRow() {
+    for (float& v : d) v = ForgettingFilter<Layout>::kFloor;
   }
-  EXPECT_EQ(Kept(whole), Kept(sliced));
+  void Add(int joint, const float* front, const float* dense, float y) {
+    float x[n + 1] = {}, weight = 1;
+    const int first = Layout::kFrontBegin[joint], end = Layout::kFrontBegin[joint + 1];
+    for (int k = first; k < end; ++k) x[k] = front[k - first];
+    for (int k = Layout::kRowBegin[joint]; k < Layout::kDense; ++k) x[Layout::kFront + k] = dense[k];
+    x[n] = y;
+    for (int k = 0; k < n; ++k) {
+      const bool own = k < Layout::kFront ? k >= first && k < end : k >= Layout::kFront + Layout::kRowBegin[joint];
+      if (!own) continue;
+      const float x0 = x[k], wx = weight * x0, next = d[k] + wx * x0, inverse = 1 / next;
+      weight *= d[k] * inverse;
+      d[k] = next;
+      for (int c = k + 1; c <= n; ++c) {
+        x[c] -= x0 * r[k][c];
+        r[k][c] += wx * inverse * x[c];
+      }
+    }
+    innovation = x[n];
+    variance = 1 / weight;
+  }
+  void Forget(const Prior<Layout>& prior, std::uint32_t moving) {
+    for (int k = 0; k < n; ++k) {
+      const std::uint32_t needed = JointsOf<Layout>(k);
+      if ((moving & needed) == needed) d[k] = std::max(d[k] * prior.lambda[k], ForgettingFilter<Layout>::kFloor);
+    }
+  }
+};
+
+// Kept bits of the filter against those of the oracle: [d, then R and z in the order in which the filter stores them].
+template <class Layout>
+void ExpectSameBits(const ForgettingFilter<Layout>& filter, const RowByRow<Layout>& oracle) {
+  const float* stored = filter.triangle();
+  for (int k = 0; k < Layout::kColumns; ++k) {
+    ASSERT_EQ(filter.weights()[k], oracle.d[k]) << k;
+    const int joint = JointOf<Layout>(k);
+    for (int c = k + 1; c <= Layout::kColumns; ++c) {
+      const bool dense = c >= Layout::kFront;
+      const bool kept = k >= Layout::kFront ||
+                        (dense ? c - Layout::kFront >= Layout::kRowBegin[joint] : c < Layout::kFrontBegin[joint + 1]);
+      ASSERT_EQ(kept ? *stored++ : 0.0f, oracle.r[k][c]) << k << ", " << c;
+    }
+  }
+  ASSERT_EQ(stored - filter.triangle(), ForgettingFilter<Layout>::kTriangle);
+}
+
+// Layouts that need every number of rows and columns at a time: odd and even dense columns, one to six front columns,
+// more joints than are worked in together, a row without front columns, rows that begin at the same column or one
+// apart, and one that begins before its predecessor.
+struct OneColumn {
+  static constexpr int kJoints = 1, kFront = 1, kDense = 1, kColumns = 2, kNonlinear = 0;
+  static constexpr int kFrontBegin[2] = {0, 1}, kRowBegin[1] = {0};
+};
+struct EightJoints {
+  static constexpr int kJoints = 8, kFront = 24, kDense = 27, kColumns = 51, kNonlinear = 0;
+  static constexpr int kFrontBegin[9] = {0, 1, 3, 6, 10, 15, 21, 21, 24};
+  static constexpr int kRowBegin[8] = {0, 1, 1, 6, 11, 14, 17, 24};
+};
+struct SevenJoints {
+  static constexpr int kJoints = 7, kFront = 21, kDense = 44, kColumns = 65, kNonlinear = 0;
+  static constexpr int kFrontBegin[8] = {0, 3, 6, 9, 12, 15, 18, 21}, kRowBegin[7] = {0, 1, 8, 15, 22, 29, 36};
+};
+struct Unordered {
+  static constexpr int kJoints = 4, kFront = 9, kDense = 14, kColumns = 23, kNonlinear = 0;
+  static constexpr int kFrontBegin[5] = {0, 2, 5, 7, 9}, kRowBegin[4] = {0, 5, 3, 9};
+};
+
+template <class Layout>
+class RowsTogether : public testing::Test {};
+using RowLayouts = testing::Types<Small, OneColumn, SevenJoints, EightJoints, Unordered>;
+TYPED_TEST_SUITE(RowsTogether, RowLayouts);
+
+TYPED_TEST(RowsTogether, InAnySlices_GiveTheBitsOfRowByRow_WhateverIsRefused) {
+  using Layout = TypeParam;
+  Prior<Layout> prior;
+  for (float& lambda : prior.lambda) lambda = 0.99f;
+  ForgettingFilter<Layout> filter;
+  filter.Restart(prior);
+  RowByRow<Layout> oracle;
+  std::mt19937 random(5);
+  std::normal_distribution<float> normal;
+  int slices = 0;
+  for (int sample = 0; sample < 60; ++sample) {
+    // Now and then a row is gated, has no number, or is not there at all.
+    const auto some = [&](bool now) { return now ? static_cast<std::uint32_t>(random()) : 0u; };
+    const std::uint32_t gated = some(sample % 5 == 1), broken = some(sample % 7 == 3), missing = some(sample % 11 == 7);
+    float innovation[Layout::kJoints] = {}, variance[Layout::kJoints] = {};
+    for (int i = 0; i < Layout::kJoints; ++i) {
+      if (missing >> i & 1u) continue;
+      float front[Layout::kFront], dense[Layout::kDense] = {}, y = normal(random);
+      for (float& v : front) v = normal(random);
+      for (int k = Layout::kRowBegin[i]; k < Layout::kDense; ++k) dense[k] = normal(random);
+      if (broken >> i & 1u) dense[Layout::kDense - 1] = std::numeric_limits<float>::quiet_NaN();
+      const bool use = !(gated >> i & 1u);
+      filter.BeginRow(i, front, dense, y, use);
+      int credit = kNoSlices;
+      EXPECT_TRUE(filter.StepRow(credit));
+      if (!use || (broken >> i & 1u)) continue;
+      oracle.Add(i, front, dense, y);
+      innovation[i] = oracle.innovation, variance[i] = oracle.variance;
+    }
+    for (int credit = 0; (credit += 1 + sample % 50, !filter.StepRows(credit));) ++slices;
+    for (int i = 0; i < Layout::kJoints; ++i) {
+      if (variance[i] == 0) continue;
+      // A row that is worked in from a later row's first column on is rounded more often.
+      const float rounding = std::is_same_v<Layout, Unordered> ? 1e-4f : 0.0f;
+      EXPECT_NEAR(filter.report(i).innovation, innovation[i], rounding) << sample << ": " << i;
+      EXPECT_NEAR(filter.report(i).variance / variance[i], 1, rounding) << sample << ": " << i;
+    }
+    const auto moving = static_cast<std::uint32_t>(sample % 3 == 0 ? random() : ~0u);
+    filter.EndSample(moving);
+    oracle.Forget(prior, moving);
+    if (!std::is_same_v<Layout, Unordered>) {
+      ASSERT_NO_FATAL_FAILURE(ExpectSameBits(filter, oracle)) << sample;
+      continue;
+    }
+    const float* stored = filter.triangle();
+    for (int k = Layout::kFront; k < Layout::kColumns; ++k)
+      ASSERT_NEAR(filter.weights()[k] / oracle.d[k], 1, 1e-4) << sample << ": " << k;
+    ASSERT_NEAR(stored[ForgettingFilter<Layout>::kTriangle - 1], oracle.r[Layout::kColumns - 1][Layout::kColumns],
+                1e-3);
+  }
+  EXPECT_GT(slices, Layout::kColumns);
 }
 
 // In double: the block's rows of R are gone; where the dense columns may be anywhere in their prior, this is noise in

@@ -243,8 +243,8 @@ TYPED_TEST(EitherForm, AnySlices_GiveTheSameBits) {
       const UpdateReport expected = whole.Update(r.joint, r.front, r.dense, r.y, true);
       sliced.BeginRow(r.joint, r.front, r.dense, r.y, true);
       for (int credit = 0; (credit += 17, !sliced.StepRow(credit));) ++slices;
-      EXPECT_EQ(sliced.report().innovation, expected.innovation);
-      EXPECT_EQ(sliced.report().accepted, expected.accepted);
+      EXPECT_EQ(sliced.report(r.joint).innovation, expected.innovation);
+      EXPECT_EQ(sliced.report(r.joint).accepted, expected.accepted);
       whole.EndSample(kAll);
       sliced.BeginEnd(kAll);
       for (int credit = 0; (credit += 17, !sliced.StepEnd(credit));) ++slices;

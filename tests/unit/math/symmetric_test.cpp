@@ -99,10 +99,6 @@ TEST_F(Ud, ColumnsInPairs_GiveTheBitsOfOneByOne) {
     BiermanColumn(u2.data(), gain.data(), -0.2, 0.4, length);
     BiermanColumns(v1.data(), v2.data(), pair.data(), 0.3, 1.7, -0.2, 0.4, length);
     EXPECT_TRUE(u1 == v1 && u2 == v2 && gain == pair) << length;
-    Fold(gain.data(), u1.data(), 0.6, 0.1, length);
-    Fold(gain.data(), u2.data(), -0.8, 0.9, length);
-    Fold(pair.data(), v1.data(), v2.data(), 0.6, 0.1, -0.8, 0.9, length);
-    EXPECT_TRUE(u1 == v1 && u2 == v2 && gain == pair) << length;
     const auto dots = Dots(a.data(), b.data(), x.data(), length, 0.5, 0.25);
     EXPECT_EQ(dots.first, Dot(a.data(), x.data(), length, 0.5));
     EXPECT_EQ(dots.second, Dot(b.data(), x.data(), length, 0.25));
@@ -110,24 +106,36 @@ TEST_F(Ud, ColumnsInPairs_GiveTheBitsOfOneByOne) {
   }
 }
 
-TEST_F(Ud, GivensRows_GiveTheCholeskyFactorOfTheNormalMatrix) {
+// One row into `stored` rows at a time; the triangle stands row by row without its diagonal.
+template <int stored>
+void Eliminate(double* d, double* r, double* x, int length, double* weight) {
+  const std::uint8_t begin = 0;
+  double rotation[2 * stored];
+  GivensCorner<stored, 1>(d, r, x, length, &begin, 0, 1, weight, rotation);
+  FoldBlock<1, stored, 1>(x, r, rotation, length);
+}
+
+TEST_F(Ud, GivensBlocks_GiveTheCholeskyFactorOfTheNormalMatrix) {
   constexpr double kFloor = 1e-9;
-  Matrix r = Matrix::Zero(n, n + 1);
-  Vector d = Vector::Constant(n, kFloor);
+  const auto at = [](int row) { return row * n - row * (row - 1) / 2; };  // where a row of the triangle begins
+  Vector packed = Vector::Zero(at(n)), d = Vector::Constant(n, kFloor);
   Matrix data = Matrix::NullaryExpr(40, n + 1, [&] { return normal(random); });
   double rss = 0;
   for (int row = 0; row < data.rows(); ++row) {
     Vector x = data.row(row);
     double weight = 1;
-    for (int j = 0; j < n; j += 2) {
-      const int k = std::min(j + 1, n - 1);  // the last one is alone
-      Vector first = r.row(j).tail(n - j), second = r.row(k).tail(n - k);
-      weight = GivensRows(&d(j), first.data(), &d(k), second.data(), x(j), x.data() + j + 1, n - 1 - j, weight);
-      r.row(j).tail(n - j) = first;
-      if (k > j) r.row(k).tail(n - k) = second;
+    for (int j = 0, stored = 1; j < n; j += stored, stored = 1 + (row + j) % 4) {
+      stored = std::min(stored, n - j);
+      const auto go = [&](auto call) { call(&d(j), &packed(at(j)), &x(j), n + 1 - j - stored, &weight); };
+      if (stored == 1) go(Eliminate<1>);
+      if (stored == 2) go(Eliminate<2>);
+      if (stored == 3) go(Eliminate<3>);
+      if (stored == 4) go(Eliminate<4>);
     }
     rss += weight * x(n) * x(n);
   }
+  Matrix r = Matrix::Zero(n, n + 1);
+  for (int j = 0; j < n; ++j) r.row(j).tail(n - j) = packed.segment(at(j), n - j);
   Matrix unit = r.leftCols(n) + Matrix::Identity(n, n);
   Matrix information = data.leftCols(n).transpose() * data.leftCols(n) + kFloor * Matrix::Identity(n, n);
   EXPECT_LT((unit.transpose() * d.asDiagonal() * unit - information).norm(), 1e-10);

@@ -146,6 +146,23 @@ std::vector<int> Currents(int ticks, double noise) {
   return currents;
 }
 
+// An axis that has shown a large acceleration may make larger steps. After minutes of slow motion it may not.
+TEST(CountCheck, AFastMotion_IsForgottenAfterMinutes) {
+  for (const int slow_ticks : {1000, 600000}) {
+    std::vector<std::int32_t> counts;
+    const auto add = [&](double q_rad) {
+      counts.push_back(static_cast<std::int32_t>(std::lround(q_rad / kCount_rad)));
+    };
+    constexpr double kTurns = 31.4;                                                   // rad/s: 100 rad/s^2 at 0.1 rad
+    const int fast = static_cast<int>(std::lround(20 * 3.14159265 / kTurns * 1000));  // ends where the axis rests
+    for (int k = 0; k < fast; ++k) add(0.1 * std::cos(1e-3 * kTurns * k));
+    for (int k = 0; k <= slow_ticks; ++k) add(0.1 + (1 - std::cos(3e-3 * k)) / 3);
+    counts.back() += 300;
+    const std::vector<int> refused = Refused(counts);  // also the first ticks, where the axis is not yet known
+    EXPECT_EQ(refused.back() == static_cast<int>(counts.size()) - 1, slow_ticks > 1000) << slow_ticks;
+  }
+}
+
 TEST(CurrentCheck, NoisyCurrentWithSteps_IsNotRefused) {
   EXPECT_TRUE(RefusedCurrents(Currents(20000, 50)).empty());
   EXPECT_TRUE(RefusedCurrents(Currents(20000, 1)).empty());

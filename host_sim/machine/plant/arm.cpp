@@ -44,7 +44,7 @@ Arm::Arm(const Scenario& scenario, const std::string& robot_path)
       stops_(robot_.joint.size(), 0),
       cut_(robot_.joint.size(), false) {
   const int n = joints();
-  if (scenario.robot != robot_.name)
+  if (!scenario.robot.empty() && scenario.robot != robot_.name)
     throw io::InputError(scenario.path + ": robot: expected \"" + robot_.name + "\", the robot of " + robot_path);
   for (const PlacedJointEffect& placed : scenario.joint_effects) {
     if (placed.joint >= n)
@@ -62,8 +62,11 @@ Arm::Arm(const Scenario& scenario, const std::string& robot_path)
   rise_KpW_ = PerJoint(scenario.thermal.rise_KpW, scenario, "thermal.rise_KpW", n);
   warming_time_s_ = PerJoint(scenario.thermal.time_constant_s, scenario, "thermal.time_constant_s", n);
   friction_ = load_ = command_ = Eigen::VectorXd::Zero(n);
-  const Eigen::VectorXd start =
-      scenario.start_rad.empty() ? Eigen::VectorXd::Zero(n) : PerJoint(scenario.start_rad, scenario, "start_rad", n);
+  Eigen::VectorXd start(n);
+  for (int j = 0; j < n; ++j)
+    start[j] = std::clamp(0.0, robot_.joint[static_cast<std::size_t>(j)].lowest_rad,
+                          robot_.joint[static_cast<std::size_t>(j)].highest_rad);
+  if (!scenario.start_rad.empty()) start = PerJoint(scenario.start_rad, scenario, "start_rad", n);
   ChoosePayload();
   Place({start.data(), static_cast<std::size_t>(n)});
 }

@@ -67,6 +67,9 @@ class Arm {
 
   int joints() const { return robot_.joints(); }
   double tick_s() const { return tick_s_; }
+  double current_time_constant_s() const { return scenario_.current_time_constant_s; }
+  // The true inertia in a pose, rotors included, [n x n]. The arm stays where it is.
+  Eigen::MatrixXd Mass(const Eigen::VectorXd& q);
   double time_s() const { return time_s_; }
   const RobotFile& robot() const { return robot_; }
   const Truth& truth() const { return truth_; }

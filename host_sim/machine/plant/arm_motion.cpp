@@ -38,6 +38,13 @@ Arm::JointTorques Arm::TorquesAt(int joint, int direction, double q, double qd, 
   return sum;
 }
 
+Eigen::MatrixXd Arm::Mass(const Eigen::VectorXd& q) {
+  Eigen::MatrixXd mass;
+  Eigen::VectorXd bias;
+  links_->MassAndBias(q, Eigen::VectorXd::Zero(joints()), mass, bias);
+  return mass + rotors_;
+}
+
 void Arm::FormDynamics(const Eigen::VectorXd& q, const Eigen::VectorXd& qd) {
   links_->MassAndBias(q, qd, link_mass_, bias_);
   mass_ = link_mass_ + rotors_;

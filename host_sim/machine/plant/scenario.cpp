@@ -80,7 +80,7 @@ Scenario ReadScenario(const std::string& path) {
   Scenario scenario;
   scenario.path = path;
   scenario.title = keys.Text("title");
-  scenario.robot = keys.Text("robot");
+  scenario.robot = keys.Text("robot", "");
   scenario.truth_seed = static_cast<std::uint64_t>(keys.Integer("truth_seed", 0, INT64_MAX));
   scenario.noise_seed = static_cast<std::uint64_t>(keys.Integer("noise_seed", 0, INT64_MAX));
   scenario.stick_ratio = keys.Number("stick_ratio", scenario.stick_ratio);
@@ -95,6 +95,7 @@ Scenario ReadScenario(const std::string& path) {
     scenario.spread.inertial = ReadSpread(truth, "inertial_spread", scenario.spread.inertial);
     scenario.spread.friction = ReadSpread(truth, "friction_spread", scenario.spread.friction);
     scenario.spread.torque_constant = ReadSpread(truth, "torque_constant_spread", scenario.spread.torque_constant);
+    scenario.spread.unstated = ReadSpread(truth, "unstated_share", scenario.spread.unstated);
     truth.Finish();
   }
   if (keys.Has("sensors")) {

@@ -43,7 +43,7 @@ struct Thermal {
 };
 
 struct Scenario {
-  std::string path, title, robot;
+  std::string path, title, robot;  // robot: empty: any
   std::uint64_t truth_seed = 1, noise_seed = 1;
   Spread spread;
   Thermal thermal;
@@ -52,7 +52,7 @@ struct Scenario {
   int substeps = 4;                      // integration steps a tick
   double torque_noise_scale = 1;         // x the robot file's torque noise
   double temperature_noise_degC = 0.05;  // standard deviation of a reading
-  std::vector<double> start_rad;         // empty: zero pose
+  std::vector<double> start_rad;         // empty: zero, or the limit next to it
   std::optional<KDL::Frame> flange;      // instead of the robot file's tool frame
   std::vector<PlacedJointEffect> joint_effects;
   std::optional<PayloadStep> payload;

@@ -24,7 +24,7 @@ class OwnDrive : public testing::Test {
   // What every true arm here has: bodies, friction, rotors and torque constants of its own.
   std::string Scenario(const std::string& name, int seed, const std::string& effect = "") {
     std::ofstream(Path(name)) << "title = \"" << name << "\"\ntruth_seed = " << seed << "\nnoise_seed = " << seed + 1
-                              << "\n[truth]\nunstated_share = 0.04\n"
+                              << "\ncommand = \"ramp\"\n[truth]\nunstated_share = 0.04\n"
                               << effect;
     return Path(name);
   }

@@ -86,6 +86,9 @@ Scenario ReadScenario(const std::string& path) {
   scenario.stick_ratio = keys.Number("stick_ratio", scenario.stick_ratio);
   if (scenario.stick_ratio < 1) keys.Fail("stick_ratio", "a number not below 1");
   scenario.current_time_constant_s = keys.Positive("current_time_constant_s", scenario.current_time_constant_s);
+  const std::string command = keys.Text("command", "held");
+  if (command != "held" && command != "ramp") keys.Fail("command", "\"held\" or \"ramp\"");
+  scenario.command_ramps = command == "ramp";
   scenario.substeps = static_cast<int>(keys.Integer("substeps", 1, 64, scenario.substeps));
   scenario.start_rad = keys.NumberOrNumbers("start_rad", {});
   if (keys.Has("flange")) scenario.flange = ReadFrame(keys.Table("flange"));

@@ -49,6 +49,7 @@ struct Scenario {
   Thermal thermal;
   double stick_ratio = 1;  // breakaway level / Coulomb level
   double current_time_constant_s = 0.001;
+  bool command_ramps = false;            // from one tick's current command to the next; else it steps
   int substeps = 4;                      // integration steps a tick
   double torque_noise_scale = 1;         // x the robot file's torque noise
   double temperature_noise_degC = 0.05;  // standard deviation of a reading

@@ -4,6 +4,7 @@
 #   tests/run.sh [all]    + end-to-end tests, planted faults, firmware and wire tests under sanitizers, both Cortex-M images and their
 #                         tests under QEMU
 #   tests/run.sh long     + the long tests, all fast tests under sanitizers
+#   tests/run.sh peers  alone: comparisons with other people's programs, which pip installs into build/peers
 # The last line is "N passed, M failed"; a CTest test, a build and a check count one each.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -13,7 +14,8 @@ case $scope in
   fast) labels='^fast$' ;;
   all) labels='^(fast|all)$' ;;
   long) labels='^(fast|all|long)$' ;;
-  *) sed -n '2,7p' "$0" >&2; exit 2 ;;
+  peers) labels= ;;
+  *) sed -n '2,8p' "$0" >&2; exit 2 ;;
 esac
 
 jobs=$(nproc)
@@ -71,6 +73,15 @@ configure_and_build() { cmake --preset "$1" && cmake --build --preset "$1" -j "$
 
 step "host packages" toolchains/install.sh host || finish
 
+if [[ $scope == peers ]]; then
+  peers_programs() { python3 -m venv build/peers/venv && build/peers/venv/bin/pip install -q --disable-pip-version-check -r tests/peers/requirements.txt; }
+  step "peers packages" toolchains/install.sh peers || finish
+  step "other people's programs" peers_programs || finish
+  step "build armcal" configure_and_build host --target armcal || finish
+  step "exports in MuJoCo and Pinocchio" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
+  finish
+fi
+
 if [[ -z ${ARMCAL_DATA:-} && -d ../shared/data ]]; then
   ARMCAL_DATA=$(cd ../shared/data && pwd)
 fi
@@ -111,4 +122,5 @@ if [[ $scope != fast ]]; then
     run_ctest "tests with sanitizers" build/host-asan '^fast$' "$tests"
   fi
 fi
+[[ $scope == fast ]] || say "not run: tests/run.sh peers (comparisons with other people's programs)"
 finish

@@ -1,25 +1,44 @@
-// tool - armcal simulate: starts the simulated drive that was compiled for a robot.
+// tool - armcal simulate: starts the simulated drive of a robot. If none was built with armcal, it compiles one.
+#include <fmt/core.h>
+
+#include "codegen/src/generator/emit.hpp"
+#include "host_sim/tool/compiled_firmware.hpp"
 #include "host_sim/tool/process.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct SimulateOptions {
-  std::string scenario, robot = "er20_like", drive, storage = "build/drive.nor", truth_log;
+  std::string scenario = "any", robot = "er20_like", drive, storage = "build/drive.nor", truth_log;
   int port = 1502;
   bool real_time = false;
 };
 
+// The program that was built with armcal for this model, or the one for all with a firmware from the cache.
+std::vector<std::string> DriveFor(const codegen::Model& model) {
+  const fs::path folder = fs::path(OwnProgram()).parent_path(), own = folder / ("armcal-drive-" + model.robot().name),
+                 any = folder / "armcal-drive";
+  if (fs::is_regular_file(own)) {
+    Background program({own.string(), "--schema"});
+    program.Wait();
+    if (program.first_line() == fmt::format("{:08X}", codegen::Schema(model))) return {own.string()};
+  }
+  if (!fs::is_regular_file(any)) throw io::InputError(any.string() + ": not there; build all of armcal");
+  return {any.string(), "--firmware", CompiledFirmware(model).string()};
+}
+
 int RunSimulate(const SimulateOptions& o) {
-  namespace fs = std::filesystem;
   const fs::path robot = RobotPath(o.robot);
   const fs::path scenario = ScenarioPath(o.scenario);
-  const std::string name = codegen::ReadRobot(robot).name;
-  const std::string drive = ProgramFor("armcal-drive", name, o.drive, "simulated drive");
+  if (!o.drive.empty() && !fs::is_regular_file(o.drive)) throw io::InputError(o.drive + ": no such program");
   if (const auto folder = fs::path(o.storage).parent_path(); !folder.empty()) fs::create_directories(folder);
-  std::vector<std::string> words{drive,     "--scenario", scenario.string(),     "--robot", robot.string(), "--storage",
-                                 o.storage, "--port",     std::to_string(o.port)};
+  std::vector<std::string> words =
+      o.drive.empty() ? DriveFor({codegen::ReadRobot(robot), LoadCatalogue()}) : std::vector<std::string>{o.drive};
+  words.insert(words.end(), {"--scenario", scenario.string(), "--robot", robot.string(), "--storage", o.storage,
+                             "--port", std::to_string(o.port)});
   if (!o.truth_log.empty()) words.insert(words.end(), {"--truth-log", o.truth_log});
   if (o.real_time) words.push_back("--real-time");
   Become(words);
@@ -30,11 +49,14 @@ int RunSimulate(const SimulateOptions& o) {
 void AddSimulate(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand(
       "simulate",
-      "run the simulated drive (Modbus TCP on 127.0.0.1)\nexample: armcal simulate --scenario stribeck --port 1502");
+      "run the simulated drive of any robot (Modbus TCP on 127.0.0.1); for a robot that armcal was not built with it "
+      "is "
+      "compiled once, with g++\nexample: armcal simulate --scenario stribeck --port 1502\nexample: armcal simulate "
+      "--robot my_arm.toml --port 1502");
   auto o = std::make_shared<SimulateOptions>();
-  verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->required();
+  verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->capture_default_str();
   verb->add_option("--robot", o->robot, "robot file or name")->capture_default_str();
-  verb->add_option("--drive", o->drive, "drive program (default: the one built for the robot)");
+  verb->add_option("--drive", o->drive, "drive program (default: the one of the robot)");
   verb->add_option("--port", o->port, "TCP port, 0: any free one")->capture_default_str()->check(CLI::Range(0, 65535));
   verb->add_option("--storage", o->storage, "file that plays the drive's flash memory")->capture_default_str();
   verb->add_option("--truth-log", o->truth_log,

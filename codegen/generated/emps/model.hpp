@@ -38,7 +38,7 @@ struct Emps {
   static constexpr int kReadyState[kJoints] = {
       -1};
   static constexpr model::AxisInfo kAxes[kJoints] = {
-      {1.0f, 0, 1.0f, 3.0f, 0.004999999888241291f, 351.5f}};
+      {1.0000000116860974e-07f, 0, 0.021453857421875f, 3.0f, 0.004999999888241291f, 351.5f}};
   static constexpr float kMotorToJoint[kJoints * kJoints] = {
       1.0f};
   static constexpr float kMotorTorqueToJoint[kJoints * kJoints] = {

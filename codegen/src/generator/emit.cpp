@@ -96,7 +96,8 @@ std::string Meaning(const Model& m) {
   s << "\n";
   for (const EffectInstance& e : m.effects()) WriteMeaning(e, s);
   for (const TableParameter& p : m.table()) s << p.name << " " << p.unit << "\n";
-  const AxisText axes = Axes(m);
+  // What stands for a motor that nobody stated is no part of the meaning.
+  const AxisText axes = Axes(m, WithoutMotor::kUnit);
   s << axes.axes << axes.motor_to_joint << axes.torque_to_joint << r.sample_ticks << " ";
   number(r.tick_rate_Hz);
   return s.str();

@@ -70,16 +70,15 @@ std::string CountText(const Passport& count) {
          " sines and cosines, " + std::to_string(count.functions) + " other functions";
 }
 
-AxisText Axes(const Model& m) {
+AxisText Axes(const Model& m, WithoutMotor without) {
   const Robot& r = m.robot();
   const int n = m.joints();
   AxisText out;
   std::vector<std::string> rows;
   for (const Joint& j : r.joint) {
-    const double counts_to_rad =
-        j.has_motor ? 2 * std::numbers::pi / (j.motor.counts_per_turn * j.motor.gear_ratio) : 1;
-    const double lsb_to_Nm =
-        j.has_motor ? j.motor.current_A_per_lsb * j.motor.torque_constant_NmpA * j.motor.gear_ratio : 1;
+    const bool unit = without == WithoutMotor::kUnit && !j.has_motor;
+    const double counts_to_rad = unit ? 1 : 2 * std::numbers::pi / (j.motor.counts_per_turn * j.motor.gear_ratio);
+    const double lsb_to_Nm = unit ? 1 : j.motor.current_A_per_lsb * j.motor.torque_constant_NmpA * j.motor.gear_ratio;
     // The noise of one tick is white: averaging the ticks of a sample divides it.
     rows.push_back("{" + Float(counts_to_rad) + ", " + std::to_string(j.motor.zero_counts) + ", " + Float(lsb_to_Nm) +
                    ", " + Float(j.torque_noise_Nm / std::sqrt(r.sample_ticks)) + ", " + Float(j.v_min_radps) + ", " +

@@ -47,7 +47,9 @@ std::string CountText(const Passport& count);  // "384 multiplications, 287 addi
 struct AxisText {
   std::string axes, motor_to_joint, torque_to_joint;
 };
-AxisText Axes(const Model& m);
+// kUnit: of a joint without a motor counts and current are rad and N m, as the schema has them.
+enum class WithoutMotor { kOnTheJoint, kUnit };
+AxisText Axes(const Model& m, WithoutMotor without = WithoutMotor::kOnTheJoint);
 
 // The emitted files and what goes into them.
 struct Functions {

@@ -58,6 +58,16 @@ Motor ReadMotor(const io::TomlReader& in, bool prismatic) {
   return m;
 }
 
+// What stands for a motor that the file does not have: 2^23 counts a turn or 1e7 a metre, and 2^14 steps of the
+// converter up to the torque limit, all on the joint side. The simulated drive measures so, and the client reads so.
+Motor OnTheJoint(JointType type, double torque_limit_Nm) {
+  Motor motor;
+  motor.counts_per_turn = type == JointType::kPrismatic ? 2 * std::numbers::pi * 1e7 : 8388608;
+  motor.gear_ratio = motor.torque_constant_NmpA = 1;
+  motor.current_A_per_lsb = torque_limit_Nm / 16384;
+  return motor;
+}
+
 void AllowDriveKeys(const io::TomlReader& in, JointType type, std::span<const std::string_view> more = {}) {
   if (type == JointType::kPrismatic) in.AllowOnly(kSlideKeys, more);
   else in.AllowOnly(kTurnKeys, more);
@@ -92,8 +102,8 @@ void ReadDrive(const io::TomlReader& in, Joint& j, const std::string& unlimited)
     if (in.Has(key)) j.wide.erase(name);
   }
   j.has_motor = in.Has("motor");
+  j.motor = j.has_motor ? ReadMotor(in, prismatic) : OnTheJoint(j.kinematics.type, j.torque_limit_Nm);
   if (!j.has_motor) return;
-  j.motor = ReadMotor(in, prismatic);
   if (in.Table("motor").Has("rotor_inertia_kgm2")) j.wide.erase("Ia");
 }
 

@@ -1,6 +1,7 @@
 // description - SDF, MJCF, YAML and a C header: files that are written whole. Link frames are the DH frames.
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cctype>
 
@@ -147,14 +148,19 @@ Description ToMjcf(const DescribedArm& arm) {
     const DescribedJoint& own = arm.joint[j];
     const Eigen::Isometry3d T = FrameOf(robot, j);
     const Eigen::Quaterniond turn(T.linear());
-    const auto& I = own.body.inertia_kgm2;
     const auto& c = own.body.center_m;
+    // MuJoCo finds the principal axes of a full inertia to eight digits only.
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(codegen::Symmetric(own.body.inertia_kgm2));
+    const Eigen::Vector3d I = principal.eigenvalues();
+    Eigen::Matrix3d axes = principal.eigenvectors();
+    if (axes.determinant() < 0) axes.col(0) *= -1;
+    const Eigen::Quaterniond tilt(axes);
     d.text += fmt::format("{}<body name=\"{}\" pos=\"{}\" quat=\"{} {} {} {}\">\n", indent, XmlText(LinkName(robot, j)),
                           Exact(Eigen::Vector3d(T.translation())), Exact(turn.w()), Exact(turn.x()), Exact(turn.y()),
                           Exact(turn.z()));
-    d.text += fmt::format("{}  <inertial pos=\"{} {} {}\" mass=\"{}\" fullinertia=\"{} {} {} {} {} {}\"/>\n", indent,
-                          Exact(c[0]), Exact(c[1]), Exact(c[2]), Exact(own.body.mass_kg), Exact(I[0]), Exact(I[3]),
-                          Exact(I[5]), Exact(I[1]), Exact(I[2]), Exact(I[4]));
+    d.text += fmt::format("{}  <inertial pos=\"{} {} {}\" quat=\"{} {} {} {}\" mass=\"{}\" diaginertia=\"{}\"/>\n",
+                          indent, Exact(c[0]), Exact(c[1]), Exact(c[2]), Exact(tilt.w()), Exact(tilt.x()),
+                          Exact(tilt.y()), Exact(tilt.z()), Exact(own.body.mass_kg), Exact(I));
     d.text += fmt::format(
         "{}  <joint name=\"{}\" type=\"{}\" axis=\"0 0 1\" range=\"{} {}\" armature=\"{}\" damping=\"{}\" "
         "frictionloss=\"{}\"/>\n",

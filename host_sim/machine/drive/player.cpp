@@ -14,8 +14,13 @@ Player::Player(int joints, double tick_s, MotionLimits limits)
   Hold(Eigen::VectorXd::Zero(joints));
 }
 
-bool Player::Load(const trajectory::Trajectory& trajectory) {
+bool Player::Load(double step_s, std::uint32_t points, const float* q) {
   if (moving()) return false;
+  trajectory::Trajectory trajectory;
+  trajectory.step_s = step_s;
+  trajectory.q =
+      Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(q, points, joints_)
+          .cast<double>();
   loaded_ = std::make_shared<const trajectory::TrajectorySpline>(trajectory);
   return true;
 }

@@ -7,8 +7,8 @@
 
 #include <Eigen/Core>
 
-#include "host_sim/client/vendor_registers.hpp"
 #include "host_sim/data/trajectory/trajectory.hpp"
+#include "host_sim/machine/drive/firmware.hpp"
 
 namespace armcal::drive {
 
@@ -21,24 +21,21 @@ struct MotionLimits {
 };
 
 // Load, Command and the getters belong to the background, Step to the tick.
-class Player {
+class Player final : public PlayedMotion {
  public:
   // A joint further than this from its set-point stops the motion.
   static constexpr double kMaxTrackingError_rad = 0.2;
 
   Player(int joints, double tick_s, MotionLimits limits);
 
-  // False while a motion runs.
-  bool Load(const trajectory::Trajectory& trajectory);
-  void SetSpeed(double share) { speed_.store(share); }
-  void Command(client::PlayerCommand command) { command_.store(command); }
+  bool Load(double step_s, std::uint32_t points, const float* q) override;
+  void SetSpeed(double share) override { speed_.store(share); }
+  void Command(client::PlayerCommand command) override { command_.store(command); }
 
-  client::PlayerState state() const { return state_.load(); }
-  client::StopReason reason() const { return reason_.load(); }
-  std::uint32_t first_tick() const { return first_tick_.load(); }  // of the played part
-  std::uint32_t last_tick() const { return last_tick_.load(); }
-  bool enabled() const { return state() != client::PlayerState::kDisabled; }
-  bool moving() const { return state() == client::PlayerState::kBlending || state() == client::PlayerState::kPlaying; }
+  client::PlayerState state() const override { return state_.load(); }
+  client::StopReason reason() const override { return reason_.load(); }
+  std::uint32_t first_tick() const override { return first_tick_.load(); }  // of the played part
+  std::uint32_t last_tick() const override { return last_tick_.load(); }
   bool command_pending() const { return command_.load() != client::PlayerCommand::kNone; }
 
   // One tick: takes a command, moves the set-point. Context: tick.

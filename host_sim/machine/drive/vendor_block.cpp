@@ -69,12 +69,7 @@ Status VendorBlock::Obey(client::PlayerCommand command) {
   if (command == client::PlayerCommand::kStart) {
     const bool complete = points_ > 0 && std::count(loaded_.begin(), loaded_.end(), 1) == static_cast<long>(points_);
     if (!complete || !player_.enabled() || player_.moving()) return Status::kWrongOrder;
-    trajectory::Trajectory t;
-    t.step_s = step_us_ * 1e-6;
-    t.q.resize(points_, joints_);
-    for (std::uint32_t k = 0; k < points_; ++k)
-      for (int j = 0; j < joints_; ++j) t.q(k, j) = position_[k * joints_ + j];
-    if (!player_.Load(t)) return Status::kBusy;
+    if (!player_.Load(step_us_ * 1e-6, points_, position_.data())) return Status::kBusy;
   }
   player_.Command(command);
   return Status::kOk;

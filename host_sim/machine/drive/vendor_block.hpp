@@ -4,14 +4,14 @@
 #include <vector>
 
 #include "armcal/link/register_map.hpp"
-#include "host_sim/machine/drive/player.hpp"
+#include "host_sim/machine/drive/firmware.hpp"
 
 namespace armcal::drive {
 
 // Context: background, all of it.
 class VendorBlock {
  public:
-  VendorBlock(Player& player, int joints) : player_(player), joints_(joints) {}
+  VendorBlock(PlayedMotion& player, int joints) : player_(player), joints_(joints) {}
 
   // kFull, kBadAddress: the map's answer.
   core::Status Serve(link::RegisterMap& map);
@@ -25,7 +25,7 @@ class VendorBlock {
   static core::Status WritePoints(void* self, std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
   core::Status Obey(client::PlayerCommand command);
 
-  Player& player_;
+  PlayedMotion& player_;
   int joints_;
   std::uint32_t points_ = 0, step_us_ = 0;
   std::uint16_t speed_percent_ = 100;

@@ -44,7 +44,7 @@ Arm::Arm(const Scenario& scenario, const std::string& robot_path)
       stops_(robot_.joint.size(), 0),
       cut_(robot_.joint.size(), false) {
   const int n = joints();
-  if (scenario.robot != robot_.name)
+  if (!scenario.robot.empty() && scenario.robot != robot_.name)
     throw io::InputError(scenario.path + ": robot: expected \"" + robot_.name + "\", the robot of " + robot_path);
   for (const PlacedJointEffect& placed : scenario.joint_effects) {
     if (placed.joint >= n)
@@ -61,9 +61,12 @@ Arm::Arm(const Scenario& scenario, const std::string& robot_path)
   temperature_ = PerJoint(scenario.thermal.start_degC, scenario, "thermal.start_degC", n);
   rise_KpW_ = PerJoint(scenario.thermal.rise_KpW, scenario, "thermal.rise_KpW", n);
   warming_time_s_ = PerJoint(scenario.thermal.time_constant_s, scenario, "thermal.time_constant_s", n);
-  friction_ = load_ = command_ = Eigen::VectorXd::Zero(n);
-  const Eigen::VectorXd start =
-      scenario.start_rad.empty() ? Eigen::VectorXd::Zero(n) : PerJoint(scenario.start_rad, scenario, "start_rad", n);
+  friction_ = load_ = command_ = slope_ = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd start(n);
+  for (int j = 0; j < n; ++j)
+    start[j] = std::clamp(0.0, robot_.joint[static_cast<std::size_t>(j)].lowest_rad,
+                          robot_.joint[static_cast<std::size_t>(j)].highest_rad);
+  if (!scenario.start_rad.empty()) start = PerJoint(scenario.start_rad, scenario, "start_rad", n);
   ChoosePayload();
   Place({start.data(), static_cast<std::size_t>(n)});
 }
@@ -90,15 +93,19 @@ void Arm::Step(std::span<const double> current_command_A, Sensors& out) {
   const int n = joints();
   if (current_command_A.size() != static_cast<std::size_t>(n))
     throw std::invalid_argument("plant::Arm::Step: one current a joint");
+  Eigen::VectorXd target(n);
   for (int j = 0; j < n; ++j) {
     const JointData& joint = robot_.joint[static_cast<std::size_t>(j)];
     const double wanted = current_command_A[static_cast<std::size_t>(j)];
     if (!std::isfinite(wanted)) throw std::invalid_argument("plant::Arm::Step: finite currents");
     const double limit = joint.torque_limit_Nm / (std::abs(joint.gear_ratio) * joint.torque_constant_NmpA);
-    command_[j] = std::clamp(wanted, -limit, limit);
-    cut_[static_cast<std::size_t>(j)] = command_[j] != wanted;
+    target[j] = std::clamp(wanted, -limit, limit);
+    cut_[static_cast<std::size_t>(j)] = target[j] != wanted;
   }
+  if (scenario_.command_ramps) slope_ = (target - command_) / tick_s_;
+  else command_ = target;
   for (int s = 0; s < scenario_.substeps; ++s) Advance(tick_s_ / scenario_.substeps);
+  command_ = target;
   Warm();
   time_s_ = static_cast<double>(++ticks_) * tick_s_;
   if (ChoosePayload()) Settle();

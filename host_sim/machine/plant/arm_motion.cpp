@@ -8,7 +8,10 @@
 namespace armcal::plant {
 
 Eigen::VectorXd Arm::CurrentAfter(double duration_s) const {
-  return command_ + (current_ - command_) * std::exp(-duration_s / scenario_.current_time_constant_s);
+  // The command runs on with its slope; exact for the first-order lag.
+  const double lag_s = scenario_.current_time_constant_s;
+  return command_ + slope_ * (duration_s - lag_s) +
+         (current_ - command_ + slope_ * lag_s) * std::exp(-duration_s / lag_s);
 }
 
 Arm::JointTorques Arm::TorquesAt(int joint, int direction, double q, double qd, bool breaking_loose) const {
@@ -36,6 +39,13 @@ Arm::JointTorques Arm::TorquesAt(int joint, int direction, double q, double qd, 
   sum.dry += dry;
   sum.undeclared += direction * dry;
   return sum;
+}
+
+Eigen::MatrixXd Arm::Mass(const Eigen::VectorXd& q) {
+  Eigen::MatrixXd mass;
+  Eigen::VectorXd bias;
+  links_->MassAndBias(q, Eigen::VectorXd::Zero(joints()), mass, bias);
+  return mass + rotors_;
 }
 
 void Arm::FormDynamics(const Eigen::VectorXd& q, const Eigen::VectorXd& qd) {
@@ -116,6 +126,7 @@ void Arm::Advance(double duration_s) {
     q_ += step * (qd_ + 0.5 * step * middle_qdd_);
     qd_ += step * middle_qdd_;
     current_ = CurrentAfter(step);
+    command_ += step * slope_;
     if (stopped >= 0) {
       qd_[stopped] = 0;
       direction_[static_cast<std::size_t>(stopped)] = 0;

@@ -1,11 +1,11 @@
-// plant - builds KDL chains from DH rows and bodies about their centres.
+// plant - builds KDL chains from DH rows or a URDF's places, and bodies about their centres.
 #include "host_sim/machine/plant/dynamics.hpp"
 
 namespace armcal::plant {
 namespace {
 
-// Each segment ends in its own link frame (its joint turns about, or slides along, that frame's z axis), so bodies are
-// handed to KDL in the frame in which the robot file gives them.
+// Each segment ends in its own link frame (its joint turns about, or slides along, an axis of that frame), so bodies
+// are handed to KDL in the frame in which the robot file gives them.
 KDL::Chain MakeChain(const RobotFile& robot, const std::vector<Body>& bodies,
                      const std::optional<AttachedBody>& payload) {
   KDL::Chain chain;
@@ -13,12 +13,13 @@ KDL::Chain MakeChain(const RobotFile& robot, const std::vector<Body>& bodies,
   for (std::size_t k = 0; k < robot.joint.size(); ++k) {
     const JointData& joint = robot.joint[k];
     const KDL::Frame at_zero =
-        before * KDL::Frame::DH_Craig1989(joint.a_m, joint.alpha_rad, joint.d_m, joint.theta_rad);
+        before * (joint.place ? joint.place->frame
+                              : KDL::Frame::DH_Craig1989(joint.a_m, joint.alpha_rad, joint.d_m, joint.theta_rad));
+    const KDL::Vector axis = at_zero.M * (joint.place ? joint.place->axis : KDL::Vector(0, 0, 1));
     KDL::RigidBodyInertia inertia = ToKdl(bodies[k]);
     if (payload && k + 1 == robot.joint.size()) inertia = inertia + payload->frame * ToKdl(payload->body);
     const auto kind = joint.prismatic ? KDL::Joint::TransAxis : KDL::Joint::RotAxis;
-    chain.addSegment(
-        KDL::Segment(joint.name, KDL::Joint(joint.name, at_zero.p, at_zero.M.UnitZ(), kind), at_zero, inertia));
+    chain.addSegment(KDL::Segment(joint.name, KDL::Joint(joint.name, at_zero.p, axis, kind), at_zero, inertia));
     before = KDL::Frame::Identity();
   }
   return chain;

@@ -6,6 +6,8 @@
 #pragma once
 
 #include <array>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,14 +25,26 @@ struct Body {
 };
 
 KDL::RigidBodyInertia ToKdl(const Body& body);
+Body FromKdl(KDL::RigidBodyInertia body);  // a copy: KDL's RefPoint is not const
+
+// Where a URDF puts a joint: its frame in the frame of the link before, at position zero, and its axis in that frame.
+struct UrdfPlace {
+  KDL::Frame frame;
+  KDL::Vector axis;
+};
 
 // Rotary quantities; for a prismatic joint read m, m/s, N, N s/m, and rad/m for the gear ratio.
 struct JointData {
   std::string name;
   bool prismatic = false;
   double alpha_rad = 0, a_m = 0, d_m = 0, theta_rad = 0;  // modified DH (Craig), offsets included
-  double torque_limit_Nm = 0, torque_noise_Nm = 0;        // noise: standard deviation of one tick's reading
+  std::optional<UrdfPlace> place;                         // in the place of DH
+  double lowest_rad = -std::numeric_limits<double>::infinity(), highest_rad = -lowest_rad;
+  double speed_limit_radps = 0;                     // 0: the file has none
+  double torque_limit_Nm = 0, torque_noise_Nm = 0;  // noise: standard deviation of one tick's reading
   double coulomb_Nm = 0, viscous_Nmsprad = 0;
+  bool coulomb_stated = false, viscous_stated = false, rotor_stated = false;  // by the robot file itself
+  bool has_motor = false;
   double counts_per_turn = 0;  // of the motor
   long long zero_counts = 0;
   double gear_ratio = 1;                                                           // signed, motor per joint
@@ -50,8 +64,11 @@ struct RobotFile {
   int joints() const { return static_cast<int>(joint.size()); }
 };
 
-// Throws io::InputError (file, key, what was expected); also when bodies or motors are missing, without which there
-// is nothing to simulate. A [payload] table makes the last link carry it.
+// Throws io::InputError (file, key, what was expected); also when bodies are missing, without which there is nothing to
+// simulate. A joint without a motor is measured on the joint: 2^23 counts a turn or 1e7 a metre, and 2^14 steps of
+// current up to the torque limit. A [payload] table makes the last link carry it.
+// A URDF's joints that have no [[joint]] table are held: at `fixed`, as they mimic, or where their limits are next to
+// zero. What they carry is a part of the link that carries them.
 RobotFile ReadRobotFile(const std::string& path);
 
 }  // namespace armcal::plant

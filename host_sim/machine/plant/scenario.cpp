@@ -80,12 +80,15 @@ Scenario ReadScenario(const std::string& path) {
   Scenario scenario;
   scenario.path = path;
   scenario.title = keys.Text("title");
-  scenario.robot = keys.Text("robot");
+  scenario.robot = keys.Text("robot", "");
   scenario.truth_seed = static_cast<std::uint64_t>(keys.Integer("truth_seed", 0, INT64_MAX));
   scenario.noise_seed = static_cast<std::uint64_t>(keys.Integer("noise_seed", 0, INT64_MAX));
   scenario.stick_ratio = keys.Number("stick_ratio", scenario.stick_ratio);
   if (scenario.stick_ratio < 1) keys.Fail("stick_ratio", "a number not below 1");
   scenario.current_time_constant_s = keys.Positive("current_time_constant_s", scenario.current_time_constant_s);
+  const std::string command = keys.Text("command", "held");
+  if (command != "held" && command != "ramp") keys.Fail("command", "\"held\" or \"ramp\"");
+  scenario.command_ramps = command == "ramp";
   scenario.substeps = static_cast<int>(keys.Integer("substeps", 1, 64, scenario.substeps));
   scenario.start_rad = keys.NumberOrNumbers("start_rad", {});
   if (keys.Has("flange")) scenario.flange = ReadFrame(keys.Table("flange"));
@@ -95,6 +98,7 @@ Scenario ReadScenario(const std::string& path) {
     scenario.spread.inertial = ReadSpread(truth, "inertial_spread", scenario.spread.inertial);
     scenario.spread.friction = ReadSpread(truth, "friction_spread", scenario.spread.friction);
     scenario.spread.torque_constant = ReadSpread(truth, "torque_constant_spread", scenario.spread.torque_constant);
+    scenario.spread.unstated = ReadSpread(truth, "unstated_share", scenario.spread.unstated);
     truth.Finish();
   }
   if (keys.Has("sensors")) {

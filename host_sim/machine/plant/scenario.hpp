@@ -43,16 +43,17 @@ struct Thermal {
 };
 
 struct Scenario {
-  std::string path, title, robot;
+  std::string path, title, robot;  // robot: empty: any
   std::uint64_t truth_seed = 1, noise_seed = 1;
   Spread spread;
   Thermal thermal;
   double stick_ratio = 1;  // breakaway level / Coulomb level
   double current_time_constant_s = 0.001;
+  bool command_ramps = false;            // from one tick's current command to the next; else it steps
   int substeps = 4;                      // integration steps a tick
   double torque_noise_scale = 1;         // x the robot file's torque noise
   double temperature_noise_degC = 0.05;  // standard deviation of a reading
-  std::vector<double> start_rad;         // empty: zero pose
+  std::vector<double> start_rad;         // empty: zero, or the limit next to it
   std::optional<KDL::Frame> flange;      // instead of the robot file's tool frame
   std::vector<PlacedJointEffect> joint_effects;
   std::optional<PayloadStep> payload;

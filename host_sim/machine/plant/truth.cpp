@@ -2,6 +2,7 @@
 #include "host_sim/machine/plant/truth.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/machine/plant/random.hpp"
@@ -11,6 +12,8 @@ namespace {
 
 // Enough for any CAD body that is itself physical; a body that never passes is the file's fault.
 constexpr int kMostDraws = 1000;
+constexpr double kFastest = 20;    // rad/s, m/s; a limit above stands for none
+constexpr double kRunUp_s = 0.25;  // in which s T alone would bring the rotor to the speed limit
 
 Body DrawBody(const Body& nominal, double spread, Random& random) {
   const auto scale = [&](double value) { return value * random.Uniform(1 - spread, 1 + spread); };
@@ -52,9 +55,19 @@ Truth DrawTruth(const RobotFile& robot, const Spread& spread, std::uint64_t seed
     truth.coulomb_Nm.push_back(joint.coulomb_Nm * random.Uniform(1 - spread.friction, 1 + spread.friction));
     truth.viscous_Nmsprad.push_back(joint.viscous_Nmsprad * random.Uniform(1 - spread.friction, 1 + spread.friction));
   }
-  for (const JointData& joint : robot.joint)
-    truth.torque_constant_NmpA.push_back(joint.torque_constant_NmpA *
-                                         random.Uniform(1 - spread.torque_constant, 1 + spread.torque_constant));
+  for (const JointData& joint : robot.joint) {
+    const double factor = random.Uniform(1 - spread.torque_constant, 1 + spread.torque_constant);
+    truth.torque_constant_NmpA.push_back(joint.torque_constant_NmpA * (joint.has_motor ? factor : 1));
+  }
+  for (std::size_t j = 0; spread.unstated > 0 && j < robot.joint.size(); ++j) {
+    const JointData& joint = robot.joint[j];
+    const auto draw = [&] { return spread.unstated * joint.torque_limit_Nm * random.Uniform(0.5, 1.5); };
+    const double speed = joint.speed_limit_radps > 0 ? std::min(joint.speed_limit_radps, kFastest) : kFastest;
+    const double coulomb = draw(), viscous = draw() / speed, rotor = draw() / speed * kRunUp_s;
+    if (!joint.coulomb_stated) truth.coulomb_Nm[j] = coulomb;
+    if (!joint.viscous_stated) truth.viscous_Nmsprad[j] = viscous;
+    if (!joint.rotor_stated) truth.rotor_inertia_kgm2[j] = rotor / (joint.gear_ratio * joint.gear_ratio);
+  }
   return truth;
 }
 

@@ -268,9 +268,11 @@ void AddBody(const tinyxml2::XMLElement* body, const std::string& parent, KDL::T
   const KDL::Frame frame(KDL::Rotation::Quaternion(quat[1], quat[2], quat[3], quat[0]), Vector(pos));
   tree.addSegment(KDL::Segment(name + "_place", KDL::Joint(KDL::Joint::None), frame), parent);
   const auto* inertial = body->FirstChildElement("inertial");
-  const auto full = Numbers(inertial->Attribute("fullinertia"));  // xx yy zz xy xz yz
-  const KDL::RigidBodyInertia own(inertial->DoubleAttribute("mass"), Vector(Numbers(inertial->Attribute("pos"))),
-                                  KDL::RotationalInertia(full[0], full[1], full[2], full[3], full[4], full[5]));
+  const auto moments = Numbers(inertial->Attribute("diaginertia")), tilt = Numbers(inertial->Attribute("quat"));
+  const KDL::RigidBodyInertia own = KDL::Frame(KDL::Rotation::Quaternion(tilt[1], tilt[2], tilt[3], tilt[0]),
+                                               Vector(Numbers(inertial->Attribute("pos")))) *
+                                    KDL::RigidBodyInertia(inertial->DoubleAttribute("mass"), KDL::Vector::Zero(),
+                                                          KDL::RotationalInertia(moments[0], moments[1], moments[2]));
   const auto* joint = body->FirstChildElement("joint");
   EXPECT_STREQ(joint->Attribute("axis"), "0 0 1");
   tree.addSegment(KDL::Segment(name, AxisZ(joint->Attribute("name"), std::string(joint->Attribute("type")) == "slide"),

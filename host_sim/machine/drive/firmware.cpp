@@ -1,0 +1,159 @@
+// drive - lib's controller for one model, behind Modbus TCP. Compiled once for each model, linked in or loaded.
+#include "host_sim/machine/drive/firmware.hpp"
+
+#include <atomic>
+#include <memory>
+
+#include <selected_model.hpp>
+#include "armcal/controller/controller.hpp"
+#include "armcal/controller/trace_records.hpp"
+#include "armcal/filter/forgetting_filter.hpp"
+#include "armcal/filter/kalman_filter.hpp"
+#include "armcal/link/tcp.hpp"
+#include "armcal/link/trace.hpp"
+#include "host_sim/machine/drive/vendor_block.hpp"
+#include "port/linux/file_storage.hpp"
+#include "port/linux/steady_clock.hpp"
+#include "port/linux/tcp_server.hpp"
+
+namespace armcal::drive {
+namespace {
+
+template <class Model>
+class Compiled final : public Firmware {
+ public:
+  static constexpr int n = Model::kJoints;
+
+  Compiled()
+      : storage_(2, kSectorBytes, 8),
+        controller_(storage_.storage(), port_linux::SteadyClock(tick_), Identity(), Rules()),
+        service_(controller_.engine()),
+        server_({&service_, Service::kMaxReply, &Service::Open, &Service::Receive, &Service::MidFrame, &Service::Close,
+                 &Service::Keep},
+                port_linux::SteadyClock(tick_)) {}
+
+  const char* name() const override { return Model::kName; }
+  std::uint32_t schema() const override { return Model::kSchema; }
+  int joints() const override { return n; }
+  AxisScale axis(int j) const override {
+    const model::AxisInfo& axis = Model::kAxes[j];
+    return {static_cast<double>(axis.counts_to_rad), axis.zero_counts, static_cast<double>(axis.lsb_to_Nm)};
+  }
+
+  std::string Start(const std::string& storage, const std::string& address, int port, PlayedMotion& motion) override {
+    if (!core::IsOk(storage_.Open(storage))) return storage + ": expected a file that can be written";
+    vendor_ = std::make_unique<VendorBlock>(motion, n);
+    if (!core::IsOk(controller_.Record(raw_trace_)) || !core::IsOk(sample_trace_.Serve(controller_.map(), 1)) ||
+        !core::IsOk(vendor_->Serve(controller_.map())))
+      return "drive: a block of registers does not fit the map";
+    controller_.template estimator<0>().SetObserver(&OnSample, this);
+    (void)controller_.Boot();  // its answer is served as table_status
+    if (!core::IsOk(server_.Listen(address, static_cast<std::uint16_t>(port)))) return server_.error();
+    return "";
+  }
+  int port() const override { return server_.port(); }
+
+  bool Work(bool wait) override {
+    bool busy = false;
+    for (int k = 0; k < kSlices; ++k) {
+      const bool room =
+          !wait || sample_trace_.recording().mode != link::TraceMode::kStreaming || sample_trace_.room() > 2;
+      if (!room || !controller_.Step()) break;
+      busy = true;
+    }
+    return busy;
+  }
+  void Serve(int timeout_ms) override { (void)server_.Poll(timeout_ms); }  // an error here is one connection's
+  void Publish() override {
+    if (read_out_at_ == samples_seen_) return;
+    read_out_at_ = samples_seen_;
+    controller_.template estimator<0>().RequestReadOut();
+    controller_.template estimator<1>().RequestReadOut();
+  }
+  std::uint32_t generation() const override { return controller_.generation(); }
+
+  bool KeepsUp() override {
+    if (raw_trace_.recording().mode == link::TraceMode::kStreaming && raw_trace_.room() < 2) return false;
+    return controller_.template estimator<0>().pending() <= kBacklog;
+  }
+  std::uint32_t tick() const override { return tick_.load(); }
+  void SetEnabled(bool enabled) override { controller_.SetEnabledAxes(enabled ? (1u << n) - 1 : 0); }
+  void FeedForward(const double* q, const double* qd, const double* qdd, const double* temperature_degC,
+                   double* tau_Nm) override {
+    controller::SetPoint<n> target;
+    float temperature[n], tau[n];
+    for (int j = 0; j < n; ++j) {
+      target.q[j] = static_cast<float>(q[j]);
+      target.qd[j] = static_cast<float>(qd[j]);
+      target.qdd[j] = static_cast<float>(qdd[j]);
+      temperature[j] = static_cast<float>(temperature_degC[j]);
+    }
+    (void)controller_.FeedForward(target, temperature, tau);  // its state is served
+    for (int j = 0; j < n; ++j) tau_Nm[j] = static_cast<double>(tau[j]);
+  }
+  double torque_scale(int j) const override {
+    return controller_.feed_forward().valid() ? static_cast<double>(controller_.adopted().committed.torque_scale[j])
+                                              : 1.0;
+  }
+  void Push(const Reading* readings) override {
+    const std::uint32_t tick = tick_.load();
+    model::RawSample<n> raw;
+    raw.tick = tick;
+    for (int j = 0; j < n; ++j) {
+      raw.counts[j] = readings[j].counts;
+      raw.current[j] = readings[j].current_lsb;
+      raw.flags[j] = static_cast<std::uint8_t>((readings[j].enabled ? model::kEnabled : 0) |
+                                               (readings[j].saturated ? model::kSaturated : 0));
+      raw.temperature_degC[j] = readings[j].temperature_degC;
+    }
+    (void)controller_.Push(raw);  // a refused sample is counted and served
+    tick_ = tick + 1;
+  }
+
+ private:
+  static constexpr std::uint32_t kSectorBytes = 16384;
+  static constexpr int kSlices = 200;           // of lib's work between two looks at the sockets
+  static constexpr std::uint32_t kBacklog = 8;  // samples that may wait before virtual time does
+  using Service = link::TcpService<port_linux::TcpServer::kSlots>;
+
+  static link::Identity Identity() {
+    link::Identity identity;
+    identity.firmware_version = 1, identity.serial_number = 1;
+    identity.capabilities = link::reg::kHasSampleTrace;
+    return identity;
+  }
+  // A file does not wear out.
+  static controller::BoardRules Rules() {
+    controller::BoardRules rules;
+    rules.saves.interval_ms = 0;
+    return rules;
+  }
+
+  static void OnSample(void* self, const model::Sample<n>& sample, const float* tau_model_Nm) {
+    auto& f = *static_cast<Compiled*>(self);
+    ++f.samples_seen_;
+    if (!f.sample_trace_.Offer(sample.tick).last) return;
+    std::uint16_t record[controller::SampleRecordWords<n>(controller::kSampleAll)];
+    controller::WriteSampleRecord<n>(sample, tau_model_Nm, record);
+    (void)f.sample_trace_.Push(record, f.controller_.generation());  // a refusal is counted in the trace
+  }
+  static std::uint16_t SampleWords(void*, std::uint32_t channels) { return controller::SampleRecordWords<n>(channels); }
+
+  std::atomic<std::uint32_t> tick_{0};  // the controller's clock
+  port_linux::FileStorage storage_;
+  controller::Controller<Model, filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>> controller_;
+  std::unique_ptr<VendorBlock> vendor_;
+  controller::RawTrace<Model> raw_trace_;
+  link::TraceRing<> sample_trace_{Model::kSampleTicks, &SampleWords, nullptr};
+  std::uint32_t samples_seen_ = 0, read_out_at_ = 0;
+  Service service_;
+  port_linux::TcpServer server_;
+};
+
+}  // namespace
+}  // namespace armcal::drive
+
+extern "C" __attribute__((visibility("default"))) armcal::drive::Firmware* MakeArmcalFirmware(int interface) {
+  if (interface != armcal::drive::kFirmwareInterface) return nullptr;
+  return new armcal::drive::Compiled<armcal::generated::SelectedModel>;
+}

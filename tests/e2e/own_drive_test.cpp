@@ -1,0 +1,92 @@
+// end-to-end tests - the drive of a robot that armcal was not built with: compiled once, whatever goes wrong meanwhile.
+#include <sys/stat.h>
+
+#include "tests/e2e/own_drive.hpp"
+
+namespace armcal::tests {
+namespace {
+
+class CompiledDrive : public OwnDrive {
+ protected:
+  // A compiler of the test: a script.
+  void CompileWith(const std::string& body) {
+    std::ofstream(Path("compiler")) << "#!/bin/sh\n" << body;
+    chmod(Path("compiler").c_str(), 0755);
+    setenv("CXX", Path("compiler").c_str(), 1);
+  }
+  std::vector<std::string> Kept(const std::string& ending = "") const {
+    std::vector<std::string> names;
+    if (fs::is_directory(Path("cache/armcal")))
+      for (const auto& e : fs::directory_iterator(Path("cache/armcal")))
+        if (const std::string name = e.path().filename(); name.ends_with(ending)) names.push_back(name);
+    return names;
+  }
+  Outcome Simulate() { return Tool({"simulate", "--robot", Robot(), "--port", "0", "--storage", Path("drive.nor")}); }
+  std::vector<std::string> Words(const std::string& storage) const {
+    return {ARMCAL_TOOL, "simulate", "--robot", Robot(), "--port", "0", "--storage", Path(storage)};
+  }
+};
+
+TEST_F(CompiledDrive, OfAScara_IsCompiledOnceAndMeasuresItsNoise) {
+  ASSERT_NO_FATAL_FAILURE(Imported(Scara()));
+
+  setenv("CXX", "no-such-compiler", 1);
+  ExpectOneLine(Simulate(), 2, "no-such-compiler: not found");
+  EXPECT_TRUE(Kept(".part").empty());
+
+  CompileWith("echo no memory left\nfor word; do case $word in *.so) echo half >\"$word\";; esac; done\nexit 1\n");
+  const Outcome failed = Simulate();
+  EXPECT_EQ(failed.code, 2);
+  EXPECT_EQ(std::count(failed.err.begin(), failed.err.end(), '\n'), 2) << failed.err;  // "compiling ...", and the fault
+  const auto at = failed.err.rfind("see ");
+  ASSERT_NE(at, std::string::npos) << failed.err;
+  EXPECT_EQ(ReadText(failed.err.substr(at + 4, failed.err.size() - at - 5)), "no memory left\n");
+  for (const std::string& name : Kept()) EXPECT_TRUE(name.ends_with(".txt") || name.ends_with(".lock")) << name;
+
+  // A start that is killed while it compiles.
+  CompileWith("echo $$ >" + Path("begun.part") + "\nmv " + Path("begun.part") + " " + Path("begun") +
+              "\nexec sleep 100\n");
+  const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  const pid_t killed = Start(Words("killed.nor"), nowhere, nowhere);
+  while (!fs::exists(Path("begun"))) usleep(1000);
+  kill(killed, SIGKILL);
+  WaitFor(killed);
+  kill(std::stoi(ReadText(Path("begun"))), SIGKILL);
+  EXPECT_EQ(Kept(".part").size(), 1u);
+
+  // Two starts at once: one compiles, both serve. Afterwards nobody needs a compiler.
+  unsetenv("CXX");
+  std::vector<pid_t> starts;
+  for (const char* name : {"first", "second"}) {
+    const int out = open(Path(name + std::string(".out")).c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0644),
+              err = open(Path(name + std::string(".err")).c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0644);
+    starts.push_back(Start(Words(name + std::string(".nor")), out, err));
+    close(out), close(err);
+  }
+  int served = 0, compiled = 0, status = 0;
+  while (served < 2 && waitpid(-1, &status, WNOHANG) == 0) {
+    usleep(10000);
+    served = 0;
+    for (const char* name : {"first.out", "second.out"})
+      served += ReadText(Path(name)).find("listening") != std::string::npos;
+  }
+  for (const pid_t start : starts) kill(start, SIGTERM), WaitFor(start);
+  for (const char* name : {"first.err", "second.err"})
+    compiled += ReadText(Path(name)).find("compiling the simulated drive of robot own, once") != std::string::npos;
+  EXPECT_EQ(served, 2) << ReadText(Path("first.err")) << ReadText(Path("second.err"));
+  EXPECT_EQ(compiled, 1);
+  EXPECT_TRUE(Kept(".part").empty());
+
+  setenv("CXX", "no-such-compiler", 1);
+  const RunningDrive drive(folder_, Scenario("nothing.toml", 5), {"--robot", Robot()});
+  const Outcome excited = Tool(
+      {"excite", "--robot", Robot(), "--no-slow", "--starts", "2", "--seconds", "20", "--out", Path("motion.csv")});
+  ASSERT_EQ(excited.code, 0) << excited.err;
+  ASSERT_NO_FATAL_FAILURE(Recorded(drive, "motion"));
+  const Outcome fit =
+      Tool({"identify", "--robot", Robot(), "--train", Path("motion_log.csv.gz"), "--json", Path("fit.json")});
+  ASSERT_EQ(fit.code, 0) << fit.err;
+}
+
+}  // namespace
+}  // namespace armcal::tests

@@ -207,8 +207,11 @@ std::vector<std::string> MotionText(const calibration::HeldOutMotion& m) {
     if (!o.beyond()) continue;
     out.push_back(
         fmt::format("joint {}: extrapolation: {:.0f} % of its positions and {:.0f} % of its speeds are outside "
-                    "of the training logs' range; the model's torque is {:.1f} times as uncertain there",
-                    j + 1, 100 * o.position, 100 * o.speed, std::sqrt(std::max(0.0, o.leverage))));
+                    "of the training logs' range; {}",
+                    j + 1, 100 * o.position, 100 * o.speed,
+                    std::isfinite(o.leverage)
+                        ? fmt::format("the model's torque is {:.1f} times as uncertain there", std::sqrt(std::max(0.0, o.leverage)))
+                        : "no row of its torque could be fitted"));
   }
   for (const auto& group : m.in_phase) {
     out.push_back(

@@ -105,7 +105,7 @@ class MapReader {
           {std::string(rule.key), Channels(key, *table, rule.dimension), optional, Matrix(key, *table)});
     }
     // The torque that is not used must be right, too: the map is for both.
-    for (const std::string other : {std::string("tau"), std::string(kLinkTorque)})
+    for (const std::string& other : {std::string("tau"), std::string(kLinkTorque)})
       if (const toml::table* table = root_[other].as_table(); table != nullptr && other != torque)
         Channels(other, *table, "torque"), Matrix(other, *table);
     CheckPower(map, torque);

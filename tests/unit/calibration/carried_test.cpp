@@ -36,12 +36,12 @@ double Declared(const codegen::Model& model, const std::string& name, int j) {
 }
 
 // Gears that are cold at the start and warm up, each joint by a share and a time of its own; magnets that get weaker.
-void Warm(const codegen::Model& model, Dataset& d, std::uint64_t seed) {
+void Warm(const codegen::Model& model, Dataset& d, std::uint64_t seed, double magnets = 0.03) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit;
   for (int j = 0; j < d.joints(); ++j) {
     const double change = 0.5 * unit(random), constant_s = 5 + 40 * unit(random), offset = 0.5 * (unit(random) - 0.5),
-                 weaker = 0.03 * unit(random), coulomb = Declared(model, "Fc", j), viscous = Declared(model, "Fv", j);
+                 weaker = magnets * unit(random), coulomb = Declared(model, "Fc", j), viscous = Declared(model, "Fv", j);
     for (int k = 0; k < d.samples(); ++k) {
       const double qd = d.s.qd(k, j), cold = std::exp(-d.s.t[k] / constant_s);
       d.tau(k, j) += change * (2 * cold - 1) * (coulomb * (qd > 0 ? 1 : -1) + viscous * qd) + offset * coulomb;
@@ -76,7 +76,7 @@ TEST(Carried, ByTheHeldOutRunAlone_IsFoundWithinItsInterval) {
     const plant::Body body{draw % 2 ? 2.0 : 8.0, {0.04, -0.03, 0.12}, {0.02, 0, 0, 0.02, 0, 0.02}};
     const Dataset train = arm.Run(30, 100 + seed, {});
     Dataset run = arm.Run(30, 200 + seed, body);
-    if (draw % 3 == 2) Warm(arm.model(), run, seed);
+    if (draw % 3 == 2) Warm(arm.model(), run, seed, 0);  // the interval asks for the training run's torque constants
     const Carried found = Ask(arm.model(), {&train}, run, 0.05);
     named += found.named;
     held += found.interval_kg[0] < body.mass_kg && body.mass_kg < found.interval_kg[1];
@@ -91,7 +91,9 @@ TEST(Carried, ByTheTrainingRunAlone_IsMissingInTheOther) {
   LadenArm arm(5, 0);
   const plant::Body body{6, {0, 0, 0.1}, {0.02, 0, 0, 0.02, 0, 0.02}};
   const Dataset train = arm.Run(30, 1, body), run = arm.Run(30, 2, {});
-  const Carried found = Ask(arm.model(), {&train}, run, 0.01);
+  codegen::Robot robot = arm.model().robot();
+  robot.has_prior = false;  // link data of the bare arm would contradict the training run
+  const Carried found = Ask(codegen::Model(robot, tests::Records()), {&train}, run, 0.01);
   EXPECT_TRUE(found.named);
   EXPECT_NEAR(found.mass_kg, -6, 0.12);  // within the tolerance and two standard deviations
 }

@@ -71,8 +71,8 @@ TEST(Measured, Ur10e_WithDefaultOptions_NamesLoadFrictionBeforeBeltAndDelay) {
   }
 }
 
-// 2.805 kg: the source's figure. By hand the payload comes out as 2.9 to 3.1 kg, because the drive gains of the source are
-// 5 to 12 % too large for that mass.
+// 2.805 kg: the source's figure. By hand the payload comes out as 2.9 to 3.1 kg, because the drive gains of the source
+// are 5 to 12 % too large for that mass.
 TEST(Measured, Ur10e_PayloadOfTheHeldOutRun_IsNamedAndItsIntervalHoldsTheMass) {
   const fs::path data = Measured("ur10e");
   SKIP_WITHOUT(data, "ur10e");
@@ -81,9 +81,10 @@ TEST(Measured, Ur10e_PayloadOfTheHeldOutRun_IsNamedAndItsIntervalHoldsTheMass) {
                                                       {"ur-20_02_19_14harm50sec", "ur-20_02_19_15harm50secLoad"},
                                                       {"ur-20_01_31-unload", "ur-20_01_31-load"}};
   for (const auto& [train, test] : runs) {
-    const Outcome o = Tool({"diagnose", "--robot", "tests/e2e/ur10e.toml", "--channels", "tests/e2e/ur10e_channels.toml",
-                            "--train", (data / (std::string(train) + ".csv.gz")).string(), "--test",
-                            (data / (std::string(test) + ".csv.gz")).string(), "--json", json.string()});
+    const Outcome o =
+        Tool({"diagnose", "--robot", "tests/e2e/ur10e.toml", "--channels", "tests/e2e/ur10e_channels.toml", "--train",
+              (data / (std::string(train) + ".csv.gz")).string(), "--test",
+              (data / (std::string(test) + ".csv.gz")).string(), "--json", json.string()});
     ASSERT_EQ(o.code, 0) << o.err;
     const nlohmann::json payload = ReadJson(json).at("payload");
     ASSERT_FALSE(payload.is_null()) << test;
@@ -108,9 +109,9 @@ TEST(Measured, Ur10e_RunsWithoutAPayload_AreSaidToCarryNone) {
   const fs::path data = Measured("ur10e");
   SKIP_WITHOUT(data, "ur10e");
   const fs::path json = FreshFolder("ur10e_bare") / "out.json";
-  for (const char* test : {"ur-20_02_12-40sec_12harm", "ur-20_01_17-ptp_10_points", "ur-20_02_05-20sec_8harm",
-                           "ur-20_02_06-20sec_10harm", "ur-20_02_19_14harm50sec", "ur-20_02_19_15harm50sec",
-                           "ur-20_01_31-unload"}) {
+  for (const char* test :
+       {"ur-20_02_12-40sec_12harm", "ur-20_01_17-ptp_10_points", "ur-20_02_05-20sec_8harm", "ur-20_02_06-20sec_10harm",
+        "ur-20_02_19_14harm50sec", "ur-20_02_19_15harm50sec", "ur-20_01_31-unload"}) {
     const Outcome o =
         Tool({"diagnose", "--robot", "tests/e2e/ur10e.toml", "--channels", "tests/e2e/ur10e_channels.toml", "--train",
               (data / "ur-20_02_12-50sec_12harm.csv.gz").string(), (data / "ur-20_02_10-30sec_12harm.csv.gz").string(),

@@ -110,12 +110,13 @@ std::vector<std::string> PayloadText(const DiagnosisView& v) {
                to_kg = std::max(std::abs(low_kg), std::abs(high_kg));
   out.push_back(fmt::format(
       "{}its mass is {:.3g} to {:.3g} kg if each joint's torque is right to {:.3g} %{}",
-      load.tolerance_stated ? "" : "the robot file states no gain tolerance, so mass is known only up to the torque scale: ",
+      load.tolerance_stated ? ""
+                            : "the robot file states no gain tolerance, so mass is known only up to the torque scale: ",
       from_kg, to_kg, 100 * load.tolerance, load.tolerance_stated ? "" : " (--gain-tolerance)"));
   const VectorXd torque = calibration::RmsInBand(*v.test, v.test->tau);
   out.push_back("error of each half with the payload of the other half, over torque: " +
-                Shares(calibration::RmsInBand(*v.test, v.held_out->after), torque) + "; without it: " +
-                Shares(calibration::RmsInBand(*v.test, v.held_out->without_payload), torque));
+                Shares(calibration::RmsInBand(*v.test, v.held_out->after), torque) +
+                "; without it: " + Shares(calibration::RmsInBand(*v.test, v.held_out->without_payload), torque));
   return out;
 }
 

@@ -19,18 +19,18 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kLoad = 10;
-constexpr double kFriction = 0.3;   // by which a joint's friction may differ between two runs: warm or cold gears
-constexpr double kGain = 0.03;      // the same of a torque constant: warm or cold magnets
-constexpr double kWide = 10;        // a prior that says nothing: one column alone may make so many times the residual
-constexpr double kReach_m = 0.5;    // true of any load: its mass lies about this far from the flange
-constexpr double kFarthest_m = 2;   // of a load's centre from the flange
-constexpr double kNamed = 15;       // score of each half; odds of e^7 to one
-constexpr double kSeen = 4;         // standard deviations by which a mass must differ from zero
-// Of the errors on the other half: geometric mean over the joints, and of one joint that gains. Wrong friction and magnets
-// that warm up give 0.89 and more in 20 draws; a payload of a tenth of the arm's rating gives less than half.
-constexpr double kWorthIt = 0.8, kJointGains = 0.95;
-constexpr int kRounds = 6;          // of noise, prior and load; three settle
-constexpr int kFewestRows = 20;     // of a joint in one half
+constexpr double kFriction = 0.3;  // by which a joint's friction may differ between two runs: warm or cold gears
+constexpr double kGain = 0.03;     // the same of a torque constant: warm or cold magnets
+constexpr double kWide = 10;       // a prior that says nothing: one column alone may make so many times the residual
+constexpr double kReach_m = 0.5;   // true of any load: its mass lies about this far from the flange
+constexpr double kFarthest_m = 2;  // of a load's centre from the flange
+constexpr double kNamed = 15;      // score of each half; odds of e^7 to one
+constexpr double kSeen = 4;        // standard deviations by which a mass must differ from zero
+// Of the errors on the other half: geometric mean over the joints, and of one joint that gains. Wrong friction and
+// magnets that warm up gained 8 % at most in 20 draws.
+constexpr double kWorthIt = 0.9, kJointGains = 0.95;
+constexpr int kRounds = 6;       // of noise, prior and load; three settle
+constexpr int kFewestRows = 20;  // of a joint in one half
 
 // One joint's rows of one half: residual, and the columns [what may differ between runs, load].
 struct Rows {
@@ -156,8 +156,7 @@ class LoadOfRun {
       // The load's mass is known after the first round. The prior of m c and I is that of a load with reach kReach_m.
       if (with)
         for (int i = 1; i < kLoad; ++i)
-          prior(differ_ + i, differ_ + i) =
-              std::pow(out.x[differ_] * (i < 4 ? kReach_m : kReach_m * kReach_m), 2);
+          prior(differ_ + i, differ_ + i) = std::pow(out.x[differ_] * (i < 4 ? kReach_m : kReach_m * kReach_m), 2);
     }
     return out;
   }
@@ -183,9 +182,7 @@ class LoadOfRun {
   VectorXd MassShares(const Estimate& e) const { return e.share.row(differ_); }
 
  private:
-  const Rows& rows(int half, int j) const {
-    return rows_[static_cast<std::size_t>(half)][static_cast<std::size_t>(j)];
-  }
+  const Rows& rows(int half, int j) const { return rows_[static_cast<std::size_t>(half)][static_cast<std::size_t>(j)]; }
   static VectorXd AsSaved(const Dataset& run, int j, const VectorXd& column) {
     if (run.saved_Hz.size() == 0 || !std::isfinite(run.saved_Hz[j])) return column;
     MatrixXd all = MatrixXd::Zero(run.samples(), run.joints());

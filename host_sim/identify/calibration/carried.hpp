@@ -25,12 +25,12 @@ struct Carried {
   double mass_kg = 0, sd_kg = 0;  // sd: also how far the halves disagree
   // Holds the true mass if each joint's gain is within the tolerance; widened by two standard deviations.
   std::array<double, 2> interval_kg{};
-  double tolerance = 0;                 // the largest of the joints
-  bool tolerance_stated = false;        // by the robot file for every joint, or by the caller
-  std::array<Eigen::VectorXd, 2> half;  // [10] load of each half
+  double tolerance = 0;                         // the largest of the joints
+  bool tolerance_stated = false;                // by the robot file for every joint, or by the caller
+  std::array<Eigen::VectorXd, 2> half;          // [10] load of each half
   std::array<double, 2> half_sd_kg{}, score{};  // score of a half: what it tells in favour of the other half's payload
-  // Of the errors of each half with the other half's payload over those without, geometric mean over the joints; and how
-  // many joints gain on both halves.
+  // Of the errors of each half with the other half's payload over those without, geometric mean over the joints; and
+  // how many joints gain on both halves.
   std::array<double, 2> factor{1, 1};
   int joints = 0;
   int begin_second = 0;  // the first sample of the second half

@@ -280,7 +280,8 @@ std::vector<std::string> CheckRows(const codegen::Robot& robot, const std::vecto
                     "{}/s for joint 1) away from turns, gaps and the ends of the log",
                     name, samples, robot.joint[0].v_min_radps, PositionUnit(robot.joint[0])));
   if (without.empty()) return {};
-  return {fmt::format("{}: joint {}: no usable row, although it moves: nothing is fitted to its torque", name, without)};
+  return {
+      fmt::format("{}: joint {}: no usable row, although it moves: nothing is fitted to its torque", name, without)};
 }
 
 }  // namespace armcal::calibration

@@ -102,7 +102,8 @@ unit = "mN*m"
 std::string CoupledLog() {
   std::string text = "t,motor1,motor2,speed1,speed2,current1,current2,sensor1,sensor2\n";
   for (int k = 0; k < 5; ++k)
-    text += "0." + std::to_string(k) + ",4," + std::to_string(16 + k) + ",3,7,1,0.2," + std::to_string(900 + k) + ",800\n";
+    text +=
+        "0." + std::to_string(k) + ",4," + std::to_string(16 + k) + ",3,7,1,0.2," + std::to_string(900 + k) + ",800\n";
   return text;
 }
 
@@ -168,7 +169,8 @@ TEST(Channels, BadMap_NamesKeyAndExpected) {
   EXPECT_EQ(error("\"mm\"]", "\"mm\", \"m\"]"), ": q.unit: expected one text or a list of 2");
   EXPECT_EQ(error("[1, 2]", "[1, \"two\"]"), ": q.scale: expected a list of numbers");
   EXPECT_EQ(error("\"pos{}\"", "\"pos\""), ": q.column: 'pos' is used for two joints");
-  EXPECT_EQ(error("offset", "ofset"), ": q.ofset: unknown key, expected column, unit, scale, offset, optional or matrix");
+  EXPECT_EQ(error("offset", "ofset"),
+            ": q.ofset: unknown key, expected column, unit, scale, offset, optional or matrix");
   EXPECT_EQ(error("[tau]", "[qref]").substr(0, 5), ": tau");
   EXPECT_EQ(error("joints = 2", "joints = = 2").substr(0, 3), ":2:");
 }

@@ -16,10 +16,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tests::LadenArm;
 
-// How often a draw is repeated: 10, or what ARMCAL_DRAWS says.
+// How often a draw is repeated: 4, or what ARMCAL_DRAWS says.
 int Draws() {
   const char* draws = std::getenv("ARMCAL_DRAWS");
-  return draws ? std::atoi(draws) : 10;
+  return draws ? std::atoi(draws) : 4;
 }
 
 Carried Ask(const codegen::Model& model, const std::vector<const Dataset*>& train, const Dataset& run,

@@ -97,7 +97,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
     model_hash = files::FileHash(o.model_out);
   }
   run->test = read.One(o.test);
-  run->held_out = run->diagnosis->Judge(run->test);
+  run->held_out = run->diagnosis->Judge(run->test, o.gain_tolerance);
   const calibration::HeldOutMotion motion =
       calibration::CompareMotion(model, finding.declared, calibration::Pointers(run->train), run->test);
   if (motion.repeats()) run->diagnosis->ConfirmNothing(verdict::MotionText(motion)[0]);
@@ -185,6 +185,10 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_flag(
       "--turns", o->at_turns,
       "look at the rows near turns and at rest, too: friction that builds up over a displacement, or sticks");
+  verb->add_option("--gain-tolerance", o->gain_tolerance,
+                   "share by which each joint's torque may be off: for the mass of a payload that the held-out log "
+                   "carries; default: the robot file's, or 0.1")
+      ->check(CLI::Range(1e-6, 0.9));
   verb->add_option("--json", o->json, "write the verdict here");
   verb->add_option("--report", o->report, "write a self-contained page here");
   verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");

@@ -15,6 +15,7 @@ struct DiagnoseOptions {
   std::vector<std::string> train;
   bool at_turns = false;
   double cutoff_Hz = 0;
+  double gain_tolerance = 0;  // of each joint's torque; 0: the robot file's
 };
 
 // One diagnosis from files to files, with everything its view refers to.

@@ -57,6 +57,7 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& o
     if (!one.channels.empty()) add("--channels", {one.channels});
     if (one.at_turns) add("--turns", {});
     if (one.cutoff_Hz > 0) add("--cutoff", {fmt::format("{}", one.cutoff_Hz)});
+    if (one.gain_tolerance > 0) add("--gain-tolerance", {fmt::format("{}", one.gain_tolerance)});
     const int code = RunProgram(words, file(".log"));
     if (code == kOk) return verdict::ReadVerdict(file(".json"));
     why = Reason(file(".log"), code);

@@ -30,6 +30,7 @@ calibration::Dataset LogReader::One(const std::string& path) const {
 }
 
 void LogReader::CheckTogether(const std::vector<const calibration::Dataset*>& data) const {
+  for (const std::string& note : calibration::CheckRows(model_.robot(), data)) fmt::print(stderr, "{}\n", note);
   for (const std::string& note : calibration::CheckColumns(model_, data)) fmt::print(stderr, "{}\n", note);
   for (const calibration::Dataset* log : data) calibration::CheckAgainstModel(model_, *log);
 }

@@ -2,6 +2,7 @@
 #include <cstdlib>
 #include <iterator>
 #include <map>
+#include <numeric>
 
 #include "tests/e2e/tool.hpp"
 
@@ -67,6 +68,57 @@ TEST(Measured, Ur10e_WithDefaultOptions_NamesLoadFrictionBeforeBeltAndDelay) {
   for (const char* joint : {"2", "3"}) {
     ASSERT_TRUE(mu.contains(joint)) << "load friction on joint " << joint;
     EXPECT_NEAR(mu[joint], 0.064, 0.004);  // least squares by hand: 0.0642 and 0.0635
+  }
+}
+
+// 2.805 kg: the source's figure. By hand the payload comes out as 2.9 to 3.1 kg, because the drive gains of the source
+// are 5 to 12 % too large for that mass.
+TEST(Measured, Ur10e_PayloadOfTheHeldOutRun_IsNamedAndItsIntervalHoldsTheMass) {
+  const fs::path data = Measured("ur10e");
+  SKIP_WITHOUT(data, "ur10e");
+  const fs::path json = FreshFolder("ur10e_payload") / "out.json";
+  const std::pair<const char*, const char*> runs[] = {{"ur-20_02_19_14harm50sec", "ur-20_02_19_14harm50secLoad"},
+                                                      {"ur-20_02_19_14harm50sec", "ur-20_02_19_15harm50secLoad"},
+                                                      {"ur-20_01_31-unload", "ur-20_01_31-load"}};
+  for (const auto& [train, test] : runs) {
+    const Outcome o =
+        Tool({"diagnose", "--robot", "tests/e2e/ur10e.toml", "--channels", "tests/e2e/ur10e_channels.toml", "--train",
+              (data / (std::string(train) + ".csv.gz")).string(), "--test",
+              (data / (std::string(test) + ".csv.gz")).string(), "--json", json.string()});
+    ASSERT_EQ(o.code, 0) << o.err;
+    const nlohmann::json payload = ReadJson(json).at("payload");
+    ASSERT_FALSE(payload.is_null()) << test;
+    EXPECT_EQ(payload.at("place"), "flange");
+    EXPECT_FALSE(payload.at("gain_tolerance_stated"));
+    EXPECT_EQ(payload.at("gain_tolerance"), 0.1);
+    EXPECT_LE(payload.at("mass_interval_kg")[0].get<double>(), 2.805) << test;
+    EXPECT_GE(payload.at("mass_interval_kg")[1].get<double>(), 2.805) << test;
+    const auto with = payload.at("relative_with").get<std::vector<double>>(),
+               without = payload.at("relative_without").get<std::vector<double>>();
+    const double mean = std::accumulate(with.begin(), with.end(), 0.0) / 6;
+    std::printf("%s: mean error %.2f %% with the payload of the other half, %.1f %% without it\n", test, 100 * mean,
+                100 * std::accumulate(without.begin(), without.end(), 0.0) / 6);
+    EXPECT_LE(mean, 0.065) << test;
+    EXPECT_NE(o.out.find("payload at the flange"), std::string::npos);
+    EXPECT_NE(o.out.find("mass is known only up to the torque scale"), std::string::npos);
+    EXPECT_NE(o.out.find("without it"), std::string::npos);
+  }
+}
+
+TEST(Measured, Ur10e_RunsWithoutAPayload_AreSaidToCarryNone) {
+  const fs::path data = Measured("ur10e");
+  SKIP_WITHOUT(data, "ur10e");
+  const fs::path json = FreshFolder("ur10e_bare") / "out.json";
+  for (const char* test :
+       {"ur-20_02_12-40sec_12harm", "ur-20_01_17-ptp_10_points", "ur-20_02_05-20sec_8harm", "ur-20_02_06-20sec_10harm",
+        "ur-20_02_19_14harm50sec", "ur-20_02_19_15harm50sec", "ur-20_01_31-unload"}) {
+    const Outcome o =
+        Tool({"diagnose", "--robot", "tests/e2e/ur10e.toml", "--channels", "tests/e2e/ur10e_channels.toml", "--train",
+              (data / "ur-20_02_12-50sec_12harm.csv.gz").string(), (data / "ur-20_02_10-30sec_12harm.csv.gz").string(),
+              "--test", (data / (std::string(test) + ".csv.gz")).string(), "--json", json.string()});
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_TRUE(ReadJson(json).at("payload").is_null()) << test;
+    EXPECT_EQ(o.out.find("payload at the flange"), std::string::npos) << test;
   }
 }
 

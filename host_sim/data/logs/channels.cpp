@@ -3,7 +3,9 @@
 
 #include <toml++/toml.h>
 
+#include <Eigen/LU>
 #include <array>
+#include <cmath>
 #include <numbers>
 #include <string_view>
 
@@ -63,6 +65,9 @@ struct Rule {
 constexpr Rule kRules[] = {{"q", "position", true},        {"tau", "torque", true},        {"qd", "speed", false},
                            {"qdd", "acceleration", false}, {"qref", "position", false},    {"tauff", "torque", false},
                            {"ext", "torque", false},       {"temp", "temperature", false}, {"flag", "flag", false}};
+constexpr std::string_view kLinkTorque = "tau_link";  // the other torque of a log that has two
+constexpr double kSingular = 1e-9;                    // of the product of the rows' lengths
+constexpr double kSamePower = 1e-3;
 
 class MapReader {
  public:
@@ -84,17 +89,26 @@ class MapReader {
     if (!root_["time"].is_table()) Fail("time", "expected a table with column and unit");
     map.time = Channels("time", *root_["time"].as_table(), "time").front();
     joints_ = static_cast<std::size_t>(map.joints);
+    const std::string torque = root_["torque"].value_or<std::string>("tau");
+    if ((root_.contains("torque") && !root_["torque"].is_string()) || (torque != "tau" && torque != kLinkTorque))
+      Fail("torque", "expected \"tau\" or \"" + std::string(kLinkTorque) + "\", the torque to use");
     for (const Rule& rule : kRules) {
-      const toml::table* table = root_[rule.key].as_table();
+      const std::string key = rule.key == "tau" ? torque : std::string(rule.key);
+      const toml::table* table = root_[key].as_table();
       if (table == nullptr) {
-        if (rule.required) Fail(std::string(rule.key), "expected a table with column and unit");
+        if (rule.required) Fail(key, "expected a table with column and unit");
         continue;
       }
       const bool optional = (*table)["optional"].value_or(false);
-      if (optional && rule.required) Fail(std::string(rule.key) + ".optional", "this quantity is always needed");
+      if (optional && rule.required) Fail(key + ".optional", "this quantity is always needed");
       map.quantities.push_back(
-          {std::string(rule.key), Channels(std::string(rule.key), *table, rule.dimension), optional});
+          {std::string(rule.key), Channels(key, *table, rule.dimension), optional, Matrix(key, *table)});
     }
+    // The torque that is not used must be right, too: the map is for both.
+    for (const std::string& other : {std::string("tau"), std::string(kLinkTorque)})
+      if (const toml::table* table = root_[other].as_table(); table != nullptr && other != torque)
+        Channels(other, *table, "torque"), Matrix(other, *table);
+    CheckPower(map, torque);
     return map;
   }
 
@@ -105,9 +119,9 @@ class MapReader {
 
   void CheckTopLevelKeys() const {
     for (const auto& [key, node] : root_) {
-      bool known = key == "joints" || key == "title" || key == "time";
+      bool known = key == "joints" || key == "title" || key == "time" || key == "torque" || key.str() == kLinkTorque;
       for (const Rule& rule : kRules) known = known || key.str() == rule.key;
-      if (!known) Fail(std::string(key.str()), "unknown key, expected joints, title, time or a quantity");
+      if (!known) Fail(std::string(key.str()), "unknown key, expected joints, title, time, torque or a quantity");
     }
   }
 
@@ -145,10 +159,14 @@ class MapReader {
 
   std::vector<Channel> Channels(const std::string& key, const toml::table& table, std::string_view dimension) const {
     for (const auto& [name, node] : table) {
-      if (name != "column" && name != "unit" && name != "scale" && name != "offset" && name != "optional") {
-        Fail(key + "." + std::string(name.str()), "unknown key, expected column, unit, scale, offset or optional");
+      if (name != "column" && name != "unit" && name != "scale" && name != "offset" && name != "optional" &&
+          name != "matrix") {
+        Fail(key + "." + std::string(name.str()),
+             "unknown key, expected column, unit, scale, offset, optional or matrix");
       }
     }
+    if (table.contains("matrix") && (dimension == "time" || dimension == "temperature" || dimension == "flag"))
+      Fail(key + ".matrix", "only positions, speeds, accelerations and torques take a matrix");
     const auto columns = PerJoint<std::string>(key, table, "column", "");
     const auto units = PerJoint<std::string>(key, table, "unit", dimension == "flag" ? "1" : "");
     const auto scales = PerJoint<double>(key, table, "scale", 1.0);
@@ -165,6 +183,45 @@ class MapReader {
       channels.push_back({column, unit.si * scales[j], unit.si * offsets[j] + unit.zero});
     }
     return channels;
+  }
+
+  // Empty where there is none.
+  Eigen::MatrixXd Matrix(const std::string& key, const toml::table& table) const {
+    const toml::node* node = table.get("matrix");
+    if (node == nullptr) return {};
+    const std::string size = std::to_string(joints_), where = key + ".matrix";
+    const auto fail = [&] { Fail(where, "expected " + size + " rows of " + size + " numbers, one row a joint"); };
+    const toml::array* rows = node->as_array();
+    if (rows == nullptr || rows->size() != joints_) fail();
+    Eigen::MatrixXd out(static_cast<Eigen::Index>(joints_), static_cast<Eigen::Index>(joints_));
+    for (std::size_t i = 0; i < joints_; ++i) {
+      const toml::array* row = rows->get(i)->as_array();
+      if (row == nullptr || row->size() != joints_) fail();
+      for (std::size_t k = 0; k < joints_; ++k) {
+        const auto value = row->get(k)->value<double>();
+        if (!value || !std::isfinite(*value)) fail();
+        out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = *value;
+      }
+    }
+    if (std::abs(out.determinant()) <= kSingular * out.rowwise().norm().prod())
+      Fail(where, "expected rows that are independent: each motor turns some joint");
+    return out;
+  }
+
+  // Motors and joints have the same power: what turns speeds by M turns torques by the transpose of M's inverse.
+  void CheckPower(const ChannelMap& map, const std::string& torque) const {
+    const auto of = [&](const char* name) {
+      for (const Quantity& q : map.quantities)
+        if (q.name == name) return q.matrix;
+      return Eigen::MatrixXd();
+    };
+    const Eigen::MatrixXd position = of("q"), tau = of("tau");
+    if (position.size() == 0 || tau.size() == 0) return;
+    const Eigen::MatrixXd expected = position.inverse().transpose();
+    if ((tau - expected).cwiseAbs().maxCoeff() > kSamePower * expected.cwiseAbs().maxCoeff())
+      Fail(torque + ".matrix",
+           "expected the transpose of the inverse of q.matrix: motors and joints have the same power (gear ratios and "
+           "units belong in scale)");
   }
 
   std::string file_;

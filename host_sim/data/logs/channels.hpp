@@ -11,9 +11,15 @@
 //   scale = 1               # one or n, optional; value = unit(scale x column + offset)
 //   offset = [0, -90, 90, 0, 0, 0]
 //   optional = true         # leave the quantity out when its columns are not in the log
-// scale and offset are numbers; the unit is that of scale x column + offset.
+//   matrix = [[1, 0], [-1, 1]]   # coupled motors, of q qd qdd qref tau tauff ext: joints = matrix x columns
+// scale and offset are numbers; the unit is that of scale x column + offset. Where there is a matrix, the columns are
+// the motors' and this unit is theirs; a row gives one joint. If q_motor = C q, positions and speeds take the inverse
+// of C, torques its transpose. A log with two torques maps the other one as well and names the one to use:
+//   torque = "tau_link"     # default "tau"
+//   [tau_link]              # a torque sensor behind the gear, say; keys as those of [tau]
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -31,6 +37,7 @@ struct Quantity {
   std::string name;            // "q", "tau", "qd", "qdd", "qref", "tauff", "ext", "temp", "flag"
   std::vector<Channel> joint;  // n
   bool optional = false;
+  Eigen::MatrixXd matrix = {};  // [n x n] joints = matrix x channels; empty: unit
 };
 
 struct ChannelMap {

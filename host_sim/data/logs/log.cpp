@@ -79,6 +79,7 @@ class Columns {
     Eigen::MatrixXd block(table_.values.rows(), static_cast<Eigen::Index>(quantity.joint.size()));
     for (std::size_t j = 0; j < quantity.joint.size(); ++j)
       block.col(static_cast<Eigen::Index>(j)) = Take(quantity.joint[j]);
+    if (quantity.matrix.size() > 0) block = (block * quantity.matrix.transpose()).eval();
     return block;
   }
 

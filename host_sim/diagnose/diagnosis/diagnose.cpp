@@ -202,11 +202,9 @@ Quantities AtEstimate(const Diagnosis::Work& w, const std::vector<const Chosen*>
   return q;
 }
 
-// The residual of another log with these terms in the model, [N x n]; w keeps their estimate. tracking: says how run
-// states were followed.
-MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
-                std::string* tracking = nullptr) {
-  w.Solve(terms);
+// The residual of another log with the terms at w's estimate, [N x n]. tracking: says how run states were followed.
+MatrixXd LeavesAtEstimate(const Diagnosis::Work& w, const std::vector<const Chosen*>& terms,
+                          const calibration::Dataset& log, std::string* tracking) {
   const calibration::Dataset seen = AsTermsSay(w, log);
   const Quantities q = AtEstimate(w, terms, seen);
   MatrixXd left = log.tau - calibration::Predict(w.model, seen, w.estimate.x, w.declared.eta);
@@ -226,6 +224,31 @@ MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, con
       left -= Track(state, q, left, w.estimate.sigma);
       if (tracking) *tracking = "run states followed one step ahead; delay one sample";
     }
+  return left;
+}
+
+// A payload is a change of the rigid coordinates, so the terms that follow the load follow it, too. leaves: [N x n] at
+// given coordinates. On each half of the log it takes the payload of the other half.
+template <class LeavesAt>
+MatrixXd OnOtherHalves(const codegen::Model& model, const calibration::Carried& payload, const VectorXd& x,
+                       const LeavesAt& leaves) {
+  MatrixXd out = leaves(x + payload.Coordinates(model, 1));
+  const Eigen::Index second = payload.begin_second, rest = out.rows() - second;
+  out.bottomRows(rest) = leaves(x + payload.Coordinates(model, 0)).bottomRows(rest);
+  return out;
+}
+
+// The same with the terms fitted; w keeps their estimate.
+MatrixXd Leaves(Diagnosis::Work& w, const std::vector<const Chosen*>& terms, const calibration::Dataset& log,
+                const calibration::Carried& payload, std::string* tracking = nullptr) {
+  w.Solve(terms);
+  if (!payload.named) return LeavesAtEstimate(w, terms, log, tracking);
+  const VectorXd x = w.estimate.x;
+  const MatrixXd left = OnOtherHalves(w.model, payload, x, [&](const VectorXd& laden) {
+    w.estimate.x = laden;
+    return LeavesAtEstimate(w, terms, log, tracking);
+  });
+  w.estimate.x = x;
   return left;
 }
 
@@ -264,14 +287,14 @@ std::optional<Refutation> Worse(const Chosen& term, const Errors& with, const Er
 // The weakest term that predicts one of its joints, or all joints together, worse than the declared model does, or
 // worse than the other terms do without it. A delay is not compared with the other terms: they were found on logs that
 // it had aligned.
-Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const Errors& before, const Errors& after,
-                std::optional<Refutation>& why) {
+Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calibration::Carried& payload,
+                const Errors& before, const Errors& after, std::optional<Refutation>& why) {
   for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
     if (!c->confirmed || c->candidate->is_event()) continue;
     if ((why = Worse(*c, after, before))) return &*c;
     const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
     if (others.empty() || c->delay_s != 0) continue;
-    if ((why = Worse(*c, after, ErrorsOf(w, log, Leaves(w, others, log))))) {
+    if ((why = Worse(*c, after, ErrorsOf(w, log, Leaves(w, others, log, payload))))) {
       why->beside_others = true;
       return &*c;
     }
@@ -299,18 +322,24 @@ bool OfTheRunInstead(Diagnosis::Work& w, const Chosen& refuted, Chosen& out) {
 
 }  // namespace
 
-HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
+HeldOut Diagnosis::Judge(const calibration::Dataset& test, double gain_tolerance) {
   Work& w = *work_;
   HeldOut out;
-  out.before = test.tau - calibration::Predict(model_, test, w.declared.x, w.declared.eta);
-  const Errors before = ErrorsOf(w, test, out.before);
+  const auto declared = [&](const VectorXd& x) {
+    return MatrixXd(test.tau - calibration::Predict(model_, test, x, w.declared.eta));
+  };
+  out.before = declared(w.declared.x);
+  const MatrixXd with_terms = Leaves(w, Confirmed(w.chosen), test, {});
+  out.payload = calibration::FindCarried(model_, w.declared, w.estimate.sigma, test, with_terms, gain_tolerance);
+  const Errors before =
+      ErrorsOf(w, test, out.payload.named ? OnOtherHalves(model_, out.payload, w.declared.x, declared) : out.before);
   std::vector<std::optional<Refutation>> why;
   for (const Term& t : finding_.terms) why.push_back(t.refuted);
   for (;;) {
-    out.after = Leaves(w, Confirmed(w.chosen), test, &out.tracking);
+    out.after = Leaves(w, Confirmed(w.chosen), test, out.payload, &out.tracking);
     Work::Estimate with_all = w.estimate;
     std::optional<Refutation> reason;
-    Chosen* refuted = Refuted(w, test, before, ErrorsOf(w, test, out.after), reason);
+    Chosen* refuted = Refuted(w, test, out.payload, before, ErrorsOf(w, test, out.after), reason);
     w.estimate = std::move(with_all);
     if (!refuted) break;
     const auto at = refuted - w.chosen.data();
@@ -322,6 +351,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test) {
       why.insert(why.begin() + at + 1, std::nullopt);
     }
   }
+  if (out.payload.named) out.without_payload = Leaves(w, Confirmed(w.chosen), test, {});
   WriteTerms(w, finding_);
   for (std::size_t k = 0; k < why.size(); ++k) finding_.terms[k].refuted = why[k];
   return out;

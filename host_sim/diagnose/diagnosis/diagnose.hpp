@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "codegen/src/generator/model.hpp"
+#include "host_sim/identify/calibration/carried.hpp"
 #include "host_sim/identify/calibration/dataset.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
@@ -64,6 +65,9 @@ struct Finding {
 struct HeldOut {
   Eigen::MatrixXd before, after;  // [N x n] residuals: measured minus predicted
   std::string tracking;           // how run-state terms were followed; empty if there are none
+  // Where one is named, `after` holds it: on each half of the log the payload that was fitted to the other half.
+  calibration::Carried payload;
+  Eigen::MatrixXd without_payload;  // [N x n] residuals with the same terms and no payload; empty if none is named
 };
 
 // Decides on the training logs at construction; the held-out log is only judged. Throws io::InputError where logs do
@@ -82,8 +86,10 @@ class Diagnosis {
 
   // Predicts the held-out log with and without the terms. Marks terms that worsen a joint of their own, or the product
   // of all joints' errors, by more than 0.5 %, against the declared model or against the other terms, as not confirmed,
-  // says why, and leaves them out of `after`; kinds and nonlinear parameters do not change.
-  HeldOut Judge(const calibration::Dataset& test);
+  // says why, and leaves them out of `after`; kinds and nonlinear parameters do not change. A payload that the held-out
+  // log carries and the training logs do not is a state of that run. It is fitted to each half of the log and taken
+  // off the other half before a term is judged. gain_tolerance: as FindCarried has it.
+  HeldOut Judge(const calibration::Dataset& test, double gain_tolerance = 0);
 
   // After Judge: the held-out log repeats a trajectory of the training logs. What was found there about the arm is no
   // longer confirmed, and says this as the reason; it stays in the comparison. A state of a run is not touched.

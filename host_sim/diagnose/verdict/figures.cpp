@@ -205,10 +205,13 @@ std::vector<std::string> MotionText(const calibration::HeldOutMotion& m) {
   for (std::size_t j = 0; j < m.joint.size(); ++j) {
     const calibration::Outside& o = m.joint[j];
     if (!o.beyond()) continue;
-    out.push_back(
-        fmt::format("joint {}: extrapolation: {:.0f} % of its positions and {:.0f} % of its speeds are outside "
-                    "of the training logs' range; the model's torque is {:.1f} times as uncertain there",
-                    j + 1, 100 * o.position, 100 * o.speed, std::sqrt(std::max(0.0, o.leverage))));
+    out.push_back(fmt::format(
+        "joint {}: extrapolation: {:.0f} % of its positions and {:.0f} % of its speeds are outside "
+        "of the training logs' range; {}",
+        j + 1, 100 * o.position, 100 * o.speed,
+        std::isfinite(o.leverage)
+            ? fmt::format("the model's torque is {:.1f} times as uncertain there", std::sqrt(std::max(0.0, o.leverage)))
+            : "no row of its torque could be fitted"));
   }
   for (const auto& group : m.in_phase) {
     out.push_back(

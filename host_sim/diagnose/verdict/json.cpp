@@ -63,6 +63,30 @@ nlohmann::ordered_json RefutedJson(const diagnosis::Refutation& why) {
   return out;
 }
 
+// null where no payload is named.
+nlohmann::ordered_json PayloadJson(const DiagnosisView& v) {
+  const calibration::Carried& load = v.held_out->payload;
+  if (!load.named) return nullptr;
+  nlohmann::ordered_json out{{"kind", "payload"},
+                             {"place", "flange"},
+                             {"mass_kg", load.mass_kg},
+                             {"mass_sd_kg", load.sd_kg},
+                             {"mass_interval_kg", load.interval_kg},
+                             {"gain_tolerance", load.tolerance},
+                             {"gain_tolerance_stated", load.tolerance_stated},
+                             {"center_m", ToList(load.load.segment<3>(1) / load.mass_kg)},
+                             {"load", ToList(load.load)},
+                             {"half_mass_kg", {load.half[0][0], load.half[1][0]}},
+                             {"half_mass_sd_kg", load.half_sd_kg},
+                             {"score", load.score}};
+  const Eigen::VectorXd torque = calibration::RmsInBand(*v.test, v.test->tau).cwiseMax(1e-12);
+  for (const auto& [key, residual] :
+       {std::pair{"relative_without", &v.held_out->without_payload}, std::pair{"relative_with", &v.held_out->after}})
+    out[key] = ToList(calibration::RmsInBand(*v.test, *residual).cwiseQuotient(torque));
+  out["sentences"] = PayloadText(v);
+  return out;
+}
+
 }  // namespace
 
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
@@ -133,6 +157,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["noise_floor"] = ToList(f.sigma);
   j["noise_innovation"] = ToList(f.innovation);
   j["smallest_detectable"] = ToList(f.smallest);
+  j["payload"] = PayloadJson(v);
   if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
   j["held_out_motion"] = ToJson(v.motion);
   j["not_looked_at"] = NotLookedAt(v);

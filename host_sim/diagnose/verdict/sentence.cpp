@@ -83,6 +83,43 @@ std::string Sentence(const DiagnosisView& v, std::size_t term) {
   return out + "; " + WhatToDo(t) + ".";
 }
 
+namespace {
+
+// "9.7, 20.1 and 28.3": a joint's error over its torque on the rows that are fitted, in per cent.
+std::string Shares(const VectorXd& error, const VectorXd& torque) {
+  std::string out;
+  for (Eigen::Index j = 0; j < error.size(); ++j)
+    out += fmt::format("{}{:.1f}", j == 0 ? "" : ", ", 100 * error[j] / std::max(torque[j], 1e-12));
+  return out + fmt::format(" % (mean {:.1f} %)", 100 * error.cwiseQuotient(torque.cwiseMax(1e-12)).mean());
+}
+
+}  // namespace
+
+std::vector<std::string> PayloadText(const DiagnosisView& v) {
+  const calibration::Carried& load = v.held_out->payload;
+  if (!load.named) return {};
+  std::vector<std::string> out;
+  const double mass_kg = std::abs(load.mass_kg);
+  out.push_back(fmt::format(
+      "payload at the flange: the held-out log carries {:.3g} +- {:.2g} kg {} than the training logs (its halves: "
+      "{:.3g} and {:.3g} kg); centre {:.3f} {:.3f} {:.3f} m from the flange",
+      mass_kg, load.sd_kg, load.mass_kg > 0 ? "more" : "less", std::abs(load.half[0][0]), std::abs(load.half[1][0]),
+      load.load[1] / load.mass_kg, load.load[2] / load.mass_kg, load.load[3] / load.mass_kg));
+  const auto [low_kg, high_kg] = load.interval_kg;
+  const double from_kg = std::min(std::abs(low_kg), std::abs(high_kg)),
+               to_kg = std::max(std::abs(low_kg), std::abs(high_kg));
+  out.push_back(fmt::format(
+      "{}its mass is {:.3g} to {:.3g} kg if each joint's torque is right to {:.3g} %{}",
+      load.tolerance_stated ? ""
+                            : "the robot file states no gain tolerance, so mass is known only up to the torque scale: ",
+      from_kg, to_kg, 100 * load.tolerance, load.tolerance_stated ? "" : " (--gain-tolerance)"));
+  const VectorXd torque = calibration::RmsInBand(*v.test, v.test->tau);
+  out.push_back("error of each half with the payload of the other half, over torque: " +
+                Shares(calibration::RmsInBand(*v.test, v.held_out->after), torque) +
+                "; without it: " + Shares(calibration::RmsInBand(*v.test, v.held_out->without_payload), torque));
+  return out;
+}
+
 std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   std::vector<std::string> out;
   if (!v.train || v.train->empty()) return out;

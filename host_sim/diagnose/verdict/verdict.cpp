@@ -72,6 +72,7 @@ Dependence DependenceOf(const DiagnosisView& v, std::size_t term) {
 
 std::string DiagnosisText(const DiagnosisView& v) {
   std::string out = "verdict: " + Headline(*v.finding) + "\n";
+  for (const std::string& line : PayloadText(v)) out += "  " + line + "\n";
   for (std::size_t k = 0; k < v.finding->terms.size(); ++k) {
     const Term& t = v.finding->terms[k];
     out += fmt::format("  {}, joint {}{}: {}\n", t.record->kind, JointName(t), Remark(t), t.record->title);
@@ -133,6 +134,10 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
   std::vector<std::string> sentences;
   for (std::size_t k = 0; k < f.terms.size(); ++k) sentences.push_back(Sentence(v, k));
   if (!sentences.empty()) page.List(sentences);
+  if (const auto lines = PayloadText(v); !lines.empty()) {
+    page.Section("A payload of the held-out log");
+    page.List(lines);
+  }
   if (const auto lines = MotionText(v.motion); !lines.empty()) {
     page.Section("What the held-out log cannot tell");
     page.List(lines);

@@ -59,6 +59,9 @@ std::string WhyNotConfirmed(const diagnosis::Term& t, const codegen::Robot& robo
 // One sentence: what, on which joint, over which other one, how much of the held-out error, and what to do.
 std::string Sentence(const DiagnosisView& v, std::size_t term);
 
+// What the held-out log carries and the training logs do not, a line each; empty if nothing is named.
+std::vector<std::string> PayloadText(const DiagnosisView& v);
+
 // What this diagnosis could not see, a line each: the band, rows left out, joints that stood, a search that was cut
 // off.
 std::vector<std::string> NotLookedAt(const DiagnosisView& v);

@@ -213,7 +213,7 @@ std::vector<Outside> FindOutside(const codegen::Model& model, const Fit& fit, co
   SolveWithPrior(fit.information, fit.sigma.cwiseAbs2().cwiseInverse(), MakePrior(model), fit.active, &covariance);
   const VectorXd own = Leverage(fit.information, covariance), on_test = Leverage(there, covariance);
   for (int j = 0; j < n; ++j)
-    if (own[j] > 0) out[j].leverage = on_test[j] / own[j];
+    if (own[j] > 0 || on_test[j] > 0) out[j].leverage = on_test[j] / own[j];  // infinity: training has no row of it
   return out;
 }
 

@@ -256,4 +256,32 @@ SignalCheck CheckSignals(const codegen::Robot& robot, const logs::Log& log) {
   return check;
 }
 
+std::vector<std::string> CheckRows(const codegen::Robot& robot, const std::vector<const Dataset*>& data) {
+  constexpr double kMoves = 0.01;  // of the samples: a joint that moves less rests
+  double all = 0;
+  int samples = 0;
+  std::string without;
+  for (int j = 0; j < robot.joints(); ++j) {
+    double rows = 0, moving = 0;
+    samples = 0;
+    for (const Dataset* log : data) {
+      rows += log->averaged(j) ? static_cast<double>(log->average[static_cast<std::size_t>(j)].rows())
+                               : log->used.col(j).sum();
+      moving += log->moving.col(j).sum();
+      samples += log->samples();
+    }
+    all += rows;
+    if (rows == 0 && moving > kMoves * samples) without += fmt::format("{}{}", without.empty() ? "" : ", ", j + 1);
+  }
+  const std::string name = data.front()->source + (data.size() > 1 ? " and the others" : "");
+  if (all == 0)
+    throw io::InputError(
+        fmt::format("{}: none of the {} samples can be used; expected a joint that moves faster than its v_min ({:.3g} "
+                    "{}/s for joint 1) away from turns, gaps and the ends of the log",
+                    name, samples, robot.joint[0].v_min_radps, PositionUnit(robot.joint[0])));
+  if (without.empty()) return {};
+  return {
+      fmt::format("{}: joint {}: no usable row, although it moves: nothing is fitted to its torque", name, without)};
+}
+
 }  // namespace armcal::calibration

@@ -6,6 +6,7 @@
 
 #include "codegen/src/robot/robot.hpp"
 #include "host_sim/data/logs/log.hpp"
+#include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::calibration {
 
@@ -23,5 +24,9 @@ struct SignalCheck {
 // - no joint moves; a position jumps, sticks, or rests while its logged speed or command moves;
 // - a torque is zero, or does not change while the joint moves.
 SignalCheck CheckSignals(const codegen::Robot& robot, const logs::Log& log);
+
+// What these logs, which are fitted or judged together, cannot show: a line for the joints that move and yet have no
+// usable row in any of them. InputError: no joint has one; the line names the first log.
+std::vector<std::string> CheckRows(const codegen::Robot& robot, const std::vector<const Dataset*>& data);
 
 }  // namespace armcal::calibration

@@ -123,5 +123,25 @@ TEST_F(LogCheck, OfExchangedTorqueColumns_NamesThem) {
   ExpectRefused("tau1 and tau2");
 }
 
+// Rows that can be fitted are what a fit is made of: without any there is none, and a moving joint without any is
+// named.
+TEST_F(LogCheck, OfLogsWithoutAUsableRow_RefusesThem) {
+  const codegen::Robot& robot = arm_.model().robot();
+  EXPECT_TRUE(CheckRows(robot, {&data_}).empty());
+  Dataset other = data_;
+  other.used.col(1).setZero();
+  EXPECT_TRUE(CheckRows(robot, {&data_, &other}).empty());  // the other log has such rows
+  ASSERT_EQ(CheckRows(robot, {&other}).size(), 1u);
+  EXPECT_EQ(CheckRows(robot, {&other})[0].find("synthetic: joint 2: no usable row"), 0u);
+  other.used.setZero();
+  try {
+    CheckRows(robot, {&other});
+    ADD_FAILURE() << "expected a refusal";
+  } catch (const io::InputError& e) {
+    EXPECT_EQ(std::string(e.what()).find("synthetic: none of the 2500 samples can be used; expected"), 0u) << e.what();
+    EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace armcal::calibration

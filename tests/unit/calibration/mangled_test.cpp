@@ -2,13 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <functional>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/channels.hpp"
 #include "host_sim/identify/calibration/body_check.hpp"
 #include "host_sim/identify/calibration/column_check.hpp"
 #include "host_sim/identify/calibration/log_check.hpp"
+#include "tests/unit/calibration/laden_arm.hpp"
 #include "tests/unit/calibration/mangled_logs.hpp"
 #include "tests/unit/calibration/measured_arms.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
@@ -36,6 +39,7 @@ Said Judge(const codegen::Model& model, const std::vector<logs::Log>& read) {
       data.push_back(Prepare(model, log));
     }
     for (const std::string& note : CheckColumns(model, Pointers(data))) said.notes += note + "\n";
+    for (const std::string& note : CheckRows(model.robot(), Pointers(data))) said.notes += note + "\n";
     for (const Dataset& d : data) CheckAgainstModel(model, d);
   } catch (const io::InputError& e) {
     said.refused = e.what();
@@ -132,6 +136,77 @@ TEST(Mangled, RestingJoints_AreNone) {
       EXPECT_EQ(said.notes.find("suspect"), std::string::npos) << said.notes;
     }
   }
+}
+
+// Runs of arms that are well, and yet unlike the usual one.
+struct Healthy {
+  std::string name;
+  std::function<logs::Log(std::uint64_t seed)> make;
+};
+
+std::vector<Healthy> HealthyRuns() {
+  const auto plain = [](double seconds, double speed, std::vector<int> still, const tests::Effect& effect = {}) {
+    return [=](std::uint64_t seed) {
+      tests::SyntheticArm arm(tests::Er20(), seed);
+      return LogOf(arm.Run(seconds, seed + 1000, effect, speed, still));
+    };
+  };
+  const auto changed = [](const std::function<void(Dataset&, std::uint64_t)>& change) {
+    return [=](std::uint64_t seed) {
+      tests::SyntheticArm arm(tests::Er20(), seed);
+      Dataset d = arm.Run(15, seed + 1000);
+      change(d, seed);
+      return LogOf(d);
+    };
+  };
+  return {
+      {"as it is", plain(15, 0.5, {})},
+      {"slow", plain(20, 0.03, {})},
+      {"short", plain(5, 0.5, {})},
+      {"one joint rests", plain(15, 0.5, {2})},
+      {"three joints rest", plain(15, 0.5, {0, 1, 4})},
+      {"only the wrist moves", plain(15, 0.5, {0, 1, 2})},
+      {"a payload",
+       [](std::uint64_t seed) {
+         tests::LadenArm arm(seed, 0.05);
+         return LogOf(arm.Run(15, seed + 1000, plant::Body{10, {0.04, -0.03, 0.12}, {0.09, 0, 0, 0.08, 0, 0.05}}));
+       }},
+      {"friction above all", plain(15, 0.5, {},
+                                   [](const tests::State& s) {
+                                     const double limit_Nm = tests::Er20().joint[s.joint].torque_limit_Nm;
+                                     return 0.4 * limit_Nm * (s.qd > 0 ? 1 : -1) + 0.1 * limit_Nm * s.qd;
+                                   })},
+      {"motor 6 turned by joint 5, too", changed([](Dataset& d, std::uint64_t) {
+         for (int k = 0; k < d.samples(); ++k) {
+           const double v = d.s.qd(k, 5) + d.s.qd(k, 4), motor_Nm = 4 * (v > 0 ? 1 : -1) + 2 * v;
+           d.tau(k, 5) += motor_Nm, d.tau(k, 4) += motor_Nm;
+         }
+       })},
+      {"another torque scale", changed([](Dataset& d, std::uint64_t seed) { d.tau *= seed % 2 ? 0.85 : 1.2; })},
+  };
+}
+
+// Healthy logs of simulated arms, with link data and without: at most one in 200 is refused or called suspect.
+TEST(Mangled, HealthySimulatedLogs_AreTaken) {
+  const char* draws = std::getenv("ARMCAL_DRAWS");
+  const int each = draws ? std::atoi(draws) : 1;
+  const codegen::Model free(WithoutLinkData(tests::Er20()), tests::Records());
+  int taken = 0, doubted = 0;
+  for (const Healthy& run : HealthyRuns())
+    for (int draw = 0; draw < each; ++draw) {
+      logs::Log log = run.make(static_cast<std::uint64_t>(draw));
+      log.qd.resize(0, 0);
+      for (const codegen::Model* model : {&free, &tests::Er20Model()}) {
+        const Said said = Judge(*model, {log});
+        const bool suspect = said.notes.find("suspect") != std::string::npos;
+        ++(said.refused.empty() && !suspect ? taken : doubted);
+        if (!said.refused.empty() || suspect)
+          std::printf("%s, draw %d, %s link data: %s\n%s", run.name.c_str(), draw, model == &free ? "no" : "with",
+                      said.refused.c_str(), said.notes.c_str());
+      }
+    }
+  std::printf("%d healthy logs taken, %d refused or called suspect\n", taken, doubted);
+  EXPECT_LE(200 * doubted, taken + doubted + 199);
 }
 
 // All healthy logs that are there: at most one in 200 is refused or called suspect.

@@ -12,6 +12,7 @@
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -28,7 +29,7 @@ void Print(const DiagnosisRun& run, const DiagnoseOptions& o) {
   for (int j = 0; j < run.model->joints(); ++j) {
     std::vector<std::string> row{std::to_string(j + 1)};
     for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor", "smallest_detectable"})
-      row.push_back(fmt::format("{:.4g}", json[key][j].get<double>()));
+      row.push_back(json[key][j].is_null() ? "-" : fmt::format("{:.4g}", json[key][j].get<double>()));
     table.rows.push_back(row);
   }
   fmt::print("held out: {}, RMS of measured minus predicted torque\n{}", o.test, report::Text(table));
@@ -70,11 +71,16 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
     if (std::error_code none; std::filesystem::equivalent(p, o.test, none))
       throw io::InputError("--test " + o.test + ": expected another log than those of --train");
   const LogReader read(model, o.channels, o.cutoff_Hz);
-  const std::vector<calibration::Dataset> train = read.All(o.train);
+  std::vector<calibration::Dataset> train = read.All(o.train);
   read.PrintUntold(train);
+  const calibration::TorqueChannel channel = calibration::SeeChannel(model, calibration::Pointers(train));
+  for (calibration::Dataset& log : train) log.channel = channel;
   for (const calibration::Dataset& log : train) run->train.push_back(calibration::ThinToBand(log));
   std::vector<calibration::Dataset> narrow;
-  for (const calibration::Dataset& log : read.Narrow(o.train)) narrow.push_back(calibration::ThinToBand(log));
+  for (const calibration::Dataset& log : read.Narrow(o.train)) {
+    narrow.push_back(calibration::ThinToBand(log));
+    narrow.back().channel = channel;
+  }
   const auto start = std::chrono::steady_clock::now();
   run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, calibration::Pointers(run->train),
                                                           calibration::Pointers(narrow), o.at_turns);
@@ -97,6 +103,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
     model_hash = files::FileHash(o.model_out);
   }
   run->test = read.One(o.test);
+  run->test.channel = channel;
   run->held_out = run->diagnosis->Judge(run->test, o.gain_tolerance);
   const calibration::HeldOutMotion motion =
       calibration::CompareMotion(model, finding.declared, calibration::Pointers(run->train), run->test);
@@ -114,6 +121,10 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   json["provenance"] = provenance;
   json["fitted_at_turns"] = nlohmann::ordered_json::array();
   for (const int j : run->diagnosis->finding().at_turns) json["fitted_at_turns"].push_back(j + 1);
+  json["torque_channel"] = nlohmann::ordered_json::array();
+  for (int j = 0; j < model.joints() && !channel.empty(); ++j)
+    if (channel.lag_s[j] != 0 || channel.late_s[j] != 0)
+      json["torque_channel"].push_back({{"joint", j + 1}, {"lag_s", channel.lag_s[j]}, {"late_s", channel.late_s[j]}});
   // Averages of a limited band have less noise than the samples that `before` and `after` are about.
   const auto limited = [&train](int j) {
     return std::any_of(train.begin(), train.end(), [j](const auto& log) { return log.averaged(j); });

@@ -5,8 +5,10 @@
 #include <cmath>
 
 #include "host_sim/diagnose/diagnosis/determined.hpp"
+#include "host_sim/diagnose/diagnosis/limits.hpp"
 #include "host_sim/diagnose/diagnosis/selector.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::diagnosis {
@@ -17,7 +19,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kMaxTerms = 24;  // far beyond what logs have shown: the search must end
-constexpr double kTried = 10;  // members of a usual grid, for what would just have been seen
 
 // Delays the logs by what the latest term says of them.
 void ApplyDelay(Diagnosis::Work& w) {
@@ -126,11 +127,8 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   finding_.most_terms = most;
   for (int j = 0; j < model.joints(); ++j)
     if (w.turns[static_cast<std::size_t>(j)]) finding_.at_turns.push_back(j);
-  finding_.smallest.resize(model.joints());
-  for (int j = 0; j < model.joints(); ++j) {
-    const double rows = std::max(2, w.evidence.index[j].size());
-    finding_.smallest[j] = finding_.sigma[j] * std::sqrt((kAccept + 2 * std::log(rows) + 2 * std::log(kTried)) / rows);
-  }
+  finding_.limits = DetectionLimits(w);
+  finding_.smallest = TypicalLimits(finding_.limits, model.joints());
 }
 
 Diagnosis::~Diagnosis() = default;
@@ -375,7 +373,9 @@ std::vector<MatrixXd> Diagnosis::TermTorque(const calibration::Dataset& data) co
     if (!c.confirmed) continue;
     const VectorXd& amplitude = w.estimate.amplitude[k++];
     if (!c.candidate->is_event()) out.back() = CandidateTorque(*c.candidate, q, c.eta, amplitude);
-    if (c.delay_s != 0) out.back() += q.tau_model - calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
+    if (c.delay_s != 0)
+      out.back() += calibration::ThroughChannel(data, q.tau_model) -
+                    calibration::Predict(model_, data, w.estimate.x, w.declared.eta);
   }
   return out;
 }

@@ -52,12 +52,21 @@ struct Term {
   bool in_fit = true;                  // it is in the model that was compared; false: refuted, or not determined
 };
 
+// How large a term would have had to be for the logs to show it.
+struct Limit {
+  const codegen::EffectRecord* record = nullptr;
+  std::vector<int> joints;  // 0-based; empty: the whole arm or its flange
+  int joint = 0;            // 0-based, on whose torque it is told
+  double rms_Nm = 0;        // of its torque there; infinity: the declared model takes all of it up
+};
+
 struct Finding {
   std::vector<Term> terms;            // strongest first; empty: nothing is missing
   calibration::Fit declared;          // the declared model, fitted on train
   Eigen::VectorXd x;                  // filter coordinates and gains with the terms in
   Eigen::VectorXd sigma, innovation;  // [n] residual and innovation standard deviation with the terms in
-  Eigen::VectorXd smallest;           // [n] RMS of the smallest effect that would have been seen
+  std::vector<Limit> limits;          // by joint, then size
+  Eigen::VectorXd smallest;           // [n] the median of a joint's limits; infinity: it has none
   std::vector<int> at_turns;          // joints whose rows near turns and at rest were fitted, too
   int most_terms = 0;                 // the search ended at so many, and did not ask for another; 0: it did
 };

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "host_sim/identify/calibration/channel.hpp"
+
 namespace armcal::diagnosis {
 
 using Eigen::MatrixXd;
@@ -29,7 +31,9 @@ Columns Gather(const Candidate& candidate, const std::vector<Quantities>& logs, 
     for (std::size_t r = 0; r < out.joints.size(); ++r) {
       const RowIndex& index = rows[out.joints[r]];
       for (int c = 0; c < candidate.columns(eta); ++c)
-        if (const VectorXd& v = value[c][r]; v.size()) index.Take(static_cast<int>(log), v, out.block[r].col(c));
+        if (const VectorXd& v = value[c][r]; v.size())
+          index.Take(static_cast<int>(log), calibration::ThroughChannel(*logs[log].data, out.joints[r], v),
+                     out.block[r].col(c));
     }
   }
   return out;
@@ -44,6 +48,7 @@ Quantities PickSamples(const Quantities& q, int every, calibration::Dataset& dat
   data.s = {PickRows(q.data->s.t, every), PickRows(q.data->s.q, every), PickRows(q.data->s.qd, every),
             PickRows(q.data->s.qdd, every), PickRows(q.data->s.temp, every)};
   data.tau = PickRows(q.data->tau, every);
+  data.channel = q.data->channel;
   Quantities out;
   out.data = &data;
   out.parts.rigid = PickRows(q.parts.rigid, every), out.parts.gravity = PickRows(q.parts.gravity, every);

@@ -11,6 +11,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/diagnose/diagnosis/noise.hpp"
 #include "host_sim/identify/calibration/band.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::diagnosis {
@@ -64,7 +65,7 @@ void Follow(const codegen::Model& model, const codegen::ArmTorque& arm, const Ve
   const calibration::Dataset& data = *quantities.data;
   arm.Evaluate(data.s, {x.data() + model.front(), static_cast<std::size_t>(model.rigid())}, reads, quantities.parts);
   if (Any(reads, codegen::Quantity::kModelTorque) || Any(reads, codegen::Quantity::kDelayedTorque))
-    quantities.tau_model = calibration::Predict(model, data, x, eta);
+    quantities.tau_model = calibration::ModelTorque(model, data, x, eta);
 }
 
 MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities, const std::vector<double>& eta,
@@ -76,7 +77,7 @@ MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantitie
   for (int c = 0; c < candidate.columns(eta); ++c)
     for (std::size_t r = 0; r < candidate.rows().size(); ++r)
       if (value[c][r].size()) tau.col(candidate.rows()[r]) += amplitude[c] * value[c][r];
-  return calibration::AsSaved(*quantities.data, std::move(tau));
+  return calibration::ThroughChannel(*quantities.data, calibration::AsSaved(*quantities.data, std::move(tau)));
 }
 
 Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalogue,
@@ -270,6 +271,10 @@ void Diagnosis::Work::StartRows() {
   regressor.resize(train.size());
   for (std::size_t log = 0; log < train.size(); ++log)
     model.Regressor(train[log]->s, {x.data(), static_cast<std::size_t>(columns)}, declared.eta, regressor[log]);
+  for (std::size_t log = 0; log < train.size() && !train[log]->channel.empty(); ++log)
+    for (int j = 0; j < n; ++j)
+      for (auto column : regressor[log][static_cast<std::size_t>(j)].colwise())
+        column = calibration::ThroughChannel(*train[log], j, column);
   for (int j = 0; j < n; ++j)
     for (int a = 0; a < active; ++a) {
       const int c = declared.active[a];

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
@@ -26,6 +27,7 @@ std::vector<std::string> Signals(const Term& t) {
   for (std::string s : t.record->signals) {
     if (s == "t") out.push_back("time");
     else if (s.ends_with("[k]")) out.push_back(s.substr(0, s.size() - 3) + std::to_string(t.joints.at(1) + 1));
+    else if (s.ends_with("[j]")) out.push_back(s.substr(0, s.size() - 3) + joint);
     else if (s.back() == ')') out.push_back(s.insert(s.size() - 1, joint));
     else out.push_back(s == "tau_rigid" ? "load" + joint : s + joint);
   }
@@ -158,6 +160,14 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["noise_innovation"] = ToList(f.innovation);
   j["smallest_detectable"] = ToList(f.smallest);
   j["payload"] = PayloadJson(v);
+  j["limits"] = nlohmann::ordered_json::array();
+  for (const diagnosis::Limit& limit : f.limits) {
+    nlohmann::ordered_json& each = j["limits"].emplace_back();
+    each["kind"] = limit.record->kind, each["joints"] = nlohmann::ordered_json::array();
+    for (const int joint : limit.joints) each["joints"].push_back(joint + 1);
+    each["on"] = limit.joint + 1;
+    each["rms_Nm"] = std::isfinite(limit.rms_Nm) ? nlohmann::ordered_json(limit.rms_Nm) : nlohmann::ordered_json();
+  }
   if (!v.held_out->tracking.empty()) j["tracking"] = v.held_out->tracking;
   j["held_out_motion"] = ToJson(v.motion);
   j["not_looked_at"] = NotLookedAt(v);

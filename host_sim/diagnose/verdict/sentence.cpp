@@ -149,6 +149,15 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
         "motion faster than {} Hz (joints 1 to {}): above that the derived speeds and accelerations are filtered or "
         "mostly noise",
         band, n));
+  if (const calibration::TorqueChannel& channel = (*v.train)[0].channel; !channel.empty()) {
+    std::string each;
+    for (int j = 0; j < n; ++j)
+      each += fmt::format("{}{:.3g} / {:.2g}", j == 0 ? "" : ", ", 1000 * channel.lag_s[j], 1000 * channel.late_s[j]);
+    out.push_back(fmt::format(
+        "the torque as the joints made it: the logs show it through a low-pass and late, time constant / delay "
+        "in ms {} (joints 1 to {}); predictions pass the same before they are compared",
+        each, n));
+  }
   if (std::isfinite(saved_Hz))
     out.push_back(fmt::format("torque above {:.3g} Hz: it was filtered away before the logs were saved", saved_Hz));
   out.push_back(

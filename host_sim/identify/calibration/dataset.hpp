@@ -12,6 +12,12 @@
 
 namespace armcal::calibration {
 
+// How the torque of each joint [n] was measured, where a log shows it: through a low-pass of first order, and late.
+struct TorqueChannel {
+  Eigen::VectorXd lag_s, late_s;  // both empty: as it is
+  bool empty() const { return lag_s.size() == 0; }
+};
+
 // N samples, n joints.
 struct Dataset {
   codegen::Signals s;         // q, qd, qdd (derived from q where the log has no better), temp
@@ -24,6 +30,7 @@ struct Dataset {
   Eigen::VectorXd cutoff_Hz;  // [n]
   Eigen::VectorXd band_Hz;    // [n] up to which torque and model are compared; infinity: as far as the log goes
   Eigen::VectorXd saved_Hz;   // [n] above it the torque was filtered away before it was saved; infinity: nowhere
+  TorqueChannel channel;      // predictions and columns pass it before they are compared with tau
   // [n] where the band is limited: the averages of samples that are fitted. Elsewhere empty: each used sample is a row.
   std::vector<Eigen::SparseMatrix<double, Eigen::RowMajor>> average;
   Eigen::MatrixXd reference;  // [N x n] commanded position; empty where the log has none

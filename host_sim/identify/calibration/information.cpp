@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "host_sim/identify/calibration/band.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/calibration/gram_kernel.hpp"
 
 namespace armcal::calibration {
@@ -75,24 +76,37 @@ class JointSum {
   int filled_ = 0;  // samples in the panel
 };
 
-// The joints whose rows are averages of samples.
-void SumAverages(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& p,
+// A joint whose rows are averages of samples, or whose columns pass a torque channel.
+bool IsFiltered(const Dataset& data, int j) {
+  return data.averaged(j) || (!data.channel.empty() && (data.channel.lag_s[j] != 0 || data.channel.late_s[j] != 0));
+}
+
+// What the rows of joint j take of a signal.
+Eigen::MatrixXd RowsOf(const Dataset& data, int j, const Eigen::MatrixXd& signal) {
+  if (data.averaged(j)) return data.average[static_cast<std::size_t>(j)] * signal;
+  std::vector<Eigen::Index> used;
+  for (int k = 0; k < data.samples(); ++k)
+    if (data.used(k, j)) used.push_back(k);
+  return signal(used, Eigen::all);
+}
+
+void SumFiltered(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& p,
                  std::span<const double> eta, Information& info) {
   const int columns = model.columns();
   std::vector<Eigen::MatrixXd> regressor;
   model.Regressor(data.s, {p.data(), static_cast<std::size_t>(columns)}, eta, regressor);
   for (int j = 0; j < model.joints(); ++j) {
-    if (!data.averaged(j)) continue;
-    const auto& average = data.average[static_cast<std::size_t>(j)];
-    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(average.rows(), columns + model.joints());
+    if (!IsFiltered(data, j)) continue;
+    const Eigen::MatrixXd tau = RowsOf(data, j, data.tau.col(j));
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(tau.rows(), columns + model.joints());
     for (int c = 0; c < columns; ++c)
-      if (!model.rows()[j][c].IsZero()) A.col(c) = average * regressor[static_cast<std::size_t>(j)].col(c);
+      if (!model.rows()[j][c].IsZero())
+        A.col(c) = RowsOf(data, j, ThroughChannel(data, j, regressor[static_cast<std::size_t>(j)].col(c)));
     A.col(columns + j) = A.leftCols(columns) * p;
-    const Eigen::VectorXd tau = average * data.tau.col(j);
     info.gram[j] = A.transpose() * A;
-    info.right[j] = A.transpose() * tau;
+    info.right[j] = A.transpose() * tau.col(0);
     info.square[j] = tau.squaredNorm();
-    info.rows[j] = static_cast<int>(average.rows());
+    info.rows[j] = static_cast<int>(tau.rows());
   }
 }
 
@@ -123,19 +137,20 @@ Information Accumulate(const codegen::Model& model, const Dataset& data, const E
   for (int j = 0; j < n; ++j) sums.emplace_back(model, j, p);
   const auto add = [&](int begin, int count, std::span<const double* const> root) {
     for (int j = 0; j < n; ++j)
-      if (!data.averaged(j))
+      if (!IsFiltered(data, j))
         info.rows[j] += sums[j].Add(count, root.subspan(static_cast<std::size_t>(j) * columns, columns),
                                     data.used.col(j).data() + begin, data.tau.col(j).data() + begin);
   };
   model.ForEachBlock(data.s, {p.data(), static_cast<std::size_t>(columns)}, eta, add);
   for (int j = 0; j < n; ++j) sums[j].Finish(columns + j, info.gram[j], info.right[j], info.square[j]);
-  if (std::any_of(data.average.begin(), data.average.end(), [](const auto& a) { return a.cols() > 0; }))
-    SumAverages(model, data, p, eta, info);
+  bool filtered = false;
+  for (int j = 0; j < n; ++j) filtered |= IsFiltered(data, j);
+  if (filtered) SumFiltered(model, data, p, eta, info);
   return info;
 }
 
-Eigen::MatrixXd Predict(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& x,
-                        std::span<const double> eta) {
+Eigen::MatrixXd ModelTorque(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& x,
+                            std::span<const double> eta) {
   const int n = model.joints(), columns = model.columns();
   Eigen::MatrixXd tau = Eigen::MatrixXd::Zero(data.samples(), n);
   const auto add = [&](int begin, int count, std::span<const double* const> root) {
@@ -149,6 +164,11 @@ Eigen::MatrixXd Predict(const codegen::Model& model, const Dataset& data, const 
   };
   model.ForEachBlock(data.s, {x.data(), static_cast<std::size_t>(columns)}, eta, add);
   return AsSaved(data, std::move(tau));
+}
+
+Eigen::MatrixXd Predict(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& x,
+                        std::span<const double> eta) {
+  return ThroughChannel(data, ModelTorque(model, data, x, eta));
 }
 
 }  // namespace armcal::calibration

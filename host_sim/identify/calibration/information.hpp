@@ -27,7 +27,10 @@ struct Information {
 Information Accumulate(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& p,
                        std::span<const double> eta);
 
-// Predicted torque [N x n]: (1 + kappa_j) Y_j p.
+// The model's torque [N x n]: (1 + kappa_j) Y_j p.
+Eigen::MatrixXd ModelTorque(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& x,
+                            std::span<const double> eta);
+// The same as the log's torque channel would have measured it.
 Eigen::MatrixXd Predict(const codegen::Model& model, const Dataset& data, const Eigen::VectorXd& x,
                         std::span<const double> eta);
 

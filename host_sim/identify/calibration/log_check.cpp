@@ -107,10 +107,11 @@ void CheckPosition(const codegen::Robot& robot, const logs::Log& log, int j) {
       continue;
     }
     const bool stuck = held * dt > kHeld_s;
-    if (std::abs(step) > kJumpSpeed * joint.speed_limit_radps * dt)
+    const double farthest = kJumpSpeed * joint.speed_limit_radps * std::max(dt, step_s);  // a late stamp shortens dt
+    if (std::abs(step) > farthest)
       Fail(log, Joint(j) + fmt::format("line {}: position {} by {:.3g} {} in one sample, expected at most {:.3g}",
                                        log.line_of(k), stuck ? "is stuck, then jumps" : "jumps", step,
-                                       PositionUnit(joint), joint.speed_limit_radps * dt));
+                                       PositionUnit(joint), farthest / kJumpSpeed));
     const bool leaps = std::abs(step) > kStopAcceleration * joint.acceleration_limit_radps2 * dt * dt;
     if (stuck && step != 0 && leaps)
       Fail(log, Joint(j) + fmt::format("line {}: position is stuck for {:.2g} s, then moves at once", log.line_of(k),

@@ -8,6 +8,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/butterworth.hpp"
 #include "host_sim/data/logs/quintic_spline.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/calibration/tall_product.hpp"
 #include "host_sim/identify/methods/closed_loop.hpp"
 
@@ -225,6 +226,9 @@ Exogeneity TestExogeneity(const codegen::Model& model, const std::vector<const D
     std::vector<MatrixXd> measured, instrument;
     model.Regressor(log.s, p, eta, measured);
     model.Regressor(Thinned(instruments[l], every).s, p, eta, instrument);
+    for (std::size_t j = 0; j < rows.size() && !log.channel.empty(); ++j)
+      for (MatrixXd* K : {&measured[j], &instrument[j]})
+        for (auto column : K->colwise()) column = ThroughChannel(log, static_cast<int>(j), column);
     for (std::size_t j = 0; j < rows.size(); ++j)
       AddRows(log, measured[j], instrument[j], Present(model, static_cast<int>(j)), static_cast<int>(j), rows[j]);
   }

@@ -1,0 +1,223 @@
+// calibration - fits each joint's torque through a low-pass and a delay, and asks most joints before it believes one.
+#include "host_sim/identify/calibration/channel.hpp"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "host_sim/identify/calibration/prior.hpp"
+
+namespace armcal::calibration {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr Index kRowsOfAJoint = 2500;  // of a joint: more do not move the result
+constexpr double kLeastPivot = 1e-10;  // of a column's own square: directions that the log does not show
+constexpr double kProbe_s = 0.005;     // lag whose column asks whether there is any
+constexpr double kTakesAway = 0.04;    // of a joint's squared error: what a lag must take away
+constexpr double kSureOfLag = 40;      // of chi^2
+constexpr double kMostJoints = 0.6;    // of those that move
+constexpr double kFewRowsForLag = 200;
+constexpr double kLongest_s = 0.25;
+constexpr std::array<double, 6> kLags_s{0.004, 0.008, 0.016, 0.032, 0.064, 0.128};
+constexpr std::array<double, 5> kDelays_s{0, 0.005, 0.01, 0.015, 0.02};
+constexpr int kHalvings = 4;
+constexpr double kDelaysDiffer = 0.2;  // of the mean: delays that differ by less are one
+
+// One joint's row of the declared model over all logs.
+struct Row {
+  int joint;
+  std::vector<const Dataset*> logs;
+  std::vector<MatrixXd> columns;  // of each log, all samples
+  Index every = 1;                // of the rows that may be used, so many are skipped
+
+  // Squared error of the best parameters with this channel, of `rows` rows. extra: one more column a log.
+  double Left(double lag_s, double late_s, Index& rows, VectorXd* best = nullptr,
+              const std::vector<VectorXd>* extra = nullptr) const;
+  bool Stands() const;
+};
+
+bool Row::Stands() const {
+  Index used = 0;
+  for (const Dataset* log : logs) used += log->used.col(joint).sum();
+  return static_cast<double>(used) < kFewRowsForLag;
+}
+
+double Row::Left(double lag_s, double late_s, Index& rows, VectorXd* best, const std::vector<VectorXd>* extra) const {
+  const Index own = columns[0].cols(), size = own + (extra ? 1 : 0);
+  MatrixXd gram = MatrixXd::Zero(size, size);
+  VectorXd right = VectorXd::Zero(size);
+  double square = 0;
+  rows = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const Dataset& log = *logs[l];
+    const bool averaged = log.averaged(joint);
+    MatrixXd A(log.samples(), size);
+    for (Index c = 0; c < own; ++c) A.col(c) = ThroughChannel(log.s.t, columns[l].col(c), lag_s, late_s);
+    if (extra) A.col(own) = (*extra)[l];
+    VectorXd y = log.tau.col(joint);
+    if (averaged) {
+      const auto& average = log.average[static_cast<std::size_t>(joint)];
+      A = MatrixXd(average * A), y = VectorXd(average * y);
+    } else {
+      std::vector<Index> kept;
+      for (Index k = 0, seen = 0; k < log.samples(); ++k)
+        if (log.used(k, joint) && seen++ % every == 0) kept.push_back(k);
+      A = MatrixXd(A(kept, Eigen::all)), y = VectorXd(y(kept));
+    }
+    gram.noalias() += A.transpose() * A;
+    right.noalias() += A.transpose() * y;
+    square += y.squaredNorm(), rows += y.size();
+  }
+  VectorXd scale = gram.diagonal().cwiseSqrt();
+  for (double& s : scale) s = s > 0 ? 1 / s : 0;
+  MatrixXd H = scale.asDiagonal() * gram * scale.asDiagonal();
+  H.diagonal().array() += kLeastPivot;
+  const VectorXd x = scale.asDiagonal() * Eigen::LDLT<MatrixXd>(H).solve(scale.asDiagonal() * right);
+  if (best) *best = x;
+  return std::max(1e-300, square - 2 * right.dot(x) + x.dot(gram * x));
+}
+
+// Whether `with` leaves clearly less than `without`.
+bool Clearly(double with, double without, Index rows) {
+  return with<(1 - kTakesAway) * without&& static_cast<double>(rows) * std::log(without / with)> kSureOfLag;
+}
+
+// A column of a little lag on the prediction takes away a clear share of the error, or of a little lead: a delay that
+// is longer than the lag of a first fit.
+bool LooksLate(const Row& row) {
+  Index rows = 0;
+  VectorXd x;
+  const double without = row.Left(0, 0, rows, &x);
+  std::vector<VectorXd> lag;
+  for (std::size_t l = 0; l < row.logs.size(); ++l) {
+    const VectorXd torque = row.columns[l] * x;
+    lag.push_back(ThroughChannel(row.logs[l]->s.t, torque, kProbe_s, 0) - torque);
+  }
+  return static_cast<double>(rows) > kFewRowsForLag && Clearly(row.Left(0, 0, rows, nullptr, &lag), without, rows);
+}
+
+struct Late {
+  double lag_s = 0, late_s = 0;  // both free
+  double alone_s = 0;            // the delay if there is no low-pass
+  bool filtered = false, delayed = false;
+};
+
+Late Search(const Row& row) {
+  Index rows = 0;
+  const double without = row.Left(0, 0, rows);
+  struct Point {
+    double lag_s, late_s, left;
+  };
+  const auto at = [&](double lag_s, double late_s) { return Point{lag_s, late_s, row.Left(lag_s, late_s, rows)}; };
+  Point delay{0, 0, without}, both = delay;
+  for (const double late_s : kDelays_s)
+    if (const Point p = at(0, late_s); p.left < delay.left) delay = p;
+  both = delay;
+  for (const double lag_s : kLags_s)
+    for (const double late_s : {kDelays_s[0], kDelays_s[2], kDelays_s[4]})
+      if (const Point p = at(lag_s, late_s); p.left < both.left) both = p;
+  double factor = 1.4, step_s = 0.0025;
+  for (int k = 0; k < kHalvings; ++k, factor = std::sqrt(factor), step_s /= 2) {
+    for (const double by_s : {-step_s, step_s})
+      if (const Point p = at(0, std::max(0.0, delay.late_s + by_s)); p.left < delay.left) delay = p;
+    for (const double by_s : {-2 * step_s, 2 * step_s})
+      if (const Point p = at(both.lag_s, std::max(0.0, both.late_s + by_s)); p.left < both.left) both = p;
+    for (const double by : {1 / factor, factor})
+      if (const Point p = at(std::min(kLongest_s, both.lag_s * by), both.late_s); p.left < both.left) both = p;
+  }
+  return {both.lag_s, both.late_s, delay.late_s, both.lag_s > 0 && Clearly(both.left, delay.left, rows),
+          Clearly(delay.left, without, rows)};
+}
+
+}  // namespace
+
+VectorXd ThroughChannel(const VectorXd& t, const VectorXd& torque, double lag_s, double late_s) {
+  const Index samples = t.size(), last = samples - 1;
+  VectorXd out = torque;
+  if (late_s != 0) {
+    Index k = 0;  // t[k] <= time < t[k + 1]
+    for (Index i = 0; i < samples; ++i) {
+      const double time = std::clamp(t[i] - late_s, t[0], t[last]);
+      k = std::min(k, std::max<Index>(0, last - 1));
+      while (k + 1 < last && t[k + 1] <= time) ++k;
+      while (k > 0 && t[k] > time) --k;
+      const double share = last > 0 ? (time - t[k]) / (t[k + 1] - t[k]) : 0;
+      out[i] = last > 0 ? (1 - share) * torque[k] + share * torque[k + 1] : torque[k];
+    }
+  }
+  if (lag_s <= 0) return out;
+  double z = out[0], before = out[0];
+  for (Index i = 1; i < samples; ++i) {
+    const double dt = t[i] - t[i - 1], rest = std::exp(-dt / lag_s), ramp = lag_s / dt * (1 - rest);
+    z = rest * z + (ramp - rest) * before + (1 - ramp) * out[i];
+    before = out[i];
+    out[i] = z;
+  }
+  return out;
+}
+
+VectorXd ThroughChannel(const Dataset& data, int joint, VectorXd torque) {
+  const TorqueChannel& c = data.channel;
+  if (c.empty() || (c.lag_s[joint] == 0 && c.late_s[joint] == 0)) return torque;
+  return ThroughChannel(data.s.t, torque, c.lag_s[joint], c.late_s[joint]);
+}
+
+MatrixXd ThroughChannel(const Dataset& data, MatrixXd torque) {
+  for (Index j = 0; j < torque.cols() && !data.channel.empty(); ++j)
+    torque.col(j) = ThroughChannel(data, static_cast<int>(j), torque.col(j));
+  return torque;
+}
+
+TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Dataset*>& logs) {
+  const int n = model.joints();
+  const VectorXd mean = MakePrior(model).mean.head(model.columns());
+  const std::vector<double> eta = MeanUnknowns(model);
+  std::vector<std::vector<MatrixXd>> regressor(logs.size());
+  for (std::size_t l = 0; l < logs.size(); ++l)
+    model.Regressor(logs[l]->s, {mean.data(), static_cast<std::size_t>(mean.size())}, eta, regressor[l]);
+  std::vector<Row> rows;
+  for (int j = 0; j < n; ++j) {
+    Row row{j, logs, {}, 1};
+    std::vector<int> present;
+    for (int c = 0; c < model.columns(); ++c)
+      if (!model.rows()[j][c].IsZero()) present.push_back(c);
+    Index used = 0;
+    for (std::size_t l = 0; l < logs.size(); ++l) {
+      row.columns.push_back(regressor[l][static_cast<std::size_t>(j)](Eigen::all, present));
+      used += logs[l]->used.col(j).sum();
+    }
+    row.every = std::max<Index>(1, used / kRowsOfAJoint);
+    if (!row.Stands()) rows.push_back(std::move(row));
+  }
+  const auto most = [&](std::ptrdiff_t count) {
+    return count >= 2 && static_cast<double>(count) >= kMostJoints * static_cast<double>(rows.size());
+  };
+  if (!most(std::count_if(rows.begin(), rows.end(), LooksLate))) return {};
+  std::vector<Late> late;
+  for (const Row& row : rows) late.push_back(Search(row));
+  TorqueChannel out{VectorXd::Zero(n), VectorXd::Zero(n)};
+  if (most(std::count_if(late.begin(), late.end(), [](const Late& l) { return l.filtered; }))) {
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      if (late[k].filtered) out.lag_s[rows[k].joint] = late[k].lag_s, out.late_s[rows[k].joint] = late[k].late_s;
+      else if (late[k].delayed) out.late_s[rows[k].joint] = late[k].alone_s;
+    return out;
+  }
+  if (!most(std::count_if(late.begin(), late.end(), [](const Late& l) { return l.delayed; }))) return {};
+  double mean_s = 0, apart_s = 0;
+  for (const Late& l : late) mean_s += l.alone_s / static_cast<double>(late.size());
+  for (const Late& l : late) apart_s = std::max(apart_s, std::abs(l.alone_s - mean_s));
+  if (apart_s < kDelaysDiffer * mean_s) return {};
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (late[k].delayed) out.late_s[rows[k].joint] = late[k].alone_s;
+  return out;
+}
+
+}  // namespace armcal::calibration

@@ -1,0 +1,26 @@
+// calibration - finds the low-pass and the delay with which a log's torque was measured, and passes predictions
+// through.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "host_sim/identify/calibration/dataset.hpp"
+
+namespace armcal::calibration {
+
+// The torque [N] of one joint as its channel shows it: late by late_s and through a low-pass of first order with the
+// time constant lag_s. Exact for a torque that is linear between samples.
+Eigen::VectorXd ThroughChannel(const Eigen::VectorXd& t, const Eigen::VectorXd& torque, double lag_s, double late_s);
+
+// The same for a joint of a log, with the log's own channel; for all joints [N x n].
+Eigen::VectorXd ThroughChannel(const Dataset& data, int joint, Eigen::VectorXd torque);
+Eigen::MatrixXd ThroughChannel(const Dataset& data, Eigen::MatrixXd torque);
+
+// The channel of all joints that leaves least where each joint's row of the regressor is fitted by itself, with
+// parameters of its own: only motion and torque of that joint decide. Empty unless most of the joints that move show a
+// low-pass, or delays that differ. One joint alone may have another cause, and a delay that all share is an effect
+// (time_delay) that the search names.
+TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Dataset*>& logs);
+
+}  // namespace armcal::calibration

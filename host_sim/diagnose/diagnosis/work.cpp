@@ -89,6 +89,8 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
       prior(calibration::MakePrior(m)),
       candidates(MakeCandidates(catalogue, m)) {
   if (train.empty()) throw io::InputError("diagnose: expected at least one training log");
+  // A channel that is known has a delay of its own. What another one would still gain is the filter's form.
+  if (!train[0]->channel.empty()) std::erase_if(candidates, [](const auto& c) { return c->delay() >= 0; });
   declared = calibration::WeightedFit(model, train);
   estimate.x = declared.x;
   estimate.sigma = declared.sigma;

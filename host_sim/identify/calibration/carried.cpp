@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "host_sim/identify/calibration/band.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/calibration/barrier_fit.hpp"
 
 namespace armcal::calibration {
@@ -103,7 +104,7 @@ class LoadOfRun {
       A.col(active + j) = run.tau.col(j);
       A.rightCols(kLoad) = (1 + fit.x[model.columns() + j]) * (body[at] * to_link);
       for (Index c = 0; c < size_; ++c)
-        if (c < active || c >= differ_) A.col(c) = AsSaved(run, j, A.col(c));
+        if (c < active || c >= differ_) A.col(c) = ThroughChannel(run, j, AsSaved(run, j, A.col(c)));
       for (int half = 0; half < 2; ++half) {
         const Picker pick(run, j, half == 0 ? 0 : begin_second_, half == 0 ? begin_second_ : run.samples());
         rows_[static_cast<std::size_t>(half)].push_back({pick(A), pick(residual.col(j))});

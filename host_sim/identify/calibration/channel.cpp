@@ -28,7 +28,7 @@ constexpr double kFewRowsForLag = 200;
 constexpr double kLongest_s = 0.25;
 constexpr std::array<double, 6> kLags_s{0.004, 0.008, 0.016, 0.032, 0.064, 0.128};
 constexpr std::array<double, 5> kDelays_s{0, 0.005, 0.01, 0.015, 0.02};
-constexpr int kHalvings = 4;
+constexpr int kHalvings = 6;
 constexpr double kDelaysDiffer = 0.2;  // of the mean: delays that differ by less are one
 
 // One joint's row of the declared model over all logs.
@@ -124,14 +124,20 @@ Late Search(const Row& row) {
   for (const double lag_s : kLags_s)
     for (const double late_s : {kDelays_s[0], kDelays_s[2], kDelays_s[4]})
       if (const Point p = at(lag_s, late_s); p.left < both.left) both = p;
-  double factor = 1.4, step_s = 0.0025;
+  double factor = 1.4, step_s = 0.005;
   for (int k = 0; k < kHalvings; ++k, factor = std::sqrt(factor), step_s /= 2) {
+    const double alone_s = delay.late_s, lag_s = both.lag_s, late_s = both.late_s;
     for (const double by_s : {-step_s, step_s})
-      if (const Point p = at(0, std::max(0.0, delay.late_s + by_s)); p.left < delay.left) delay = p;
-    for (const double by_s : {-2 * step_s, 2 * step_s})
-      if (const Point p = at(both.lag_s, std::max(0.0, both.late_s + by_s)); p.left < both.left) both = p;
-    for (const double by : {1 / factor, factor})
-      if (const Point p = at(std::min(kLongest_s, both.lag_s * by), both.late_s); p.left < both.left) both = p;
+      if (const Point p = at(0, std::max(0.0, alone_s + by_s)); p.left < delay.left) delay = p;
+    // A longer lag and a shorter delay look much alike: the two move apart and together.
+    for (const auto& [by, by_s] : {std::pair{1.0, -step_s},
+                                   {1.0, step_s},
+                                   {factor, 0.0},
+                                   {1 / factor, 0.0},
+                                   {factor, -step_s},
+                                   {1 / factor, step_s}})
+      if (const Point p = at(std::min(kLongest_s, lag_s * by), std::max(0.0, late_s + by_s)); p.left < both.left)
+        both = p;
   }
   return {both.lag_s, both.late_s, delay.late_s, both.lag_s > 0 && Clearly(both.left, delay.left, rows),
           Clearly(delay.left, without, rows)};

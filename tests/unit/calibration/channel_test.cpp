@@ -1,0 +1,101 @@
+// calibration tests - a channel is found in torques that an integration in small steps has filtered, and in no others.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "host_sim/identify/calibration/channel.hpp"
+#include "tests/unit/calibration/synthetic_arm.hpp"
+
+namespace armcal::calibration {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+// y' = (u(t - late) - y) / lag in fifty steps a sample; u is linear between samples.
+VectorXd Integrated(const VectorXd& t, const VectorXd& u, double lag_s, double late_s) {
+  constexpr int kSteps = 50;
+  const auto at = [&](double time) {
+    const double step_s = t[1] - t[0],
+                 place = std::clamp((time - t[0]) / step_s, 0.0, static_cast<double>(t.size() - 1));
+    const Index k = std::min<Index>(static_cast<Index>(place), t.size() - 2);
+    return u[k] + (place - static_cast<double>(k)) * (u[k + 1] - u[k]);
+  };
+  VectorXd out(t.size());
+  double y = at(t[0] - late_s);
+  out[0] = y;
+  for (Index k = 1; k < t.size(); ++k) {
+    const double dt = (t[k] - t[k - 1]) / kSteps;
+    for (int i = 0; i < kSteps; ++i) {
+      const double middle = at(t[k - 1] + (i + 0.5) * dt - late_s);
+      y += (1 - std::exp(-dt / lag_s)) * (middle - y);
+    }
+    out[k] = y;
+  }
+  return out;
+}
+
+struct Arm {
+  tests::SyntheticArm arm{tests::Er20(), 5};
+  Dataset log = arm.Run(40, 6);
+  void Measure(int j, double lag_s, double late_s) {
+    log.tau.col(j) = Integrated(log.s.t, log.tau.col(j), lag_s, late_s);
+  }
+  TorqueChannel Seen() const { return SeeChannel(arm.model(), {&log}); }
+};
+
+constexpr std::array kTimes{0.0, 0.01, 0.03, 0.04, 0.2, 1.0};
+
+TEST(Channel, ARampThroughALowPass_IsLateByItsTimeConstant) {
+  const VectorXd t = VectorXd::Map(kTimes.data(), 6);
+  const VectorXd y = ThroughChannel(t, t, 0.05, 0);
+  for (Index k = 0; k < t.size(); ++k) EXPECT_NEAR(y[k], t[k] - 0.05 * (1 - std::exp(-t[k] / 0.05)), 1e-12);
+  const VectorXd late = ThroughChannel(t, t, 0, 0.02);
+  for (Index k = 1; k < t.size(); ++k) EXPECT_NEAR(late[k], std::max(0.0, t[k] - 0.02), 1e-12);
+}
+
+TEST(Channel, LowPassesAndDelaysOfTheirOwn_AreFoundOnEveryJoint) {
+  Arm a;
+  for (int j = 0; j < 6; ++j) a.Measure(j, 0.02 + 0.01 * j, 0.004 * (j % 3));
+  const TorqueChannel seen = a.Seen();
+  ASSERT_FALSE(seen.empty());
+  for (int j = 0; j < 6; ++j) {
+    EXPECT_NEAR(seen.lag_s[j], 0.02 + 0.01 * j, 0.15 * (0.02 + 0.01 * j)) << j;
+    EXPECT_NEAR(seen.late_s[j], 0.004 * (j % 3), 0.004) << j;
+  }
+}
+
+TEST(Channel, TorqueAsItIs_HasNone) { EXPECT_TRUE(Arm().Seen().empty()); }
+
+TEST(Channel, OneJointAlone_MayHaveAnotherCause) {
+  Arm a;
+  a.Measure(1, 0.04, 0.01);
+  EXPECT_TRUE(a.Seen().empty());
+}
+
+TEST(Channel, ADelayThatAllJointsShare_IsLeftToTheSearch) {
+  Arm a;
+  for (int j = 0; j < 6; ++j) a.Measure(j, 1e-6, 0.008);
+  EXPECT_TRUE(a.Seen().empty());
+}
+
+TEST(Channel, AFitThroughTheChannel_GivesTheParametersOfTheTorqueBeforeIt) {
+  Arm plain, late;
+  for (int j = 0; j < 6; ++j) late.Measure(j, 0.03, 0.005);
+  const Fit truth = WeightedFit(plain.arm.model(), {&plain.log});
+  const Fit ignored = WeightedFit(late.arm.model(), {&late.log});
+  late.log.channel = late.Seen();
+  const Fit fit = WeightedFit(late.arm.model(), {&late.log});
+  int viscous = 0;
+  for (int c = 0; c < plain.arm.model().front(); ++c) {
+    if (!plain.arm.model().column_name(c).starts_with("Fv")) continue;
+    ++viscous;
+    EXPECT_LT(std::abs(fit.x[c] - truth.x[c]), 0.5 * std::abs(ignored.x[c] - truth.x[c]) + 2 * truth.sd[c])
+        << plain.arm.model().column_name(c);
+  }
+  EXPECT_EQ(viscous, 6);
+}
+
+}  // namespace
+}  // namespace armcal::calibration

@@ -73,6 +73,7 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
   const LogReader read(model, o.channels, o.cutoff_Hz);
   std::vector<calibration::Dataset> train = read.All(o.train);
   read.PrintUntold(train);
+  const auto start = std::chrono::steady_clock::now();
   const calibration::TorqueChannel channel = calibration::SeeChannel(model, calibration::Pointers(train));
   for (calibration::Dataset& log : train) log.channel = channel;
   for (const calibration::Dataset& log : train) run->train.push_back(calibration::ThinToBand(log));
@@ -81,7 +82,6 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
     narrow.push_back(calibration::ThinToBand(log));
     narrow.back().channel = channel;
   }
-  const auto start = std::chrono::steady_clock::now();
   run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, calibration::Pointers(run->train),
                                                           calibration::Pointers(narrow), o.at_turns);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "codegen/src/generator/state_path.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 
 namespace armcal::diagnosis {
 
@@ -60,17 +61,9 @@ std::vector<double> Candidate::Initial() const {
 namespace {
 
 // Each column as it was a time before, linear between samples: friction's jumps stay jumps.
-Eigen::MatrixXd Earlier(const VectorXd& t, const Eigen::MatrixXd& y, double delay_s) {
-  Eigen::MatrixXd out(y.rows(), y.cols());
-  const Eigen::Index last = t.size() - 1;
-  Eigen::Index k = 0;  // t[k] <= time < t[k + 1]
-  for (Eigen::Index i = 0; i <= last; ++i) {
-    const double time = std::clamp(t[i] - delay_s, t[0], t[last]);
-    while (k + 1 < last && t[k + 1] <= time) ++k;
-    const double share = (time - t[k]) / (t[k + 1] - t[k]);
-    out.row(i) = (1 - share) * y.row(k) + share * y.row(k + 1);
-  }
-  return out;
+Eigen::MatrixXd Earlier(const VectorXd& t, Eigen::MatrixXd y, double delay_s) {
+  for (auto column : y.colwise()) column = calibration::ThroughChannel(t, column, 0, delay_s);
+  return y;
 }
 
 // The log's column that a graph input stands for; null where the log does not have it, which reads as zero.

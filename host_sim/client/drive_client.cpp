@@ -6,6 +6,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <thread>
 
 #include "armcal/core/words.hpp"
 #include "host_sim/client/register_text.hpp"
@@ -17,8 +21,13 @@ namespace reg = link::reg;
 namespace {
 
 constexpr int kChunk = 120;  // below the protocol's 123, and even, so that no request splits a 32-bit value
-constexpr int kAttempts = 3;
-constexpr std::uint32_t kResponse_s = 2;
+constexpr auto kBudget = std::chrono::seconds(6);        // for a request with all its attempts
+constexpr auto kPause = std::chrono::milliseconds(200);  // before a connection that was refused is tried again
+constexpr int kTcpAttempts = 3;
+constexpr double kResponse_s = 2.0;
+constexpr int kFrameBytes = 256;         // the longest
+constexpr int kLongestPause_ms = 30;     // inside what comes from a serial line: adapters hand bytes on every 16 ms
+constexpr int kByteTimeout_us = 100000;  // inside a reply, on a serial line
 
 void CloseAndFree(_modbus* connection) {
   modbus_close(connection);
@@ -34,17 +43,19 @@ int ExceptionCode(int error) {
 }  // namespace
 
 DriveClient::DriveClient(std::string name, int unit, std::function<_modbus*()> open)
-    : name_(std::move(name)), unit_(unit), open_(std::move(open)), connection_(nullptr, CloseAndFree) {
-  Connect();
-}
+    : name_(std::move(name)), unit_(unit), open_(std::move(open)), connection_(nullptr, CloseAndFree) {}
 
 DriveClient::DriveClient(const std::string& host, int port, int unit)
     : DriveClient(fmt::format("{}:{}", host, port), unit,
-                  [=] { return modbus_new_tcp_pi(host.c_str(), std::to_string(port).c_str()); }) {}
+                  [=] { return modbus_new_tcp_pi(host.c_str(), std::to_string(port).c_str()); }) {
+  Connect();
+}
 
 DriveClient::DriveClient(const SerialLine& line, int unit)
-    : DriveClient(line.device, unit,
-                  [=] { return modbus_new_rtu(line.device.c_str(), line.baud, line.parity, 8, 1); }) {}
+    : DriveClient(line.device, unit, [=] { return modbus_new_rtu(line.device.c_str(), 115200, line.parity, 8, 1); }) {
+  line_ = line;
+  Connect();
+}
 
 DriveClient::~DriveClient() = default;
 DriveClient::DriveClient(DriveClient&&) noexcept = default;
@@ -55,23 +66,61 @@ void DriveClient::Connect() {
   Connection fresh(open_(), CloseAndFree);
   if (!fresh) throw LinkError(fmt::format("{}: {}", name_, modbus_strerror(errno)));
   modbus_set_slave(fresh.get(), unit_);
-  modbus_set_response_timeout(fresh.get(), kResponse_s, 0);
   if (modbus_connect(fresh.get()) != 0)
     throw LinkError(fmt::format("{}: cannot connect: {}", name_, modbus_strerror(errno)));
+  if (line_) {
+    if (const int got = SetSpeed(modbus_get_socket(fresh.get()), line_->baud);
+        got == 0 || std::abs(got - line_->baud) > line_->baud / 50)
+      throw LinkError(fmt::format("{}: cannot run at {} baud, it offers {}", name_, line_->baud, got));
+    modbus_set_byte_timeout(fresh.get(), 0, kByteTimeout_us);
+  }
   modbus_flush(fresh.get());  // a serial line may still hold the late answer to an earlier request
   connection_ = std::move(fresh);
 }
 
-void DriveClient::Request(const std::string& what, const std::function<int(_modbus*)>& call) {
-  std::string failure;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (!connection_) Connect();
-    if (call(connection_.get()) >= 0) return;
-    if (const int exception = ExceptionCode(errno)) Refused(what, exception);
-    failure = modbus_strerror(errno);
-    connection_.reset();
+// Longer than any pause inside a late reply, and than ten bytes.
+int DriveClient::QuietMs() const {
+  return std::max(kLongestPause_ms, static_cast<int>(1000 * 10 / line_->bytes_per_s()));
+}
+
+void DriveClient::SetTimeout(Patience patience, int attempt) {
+  double wait_s = kResponse_s;
+  if (line_ && patience == Patience::kShort)
+    wait_s = std::min(kResponse_s, (2 * kFrameBytes / line_->bytes_per_s() + 0.05) * std::pow(2.0, attempt));
+  const auto wait_us = static_cast<std::uint32_t>(1e6 * wait_s);
+  modbus_set_response_timeout(connection_.get(), wait_us / 1000000, wait_us % 1000000);
+}
+
+// late: the reply may still come, perhaps after the line has been silent for a while.
+void DriveClient::AfterFailure(bool late) {
+  ++failed_attempts_;
+  if (line_ && errno != EIO && errno != EBADF && errno != ENXIO && errno != ENODEV) {
+    const int frame_ms = static_cast<int>(1000 * kFrameBytes / line_->bytes_per_s());
+    if (DrainToSilence(modbus_get_socket(connection_.get()), late ? frame_ms + QuietMs() : QuietMs())) return;
   }
-  throw LinkError(fmt::format("{}: {}: {} (tried {} times)", name_, what, failure, kAttempts));
+  connection_.reset();
+}
+
+void DriveClient::Request(const std::string& what, const std::function<int(_modbus*)>& call, Patience patience) {
+  const auto start = std::chrono::steady_clock::now();
+  for (int attempt = 0;; ++attempt) {
+    const bool over = std::chrono::steady_clock::now() - start >= kBudget;
+    std::string failure;
+    try {
+      if (!connection_) Connect();
+      SetTimeout(patience, attempt);
+      if (call(connection_.get()) >= 0) return;
+      if (const int exception = ExceptionCode(errno)) Refused(what, exception);
+      failure = fmt::format("{}: {}: {}", name_, what, modbus_strerror(errno));
+      AfterFailure(errno == ETIMEDOUT);
+    } catch (const LinkError& error) {  // it cannot connect; a line that was pulled out may be plugged in again
+      if (!line_) throw;
+      failure = error.what();
+      std::this_thread::sleep_for(kPause);
+    }
+    if (over || (!line_ && attempt + 1 == kTcpAttempts))
+      throw LinkError(fmt::format("{} (tried {} times)", failure, attempt + 1));
+  }
 }
 
 // Asks the drive for its own reason. If it does not answer, there is only the exception.
@@ -115,6 +164,20 @@ void DriveClient::Write(int first, std::span<const std::uint16_t> words) {
 void DriveClient::WriteSingle(int address, std::uint16_t word) {
   Request(fmt::format("writing register 0x{:04X}", address),
           [&](modbus_t* c) { return modbus_write_register(c, address, word); });
+}
+
+std::vector<std::uint16_t> DriveClient::WriteThenRead(int write_first, std::span<const std::uint16_t> words,
+                                                      int read_first, int count, Patience patience) {
+  std::vector<std::uint16_t> read(static_cast<std::size_t>(count));
+  Request(
+      fmt::format("writing {} registers from 0x{:04X} and reading {} from 0x{:04X}", words.size(), write_first, count,
+                  read_first),
+      [&](modbus_t* c) {
+        return modbus_write_and_read_registers(c, write_first, static_cast<int>(words.size()), words.data(), read_first,
+                                               count, read.data());
+      },
+      patience);
+  return read;
 }
 
 std::vector<std::uint16_t> DriveClient::Read(const link::Span& span) {

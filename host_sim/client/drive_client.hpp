@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "armcal/core/status.hpp"
 #include "armcal/link/register_words.hpp"
 #include "host_sim/client/errors.hpp"
+#include "host_sim/client/serial_line.hpp"
 
 struct _modbus;  // libmodbus' connection
 
@@ -40,16 +42,17 @@ struct DriveStatus {
   std::uint32_t rows_used[2], rows_gated[2];
 };
 
-// A serial line as SPEC.md has it: eight data bits, one stop bit.
-struct SerialLine {
-  std::string device;  // "/dev/ttyUSB0"
-  int baud = 115200;
-  char parity = 'E';  // N, E or O
+// How long a call waits for a reply at its first attempt; later attempts wait longer, up to two seconds.
+enum class Patience {
+  kNormal,  // 2 s
+  kShort,   // a serial line: a few times what the line needs. For replies that tell whether they are late.
 };
 
-// Every call throws LinkError after three attempts without a sensible answer, two seconds each. Between them it
-// connects anew, so that a late answer is never taken for the next one. It throws RefusedError, with the drive's own
-// reason, if the drive answers with an exception. An attempt may be repeated because every armcal write may come twice.
+// Every call throws LinkError after three attempts over TCP, two seconds each, or after six seconds on a serial line,
+// without a sensible answer. Over TCP it connects anew between attempts; on a serial line it waits for silence first.
+// So a late answer is not taken for the next one. A serial adapter that was pulled out may come back meanwhile. It
+// throws RefusedError, with the drive's own reason, if the drive answers with an exception. An attempt may be repeated
+// because every armcal write may come twice.
 class DriveClient {
  public:
   DriveClient(const std::string& host, int port, int unit = 1);
@@ -64,6 +67,11 @@ class DriveClient {
   // The same for writing. A block that must be written whole has at most 120 registers.
   void Write(int first, std::span<const std::uint16_t> words);
   void WriteSingle(int address, std::uint16_t word);  // function 6
+
+  // Function 23, which a drive of map version 1.4 serves: writes, then reads holding registers. One request for both,
+  // so at most 121 and 125 registers.
+  std::vector<std::uint16_t> WriteThenRead(int write_first, std::span<const std::uint16_t> words, int read_first,
+                                           int count, Patience patience);
 
   // A block or a register by its declaration (registers.hpp). `trace`: 0 or 1, for registers that exist twice.
   template <const auto& kBlock>
@@ -93,6 +101,10 @@ class DriveClient {
   Identity ReadIdentity();
   DriveStatus ReadStatus();
 
+  // The serial line, if it is one.
+  const std::optional<SerialLine>& line() const { return line_; }
+  // Attempts that had no sensible answer, since the beginning.
+  int failed_attempts() const { return failed_attempts_; }
   const std::string& name() const { return name_; }  // "host:port" or the device, for messages
 
  private:
@@ -100,13 +112,19 @@ class DriveClient {
 
   DriveClient(std::string name, int unit, std::function<_modbus*()> open);
   void Connect();
-  void Request(const std::string& what, const std::function<int(_modbus*)>& call);
+  void Request(const std::string& what, const std::function<int(_modbus*)>& call,
+               Patience patience = Patience::kNormal);
+  void SetTimeout(Patience patience, int attempt);
+  void AfterFailure(bool late);
+  int QuietMs() const;
   [[noreturn]] void Refused(const std::string& what, int exception);
   std::vector<std::uint16_t> ReadWords(bool input, int first, int count);
 
   std::string name_;
   int unit_;
   std::function<_modbus*()> open_;
+  std::optional<SerialLine> line_;
+  int failed_attempts_ = 0;
   Connection connection_;
 };
 

@@ -13,6 +13,8 @@
 #include "armcal/controller/trace_records.hpp"
 #include "armcal/link/registers.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/line_load.hpp"
+#include "host_sim/client/packed_records.hpp"
 #include "host_sim/client/vendor_registers.hpp"
 #include "host_sim/data/report/progress.hpp"
 #include "host_sim/data/trajectory/trajectory.hpp"
@@ -84,19 +86,33 @@ std::string Describe(const Player& p) {
 // Traces 0 and, if asked for, 1, from the next sample's tick on until Stop.
 class Traces {
  public:
-  Traces(DriveClient& drive, const RecordOptions& o, int sample_ticks) : drive_(drive) {
-    // windows of the trace and of the drive's own samples are the same ticks
+  Traces(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot, Recording& recording)
+      : drive_(drive) {
+    const Identity id = drive.ReadIdentity();
+    if (drive.line()) load_ = MeasureLine(drive, id.map_minor >= 4);
     TraceRequest request;
-    request.decimation = static_cast<std::uint16_t>(o.decimation > 0 ? o.decimation : sample_ticks);
+    recording.packed = o.lean && drive.line() && (id.capabilities & reg::kHasPacked) != 0;
+    request.channels = recording.packed ? controller::kRawPacked
+                       : o.lean         ? controller::kRawMotion | controller::kRawFlags
+                                        : controller::kRawAll;
+    recording.wanted_decimation = o.decimation > 0 ? o.decimation : robot.sample_ticks;
+    const int n = robot.joints(), words = recording.packed ? 2 * n + (n + 1) / 2 + 1 : o.lean ? 5 * n : 11 * n;
+    recording.decimation =
+        drive.line() ? Fitting(o, robot, words, recording.wanted_decimation) : recording.wanted_decimation;
+    request.decimation = static_cast<std::uint16_t>(recording.decimation);
+    // windows of the trace and of the drive's own samples are the same ticks
+    const auto sample_ticks = static_cast<std::uint32_t>(robot.sample_ticks);
     request.start_tick = (drive.ReadStatus().tick / sample_ticks + 2) * sample_ticks;
-    request.channels = o.lean ? controller::kRawMotion | controller::kRawFlags : controller::kRawAll;
+    const auto taking = [&](int record_words) {
+      return load_ && load_->WindowPays(record_words) ? Taking::kWindow : Taking::kPages;
+    };
     StartTrace(drive, 0, request);
-    reader_.emplace(drive, 0);
+    reader_.emplace(drive, 0, Gaps::kAllow, taking(words));
     if (o.samples.empty()) return;
     TraceRequest all;
     all.channels = controller::kSampleAll;
     StartTrace(drive, 1, all);
-    sample_reader_.emplace(drive, 1);
+    sample_reader_.emplace(drive, 1, Gaps::kAllow, taking(n * controller::kSampleWordsPerJoint));
   }
   // How many records came; a moment's rest for the drive if none waited.
   std::size_t Take(Recording& to) {
@@ -112,9 +128,46 @@ class Traces {
   }
 
  private:
+  // The decimation that the line can carry; it says so if that is not the one that was wanted.
+  int Fitting(const RecordOptions& o, const codegen::Robot& robot, int words, int wanted) {
+    const int n = robot.joints();
+    const LineLoad& line = *load_;
+    const double sample_share = o.samples.empty() ? 0
+                                                  : line.SecondsOf(n * controller::kSampleWordsPerJoint) *
+                                                        robot.tick_rate_Hz / robot.sample_ticks;
+    const int fits = line.Decimation(words, wanted, robot.sample_ticks, robot.tick_rate_Hz, sample_share);
+    if (fits == 0)
+      throw io::InputError(fmt::format(
+          "{}: {} baud with a turnaround of {:.0f} ms carries no recording{}; take a faster line", drive_.name(),
+          drive_.line()->baud, 1e3 * line.turnaround_s, o.samples.empty() ? "" : " with --samples"));
+    if (fits != wanted)
+      fmt::print(
+          "{}: {} baud with a turnaround of {:.0f} ms cannot carry {:.0f} records of {} registers a second; "
+          "{} ticks are averaged into one record instead of {}{}\n",
+          drive_.name(), drive_.line()->baud, 1e3 * line.turnaround_s, robot.tick_rate_Hz / wanted, words, fits, wanted,
+          o.lean ? "" : " (--lean needs less)");
+    return fits;
+  }
+
   DriveClient& drive_;
+  std::optional<LineLoad> load_;  // of a serial line
   std::optional<TraceReader> reader_, sample_reader_;
 };
+
+// The part of a recording that is whole: the longest run of ticks without a gap.
+void KeepLongestRun(TraceRecords& r) {
+  std::size_t best = 0, best_count = 0;
+  for (std::size_t first = 0, k = 1; k <= r.count(); ++k)
+    if (k == r.count() || r.ticks[k] - r.ticks[k - 1] != r.tick_step) {
+      if (k - first > best_count) best = first, best_count = k - first;
+      first = k;
+    }
+  const auto cut = [&](auto& list, std::size_t each) {
+    list.erase(list.begin() + static_cast<std::ptrdiff_t>((best + best_count) * each), list.end());
+    list.erase(list.begin(), list.begin() + static_cast<std::ptrdiff_t>(best * each));
+  };
+  cut(r.ticks, 1), cut(r.generations, 1), cut(r.words, r.record_words);
+}
 
 // The drive plays the trajectory.
 Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
@@ -123,11 +176,11 @@ Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot&
   drive.WriteSingle(kPlayerSpeed, static_cast<std::uint16_t>(o.speed_percent));
   drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kEnable));
   WaitFor(drive, "axes enabled", [&] { return ReadPlayer(drive).state != PlayerState::kDisabled; });
-  Traces traces(drive, o, robot.sample_ticks);
-  drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kStart));
   Recording recording;
-  Player player;
-  {
+  Traces traces(drive, o, robot, recording);
+  drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kStart));
+  Player player{};
+  try {
     report::Progress progress("record");
     // A drive in virtual time stands still soon after the motion, and then there are no more records. The tick of a
     // real drive goes on: what comes half a second later belongs to no motion.
@@ -150,6 +203,11 @@ Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot&
       const bool all_came = over(recording.raw) && (o.samples.empty() || over(recording.samples));
       done = ended && (quiet == 10 || all_came || player.state == PlayerState::kStopped);
     }
+  } catch (const LinkError& error) {
+    if (player.state != PlayerState::kPlaying || recording.raw.ticks.empty()) throw;
+    recording.cut = error.what();
+    recording.played = {player.first_tick, recording.raw.ticks.back() + recording.raw.tick_step - 1};
+    return recording;
   }
   traces.Stop();
   drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kDisable));
@@ -163,20 +221,26 @@ Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot&
 // The drive goes on with its work.
 Recording Watch(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
   using Clock = std::chrono::steady_clock;
-  Traces traces(drive, o, robot.sample_ticks);
   Recording recording;
+  Traces traces(drive, o, robot, recording);
   TraceRecords& raw = recording.raw;
   report::Progress progress("record");
   Clock::time_point last = Clock::now();
-  for (double seconds = 0; seconds < o.seconds;) {
-    if (traces.Take(recording) > 0) last = Clock::now();
-    if (Clock::now() - last > std::chrono::seconds(10))
-      throw LinkError(drive.name() + ": not a record for ten seconds: its tick stands still");
-    if (raw.ticks.empty()) continue;
-    seconds = (raw.ticks.back() - raw.ticks.front()) / robot.tick_rate_Hz;
-    progress.Set(std::min(1.0, seconds / o.seconds));
+  try {
+    for (double seconds = 0; seconds < o.seconds;) {
+      if (o.interrupted != nullptr && *o.interrupted) throw LinkError("interrupted");
+      if (traces.Take(recording) > 0) last = Clock::now();
+      if (Clock::now() - last > std::chrono::seconds(10))
+        throw LinkError(drive.name() + ": not a record for ten seconds: its tick stands still");
+      if (raw.ticks.empty()) continue;
+      seconds = (raw.ticks.back() - raw.ticks.front()) / robot.tick_rate_Hz;
+      progress.Set(std::min(1.0, seconds / o.seconds));
+    }
+    traces.Stop();
+  } catch (const LinkError& error) {
+    if (raw.ticks.empty()) throw;
+    recording.cut = error.what();
   }
-  traces.Stop();
   recording.played = {raw.ticks.front(), raw.ticks.back() + raw.tick_step - 1};
   return recording;
 }
@@ -209,11 +273,19 @@ void CheckDrive(DriveClient& drive, const RecordOptions& o, const codegen::Robot
 Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
   CheckDrive(drive, o, robot);
   Recording recording = o.trajectory.empty() ? Watch(drive, o, robot) : Play(drive, o, robot);
-  const std::uint32_t lost = recording.raw.lost + recording.samples.lost;
-  if (lost > 0)
-    throw LinkError(
-        fmt::format("{}: the drive lost {} trace records because the link was too slow; nothing is glued over a gap",
-                    drive.name(), lost));
+  recording.failed_attempts = drive.failed_attempts();
+  if (const std::uint32_t lost = recording.raw.lost + recording.samples.lost; lost > 0 && recording.cut.empty())
+    recording.cut =
+        fmt::format("{}: the drive lost {} trace records because the link was too slow", drive.name(), lost);
+  if (!recording.cut.empty()) {  // nothing is glued over a gap
+    KeepLongestRun(recording.raw), KeepLongestRun(recording.samples);
+    if (recording.raw.count() < logs::kMinSamples) throw LinkError(recording.cut + "; nothing is kept");
+  }
+  if (recording.packed) {
+    Unpacked plain = Unpack(recording.raw, robot.joints());
+    recording.raw = std::move(plain.records);
+    recording.unknown = plain.unknown;
+  }
   return recording;
 }
 

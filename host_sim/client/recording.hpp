@@ -1,6 +1,7 @@
 // client - records the traces of a drive, which plays a trajectory or does its own work, and makes logs of them.
 #pragma once
 
+#include <atomic>
 #include <string>
 
 #include "codegen/src/robot/robot.hpp"
@@ -20,16 +21,23 @@ struct RecordOptions {
   double seconds = 0;
   int speed_percent = 100, decimation = 0;
   bool lean = false;
+  const std::atomic<bool>* interrupted = nullptr;  // ends a recording of --seconds early, as a partial one
 };
 
 struct Recording {
   TraceRecords raw, samples;
-  PlayedTicks played;  // what belongs into the log
+  PlayedTicks played;       // what belongs into the log
+  std::string cut;          // why the recording ended early; empty: it is whole
+  bool packed = false;      // the drive's packed records were taken
+  std::size_t unknown = 0;  // of those: positions that could not be told
+  int decimation = 0, wanted_decimation = 0;
+  int failed_attempts = 0;  // requests that had to be repeated
 };
 
-// The trajectory if there is one, else so many seconds. Throws io::InputError (another robot, a bad trajectory),
-// RefusedError (the drive serves no trace or plays none; the motion was stopped), LinkError (records
-// were lost).
+// The trajectory if there is one, else so many seconds. On a serial line that cannot carry the records, it says so
+// before the recording begins, and takes a larger decimation. What came before the link broke or records were lost is
+// kept if it makes a log: then `cut` says why. Throws io::InputError (another robot, a bad trajectory, a line too slow
+// for any decimation), RefusedError (the drive serves no trace or plays none; the motion was stopped), LinkError.
 Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot);
 
 // Trace 0, with motion and flags and whatever else its channels hold. Records whose whole window lies inside the played

@@ -80,6 +80,8 @@ StatusText TextOf(Status status) {
       return {"Clamped", "a value was cut to its limit"};
     case Status::kHeld:
       return {"Held", "the last good value is kept"};
+    case Status::kUnfinished:  // it never leaves the firmware
+      break;
   }
   return {nullptr, nullptr};
 }
@@ -94,16 +96,24 @@ const char* AccessName(link::Access access) {
 
 const char* KindName(RegisterKind kind) { return kind == RegisterKind::kInput ? "input" : "holding"; }
 
+// What may be written; empty if nothing may.
+std::string RangeText(const Register& r) {
+  if (r.access == link::Access::kRead) return "";
+  if (r.range.given) return fmt::format("{:.0f} to {:.0f}", r.range.low, r.range.high);
+  return r.type == link::RegisterType::kF32 ? "finite" : "any";
+}
+
 std::string KindMarkdown(RegisterKind kind, int function, int base) {
   std::string text = fmt::format(
-      "### {} registers (function {})\n\n| dec | hex | number | count | type | access | name | unit | meaning |\n"
-      "|---|---|---|---|---|---|---|---|---|\n",
+      "### {} registers (function {})\n\n| dec | hex | number | count | type | access | name | unit | meaning | range "
+      "|\n"
+      "|---|---|---|---|---|---|---|---|---|---|\n",
       kind == RegisterKind::kInput ? "Input" : "Holding", function, base);
   for (const Register& r : link::kRegisters)
     if (r.kind == kind)
-      text +=
-          fmt::format("| {} | 0x{:04X} | {} | {} | {} | {} | {} | {} | {} |\n", r.address, r.address,
-                      base + 1 + r.address, r.count, TypeName(r.type), AccessName(r.access), r.name, r.unit, r.meaning);
+      text += fmt::format("| {} | 0x{:04X} | {} | {} | {} | {} | {} | {} | {} | {} |\n", r.address, r.address,
+                          base + 1 + r.address, r.count, TypeName(r.type), AccessName(r.access), r.name, r.unit,
+                          r.meaning, RangeText(r));
   return text;
 }
 
@@ -129,10 +139,10 @@ std::string StatusMarkdown() {
 }
 
 std::string RegisterCsv() {
-  std::string text = "kind,address,count,type,access,name,unit\n";
+  std::string text = "kind,address,count,type,access,name,unit,range\n";
   for (const Register& r : link::kRegisters)
-    text += fmt::format("{},{},{},{},{},{},{}\n", KindName(r.kind), r.address, r.count, TypeName(r.type),
-                        AccessName(r.access), r.name, r.unit);
+    text += fmt::format("{},{},{},{},{},{},{},{}\n", KindName(r.kind), r.address, r.count, TypeName(r.type),
+                        AccessName(r.access), r.name, r.unit, RangeText(r));
   return text;
 }
 
@@ -142,7 +152,7 @@ std::string RegisterJson() {
   json["map_minor"] = link::reg::kMapMinorValue;
   json["layout_crc"] = link::kLayoutCrc;
   json["word_order"] = "big";
-  for (const Register& r : link::kRegisters)
+  for (const Register& r : link::kRegisters) {
     json["items"].push_back({{"name", r.name},
                              {"kind", KindName(r.kind)},
                              {"address", r.address},
@@ -150,7 +160,10 @@ std::string RegisterJson() {
                              {"type", TypeName(r.type)},
                              {"access", AccessName(r.access)},
                              {"unit", r.unit},
-                             {"meaning", r.meaning}});
+                             {"meaning", r.meaning},
+                             {"range", RangeText(r)}});
+    if (r.range.given) json["items"].back()["low"] = r.range.low, json["items"].back()["high"] = r.range.high;
+  }
   return json.dump(2) + "\n";
 }
 

@@ -37,23 +37,34 @@ struct TraceRecords {
 // trace: 0 raw samples, 1 processed samples. Drops what the drive had recorded before.
 void StartTrace(DriveClient& drive, int trace, const TraceRequest& request);
 
+// How pages are taken. kWindow: by one request of function 23 that acknowledges and reads, for a slow line and a drive
+// of map version 1.4; a record has at most link::reg::kWindowWords registers.
+enum class Taking { kPages, kWindow };
+
 // Reads the pages of one recording in order.
 class TraceReader {
  public:
-  TraceReader(DriveClient& drive, int trace, Gaps gaps = Gaps::kAllow);
+  TraceReader(DriveClient& drive, int trace, Gaps gaps = Gaps::kAllow, Taking taking = Taking::kPages);
 
-  // Takes one page, appends it to `records` and releases it on the drive. Returns the number of records, 0 if there is
-  // none now. It also refreshes `records.lost` and `.state`. Throws LinkError if another client has started the trace
-  // anew meanwhile, and, with Gaps::kRefuse, if ticks are missing between two records.
+  // Takes one page or window, appends it to `records` and releases it on the drive. Returns the number of records, 0 if
+  // there is none now. It also refreshes `records.lost` and `.state`. Throws LinkError if another client has started
+  // the trace anew meanwhile, and, with Gaps::kRefuse, if ticks are missing between two records.
   std::size_t TakePage(TraceRecords& records);
 
   // Takes pages until the recording is done and nothing is left. For one-shot recordings and streams with a limit.
   TraceRecords TakeAll();
 
  private:
+  std::size_t TakeWindow(TraceRecords& records);
+  bool IsNext(const TraceRecords& records, std::uint16_t recording, std::uint32_t first, std::uint32_t first_tick,
+              std::uint16_t count) const;
+  void Append(TraceRecords& records, std::uint32_t first_tick, std::uint16_t count, std::uint16_t generation,
+              const std::uint16_t* data) const;
+
   DriveClient& drive_;
   int trace_;
   Gaps gaps_;
+  Taking taking_;
   std::uint32_t next_ = 0;
   std::uint16_t recording_ = 0;  // its number
 };

@@ -98,29 +98,6 @@ int Verify(const FlashOptions& o) {
   return same ? kOk : kMismatch;
 }
 
-// Runs a verb. If it fails, the JSON says so: what went wrong, and the exit code that main() makes of it.
-int Reported(const FlashOptions& o, int (*verb)(const FlashOptions&)) {
-  const auto failed = [&](const std::exception& e, int code, const char* what) {
-    WriteJson(o.json, {{what, false}, {"error", e.what()}, {"exit_code", code}});
-  };
-  const char* const what = verb == Flash ? "readback_ok" : "same";
-  try {
-    return verb(o);
-  } catch (const client::LinkError& e) {
-    failed(e, kLink, what);
-    throw;
-  } catch (const client::RefusedError& e) {
-    failed(e, kRefused, what);
-    throw;
-  } catch (const client::VerifyError& e) {
-    failed(e, kMismatch, what);
-    throw;
-  } catch (const std::exception& e) {
-    failed(e, kBadInput, what);
-    throw;
-  }
-}
-
 CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std::shared_ptr<FlashOptions>& o) {
   auto* verb = app.add_subcommand(name, help);
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
@@ -140,7 +117,9 @@ void AddFlash(CLI::App& app, Action& action) {
                          "--connect 127.0.0.1:1502 --robot er20_like --table build/table.toml",
                          o);
   verb->add_flag("--dry-run", o->dry_run, "check and say what would be sent");
-  verb->callback([o, &action] { action = [o] { return Reported(*o, Flash); }; });
+  verb->callback([o, &action] {
+    action = [o] { return Reported(o->json, [&] { return Flash(*o); }, {{"readback_ok", false}}); };
+  });
 }
 
 void AddVerify(CLI::App& app, Action& action) {
@@ -149,7 +128,9 @@ void AddVerify(CLI::App& app, Action& action) {
                          "compare the table in force with a file\nexample: armcal verify --connect 127.0.0.1:1502 "
                          "--robot er20_like --table build/table.toml",
                          o);
-  verb->callback([o, &action] { action = [o] { return Reported(*o, Verify); }; });
+  verb->callback([o, &action] {
+    action = [o] { return Reported(o->json, [&] { return Verify(*o); }, {{"same", false}}); };
+  });
 }
 
 }  // namespace armcal::tool

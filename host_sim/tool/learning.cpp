@@ -2,8 +2,11 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <optional>
+
 #include "armcal/link/registers.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/writer_seat.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -51,7 +54,8 @@ int RunLearning(const LearningOptions& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   const client::Identity id = drive.ReadIdentity();
   const std::uint16_t block = BlockOf(o.reset, id.axes);
-  if (block != 0 || o.hold || o.resume) drive.WriteValue<reg::kUnlock>(reg::kUnlockKey);
+  std::optional<client::WriterSeat> seat;
+  if (block != 0 || o.hold || o.resume) seat.emplace(drive);
   if (o.hold || o.resume) drive.WriteValue<reg::kLearningHold>(o.hold ? 1 : 0);
   if (block != 0) drive.WriteValue<reg::kLearningReset>(block);
   Report(drive, id, o);

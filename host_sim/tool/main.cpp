@@ -1,23 +1,22 @@
 // tool - reads the command line, runs one verb, and turns every failure into one line and an exit code.
+#include <fmt/core.h>
+
 #include <cstdio>
 #include <exception>
 
-#include "codegen/src/io/input_error.hpp"
+#include "armcal/core/version.hpp"
 #include "host_sim/client/errors.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
 namespace {
 
-int Fail(const std::exception& e, int code) {
-  std::fprintf(stderr, "armcal: %s\n", e.what());
-  return code;
-}
-
 int Main(int argc, char** argv) {
   CLI::App app{
       "armcal: estimate the dynamic parameters of an arm, find what its model lacks, flash the table that mends it"};
   app.require_subcommand(1);
+  app.set_version_flag("--version", fmt::format("armcal {}.{}.{}", ARMCAL_VERSION >> 16, ARMCAL_VERSION >> 8 & 0xff,
+                                                ARMCAL_VERSION & 0xff));
   Action action;
   AddSimulate(app, action);
   AddExcite(app, action);
@@ -34,6 +33,7 @@ int Main(int argc, char** argv) {
   AddVerify(app, action);
   AddHealth(app, action);
   AddLearning(app, action);
+  AddDevice(app, action);
   AddDemo(app, action);
   AddBench(app, action);
   AddSurvey(app, action);
@@ -42,20 +42,21 @@ int Main(int argc, char** argv) {
     return action();
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kOk : kBadInput;
-  } catch (const io::InputError& e) {
-    return Fail(e, kBadInput);
-  } catch (const client::LinkError& e) {
-    return Fail(e, kLink);
-  } catch (const client::RefusedError& e) {
-    return Fail(e, kRefused);
-  } catch (const client::VerifyError& e) {
-    return Fail(e, kMismatch);
   } catch (const std::exception& e) {
-    return Fail(e, kBadInput);
+    std::fprintf(stderr, "armcal: %s\n", e.what());
+    return ExitCodeOf(e);
   }
 }
 
 }  // namespace
+
+int ExitCodeOf(const std::exception& error) {
+  if (dynamic_cast<const client::LinkError*>(&error) != nullptr) return kLink;
+  if (dynamic_cast<const client::RefusedError*>(&error) != nullptr) return kRefused;
+  if (dynamic_cast<const client::VerifyError*>(&error) != nullptr) return kMismatch;
+  return kBadInput;
+}
+
 }  // namespace armcal::tool
 
 int main(int argc, char** argv) { return armcal::tool::Main(argc, argv); }

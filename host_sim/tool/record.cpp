@@ -7,6 +7,7 @@
 #include "host_sim/data/logs/log.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/tool/connect.hpp"
+#include "host_sim/tool/interrupt.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -33,20 +34,40 @@ VectorXd RmsOf(const logs::Log& log, Value value, Use use) {
 
 std::vector<double> List(const VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
+// "work.csv.gz" gives "work.partial.csv.gz", so that nobody takes it for a whole recording.
+std::string PartialPath(const std::string& path) {
+  const auto name = path.rfind('/') == std::string::npos ? 0 : path.rfind('/') + 1;
+  const auto dot = path.find('.', name);
+  return path.empty() || dot == std::string::npos ? path : path.substr(0, dot) + ".partial" + path.substr(dot);
+}
+
 int RunRecord(const client::RecordOptions& o) {
   const codegen::Robot robot = codegen::ReadRobot(RobotPath(o.robot));
   const int n = robot.joints();
   if (o.trajectory.empty() == (o.seconds == 0)) throw io::InputError("record: expected --trajectory or --seconds");
   client::DriveClient drive = ConnectTo(o.connect);
-  const client::Recording recording = Record(drive, o, robot);
+  const InterruptGuard guard;
+  client::RecordOptions options = o;
+  options.interrupted = &InterruptGuard::interrupted();
+  const client::Recording recording = Record(drive, options, robot);
+  const bool partial = !recording.cut.empty();
+  const std::string out = partial ? PartialPath(o.out) : o.out,
+                    samples_out = partial ? PartialPath(o.samples) : o.samples;
   const client::TraceRecords &raw = recording.raw, &samples = recording.samples;
   const client::PlayedTicks& played_ticks = recording.played;
 
   std::uint32_t first_tick = 0;
   const logs::Log log = client::RawLog(raw, robot, played_ticks, first_tick);
-  logs::WriteLog(o.out, log);
-  nlohmann::ordered_json json{
-      {"log", o.out}, {"first_tick", first_tick}, {"decimation", raw.tick_step}, {"samples", log.samples()}};
+  logs::WriteLog(out, log);
+  nlohmann::ordered_json json{{"log", out},
+                              {"first_tick", first_tick},
+                              {"decimation", raw.tick_step},
+                              {"samples", log.samples()},
+                              {"partial", partial},
+                              {"wanted_decimation", recording.wanted_decimation},
+                              {"packed", recording.packed},
+                              {"positions_not_told", recording.unknown},
+                              {"repeated_requests", recording.failed_attempts}};
   report::Table table{{"joint", "moving / %"}, {}};
   VectorXd tracking;
   if (log.qref.size() > 0) {
@@ -59,7 +80,7 @@ int RunRecord(const client::RecordOptions& o) {
   const auto v_min = [&](int j) { return robot.joint[j].v_min_radps; };
   VectorXd residual;
   if (!o.samples.empty()) {
-    logs::WriteLog(o.samples, client::SampleLog(samples, robot, played_ticks, true));
+    logs::WriteLog(samples_out, client::SampleLog(samples, robot, played_ticks, true));
     const logs::Log played = client::SampleLog(samples, robot, played_ticks, false);
     residual = RmsOf(
         played, [&](Eigen::Index k, int j) { return played.tau(k, j) - played.tauff(k, j); },
@@ -77,10 +98,21 @@ int RunRecord(const client::RecordOptions& o) {
     if (tracking.size() > 0) table.rows.back().push_back(fmt::format("{:.3f}", 1e3 * tracking[j]));
     if (residual.size() > 0) table.rows.back().push_back(fmt::format("{:.3f}", residual[j]));
   }
-  fmt::print("{}: {} samples, {:.1f} s, none lost\n{}", o.out, log.samples(), log.t[log.samples() - 1],
-             report::Text(table));
+  fmt::print("{}: {} samples, {:.1f} s, {}\n{}", out, log.samples(), log.t[log.samples() - 1],
+             partial ? "a part of the recording" : "none lost", report::Text(table));
+  if (recording.unknown > 0)
+    fmt::print(
+        "{} positions of packed records could not be told and are marked stale: the arm moved too fast for them\n",
+        recording.unknown);
+  if (!partial) {
+    WriteJson(o.json, json);
+    return kOk;
+  }
+  json["error"] = recording.cut;
+  json["exit_code"] = static_cast<int>(kPartial);
   WriteJson(o.json, json);
-  return kOk;
+  fmt::print(stderr, "armcal: {}; what came before is in {}\n", recording.cut, out);
+  return kPartial;
 }
 
 }  // namespace
@@ -97,7 +129,7 @@ void AddRecord(CLI::App& app, Action& action) {
   verb->add_option("--robot", o->robot, "robot file or name")->required();
   verb->add_option("--trajectory", o->trajectory, "trajectory of armcal excite, for a drive that plays it");
   verb->add_option("--seconds", o->seconds, "instead: so long, whatever the arm does")->check(CLI::Range(1.0, 86400.0));
-  verb->add_flag("--lean", o->lean, "position, current and flags only: half the words, for a serial line");
+  verb->add_flag("--lean", o->lean, "position, current and flags only, for a serial line; packed if the drive can");
   verb->add_option("--out", o->out, "log to write (.csv or .csv.gz)")->required();
   verb->add_option("--samples", o->samples,
                    "also write the drive's processed samples, with the committed model's torque as tauff");
@@ -108,7 +140,7 @@ void AddRecord(CLI::App& app, Action& action) {
                    "ticks averaged into one record (default: the estimator's; 1 keeps gear ripple)")
       ->check(CLI::Range(1, 16));
   verb->add_option("--json", o->json, "write the figures here");
-  verb->callback([o, &action] { action = [o] { return RunRecord(*o); }; });
+  verb->callback([o, &action] { action = [o] { return Reported(o->json, [&] { return RunRecord(*o); }); }; });
 }
 
 }  // namespace armcal::tool

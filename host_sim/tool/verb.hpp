@@ -35,6 +35,7 @@ void AddVerify(CLI::App& app, Action& action);
 void AddHealth(CLI::App& app, Action& action);
 void AddLearning(CLI::App& app, Action& action);
 void AddDemo(CLI::App& app, Action& action);
+void AddDevice(CLI::App& app, Action& action);  // info, get, set, watch, scan, map, backup, restore, diff
 void AddBench(CLI::App& app, Action& action);
 void AddSurvey(CLI::App& app, Action& action);
 
@@ -46,6 +47,25 @@ using codegen::RobotPath;
 // Writes j to `path` if it is not empty; whole or not at all.
 inline void WriteJson(const std::string& path, const nlohmann::ordered_json& j) {
   if (!path.empty()) files::WriteWholeFile(path, j.dump(1) + "\n");
+}
+
+// The exit code that main() makes of an exception.
+int ExitCodeOf(const std::exception& error);
+
+// Runs a verb's work. If it fails, the JSON says so, with whatever `said` holds by then: what went wrong, and the exit
+// code.
+template <class Work>
+int Reported(const std::string& path, Work work,
+             const nlohmann::ordered_json& said = nlohmann::ordered_json::object()) {
+  try {
+    return work();
+  } catch (const std::exception& error) {
+    nlohmann::ordered_json json = said;
+    json["error"] = error.what();
+    json["exit_code"] = ExitCodeOf(error);
+    WriteJson(path, json);
+    throw;
+  }
 }
 
 // A scenario file by its path, or by its name in host_sim/scenarios. Throws io::InputError if there is none.

@@ -76,12 +76,12 @@ Status TcpServer::Poll(int timeout_ms) {
     // A socket with an unsent reply is only written to, so a client that does not read cannot pile up requests here.
     const short wanted = slots_[i].out.empty() ? POLLIN : POLLOUT;
     watched[1 + i] = {slots_[i].socket, wanted, 0};
+    if (Asked(i)) timeout_ms = 0;
   }
-  if (::poll(watched, 1 + kSlots, timeout_ms) > 0) {
-    for (int i = 0; i < kSlots; ++i)
-      if (slots_[i].socket >= 0 && watched[1 + i].revents != 0) Serve(i);
-    if (watched[0].revents != 0) Accept();
-  }
+  const bool some = ::poll(watched, 1 + kSlots, timeout_ms) > 0;
+  for (int i = 0; i < kSlots; ++i)
+    if (slots_[i].socket >= 0 && ((some && watched[1 + i].revents != 0) || Asked(i))) Serve(i);
+  if (some && watched[0].revents != 0) Accept();
   for (Slot& slot : slots_) CloseLate(slot);
   return Status::kOk;
 }
@@ -142,7 +142,7 @@ void TcpServer::Serve(int index) {
   if (!Send(slot)) return Close(slot);
   if (slot.out.empty() && slot.in.empty()) Receive(slot);
   if (!Answer(index)) return Close(slot);
-  if (slot.leaving && slot.in.empty() && slot.out.empty()) Close(slot);
+  if (slot.leaving && slot.in.empty() && slot.out.empty() && !Asked(index)) Close(slot);
 }
 
 void TcpServer::Receive(Slot& slot) {
@@ -160,7 +160,7 @@ void TcpServer::Receive(Slot& slot) {
 bool TcpServer::Answer(int index) {
   Slot& slot = slots_[index];
   std::size_t taken = 0;
-  while (taken < slot.in.size() && slot.out.empty()) {
+  for (bool asked = Asked(index); (asked || taken < slot.in.size()) && slot.out.empty();) {
     std::size_t used = 0;
     std::size_t reply_bytes = 0;
     slot.out.resize(service_.max_reply);
@@ -172,6 +172,8 @@ bool TcpServer::Answer(int index) {
     if (mid_frame && !(slot.mid_frame && reply_bytes == 0)) slot.frame_ms = clock_.Ms();
     slot.mid_frame = mid_frame;
     if (!sound || !Send(slot)) return false;
+    asked = false;
+    if (Asked(index)) break;
   }
   slot.in.erase(slot.in.begin(), slot.in.begin() + static_cast<std::ptrdiff_t>(taken));
   return true;

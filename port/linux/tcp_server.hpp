@@ -13,7 +13,8 @@ namespace armcal::port_linux {
 
 // The service. `receive` takes at most one request out of `bytes`, says in `used` how many bytes it took, and puts the
 // reply into `reply` [max_reply]. It answers false if the connection should be closed. `close`: the slot's connection
-// is gone. `keep`: the slot's connection should not make room for another one.
+// is gone. `keep`: the slot's connection should not make room for another one. `asked`: the answer to the slot's last
+// request is not ready; `receive` is then called in every Poll, with no bytes if there are none.
 struct ByteService {
   void* context;
   std::size_t max_reply;
@@ -23,6 +24,7 @@ struct ByteService {
   bool (*mid_frame)(void* context, int slot);
   void (*close)(void* context, int slot) = nullptr;
   bool (*keep)(void* context, int slot) = nullptr;
+  bool (*asked)(void* context, int slot) = nullptr;
 };
 
 struct TcpLimits {
@@ -73,6 +75,7 @@ class TcpServer {
   int MakeRoom(std::uint32_t address);
   void Serve(int slot);
   void Receive(Slot& slot);
+  bool Asked(int index) const { return service_.asked != nullptr && service_.asked(service_.context, index); }
   bool Answer(int index);
   bool Send(Slot& slot);
   void Close(Slot& slot);

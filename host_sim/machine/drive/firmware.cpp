@@ -1,20 +1,23 @@
-// drive - lib's controller for one model, behind Modbus TCP. Compiled once for each model, linked in or loaded.
+// drive - lib's controller for one model, behind Modbus TCP and RTU. Compiled once for each model, linked in or loaded.
 #include "host_sim/machine/drive/firmware.hpp"
 
 #include <atomic>
 #include <memory>
+#include <optional>
 
 #include <selected_model.hpp>
 #include "armcal/controller/controller.hpp"
 #include "armcal/controller/trace_records.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
+#include "armcal/link/rtu.hpp"
 #include "armcal/link/tcp.hpp"
 #include "armcal/link/trace.hpp"
 #include "host_sim/machine/drive/vendor_block.hpp"
 #include "port/linux/file_storage.hpp"
 #include "port/linux/steady_clock.hpp"
 #include "port/linux/tcp_server.hpp"
+#include "port/linux/tty_serial.hpp"
 
 namespace armcal::drive {
 namespace {
@@ -28,9 +31,8 @@ class Compiled final : public Firmware {
       : storage_(2, kSectorBytes, 8),
         controller_(storage_.storage(), port_linux::SteadyClock(tick_), Identity(), Rules()),
         service_(controller_.engine()),
-        server_({&service_, Service::kMaxReply, &Service::Open, &Service::Receive, &Service::MidFrame, &Service::Close,
-                 &Service::Keep},
-                port_linux::SteadyClock(tick_)) {}
+        read_service_(controller_.engine(), link::Rights::kRead),
+        server_(Bytes(service_), port_linux::SteadyClock(tick_)) {}
 
   const char* name() const override { return Model::kName; }
   std::uint32_t schema() const override { return Model::kSchema; }
@@ -40,7 +42,7 @@ class Compiled final : public Firmware {
     return {static_cast<double>(axis.counts_to_rad), axis.zero_counts, static_cast<double>(axis.lsb_to_Nm)};
   }
 
-  std::string Start(const std::string& storage, const std::string& address, int port, PlayedMotion& motion) override {
+  std::string Start(const std::string& storage, const Access& access, PlayedMotion& motion) override {
     if (!core::IsOk(storage_.Open(storage))) return storage + ": expected a file that can be written";
     vendor_ = std::make_unique<VendorBlock>(motion, n);
     if (!core::IsOk(controller_.Record(raw_trace_)) || !core::IsOk(sample_trace_.Serve(controller_.map(), 1)) ||
@@ -48,10 +50,19 @@ class Compiled final : public Firmware {
       return "drive: a block of registers does not fit the map";
     controller_.template estimator<0>().SetObserver(&OnSample, this);
     (void)controller_.Boot();  // its answer is served as table_status
-    if (!core::IsOk(server_.Listen(address, static_cast<std::uint16_t>(port)))) return server_.error();
+    if (!access.serial.empty()) {
+      if (!core::IsOk(line_.Open(access.serial))) return access.serial + ": expected a terminal that can be opened";
+      modbus_.emplace(controller_.engine(), line_.serial(), port_linux::SteadyClock(tick_), kAddress, kSilence_ms);
+    }
+    if (!core::IsOk(server_.Listen(access.address, static_cast<std::uint16_t>(access.port)))) return server_.error();
+    if (access.read_address.empty()) return "";
+    reader_.emplace(Bytes(read_service_), port_linux::SteadyClock(tick_));
+    if (!core::IsOk(reader_->Listen(access.read_address, static_cast<std::uint16_t>(access.read_port))))
+      return reader_->error();
     return "";
   }
   int port() const override { return server_.port(); }
+  int read_port() const override { return reader_ ? reader_->port() : 0; }
 
   bool Work(bool wait) override {
     bool busy = false;
@@ -63,7 +74,11 @@ class Compiled final : public Firmware {
     }
     return busy;
   }
-  void Serve(int timeout_ms) override { (void)server_.Poll(timeout_ms); }  // an error here is one connection's
+  void Serve(int timeout_ms) override {
+    (void)server_.Poll(timeout_ms);  // an error here is one connection's
+    if (reader_) (void)reader_->Poll(0);
+    if (modbus_) modbus_->Poll();
+  }
   void Publish() override {
     if (read_out_at_ == samples_seen_) return;
     read_out_at_ = samples_seen_;
@@ -112,10 +127,16 @@ class Compiled final : public Firmware {
 
  private:
   static constexpr std::uint32_t kSectorBytes = 16384;
-  static constexpr int kSlices = 200;           // of lib's work between two looks at the sockets
-  static constexpr std::uint32_t kBacklog = 8;  // samples that may wait before virtual time does
+  static constexpr int kSlices = 200;  // of lib's work between two looks at the sockets
+  static constexpr std::uint8_t kAddress = 1;
+  static constexpr std::uint32_t kSilence_ms = 20;  // a pseudo-terminal keeps no pauses
+  static constexpr std::uint32_t kBacklog = 8;      // samples that may wait before virtual time does
   using Service = link::TcpService<port_linux::TcpServer::kSlots>;
 
+  static port_linux::ByteService Bytes(Service& service) {
+    return {&service,           Service::kMaxReply, &Service::Open, &Service::Receive,
+            &Service::MidFrame, &Service::Close,    &Service::Keep, &Service::Asked};
+  }
   static link::Identity Identity() {
     link::Identity identity;
     identity.firmware_version = 1, identity.serial_number = 1;
@@ -146,8 +167,11 @@ class Compiled final : public Firmware {
   controller::RawTrace<Model> raw_trace_;
   link::TraceRing<> sample_trace_{Model::kSampleTicks, &SampleWords, nullptr};
   std::uint32_t samples_seen_ = 0, read_out_at_ = 0;
-  Service service_;
+  Service service_, read_service_;
   port_linux::TcpServer server_;
+  std::optional<port_linux::TcpServer> reader_;
+  port_linux::TtySerial line_;
+  std::optional<link::RtuService> modbus_;
 };
 
 }  // namespace

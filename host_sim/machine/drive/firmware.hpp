@@ -12,7 +12,7 @@
 
 namespace armcal::drive {
 
-inline constexpr int kFirmwareInterface = 1;
+inline constexpr int kFirmwareInterface = 2;
 
 // What the registers of the player do. Context: background.
 class PlayedMotion {
@@ -46,7 +46,16 @@ struct Reading {
   bool enabled, saturated;
 };
 
-// lib's controller behind Modbus TCP.
+// How the firmware can be reached. Port 0: any free one. serial: a terminal, 115200 baud, address 1; empty: none.
+// read_address, read_port: a second listener that serves reading functions alone; empty: none.
+struct Access {
+  std::string address;
+  int port;
+  std::string serial, read_address;
+  int read_port;
+};
+
+// lib's controller behind Modbus.
 class Firmware {
  public:
   virtual ~Firmware() = default;
@@ -56,13 +65,13 @@ class Firmware {
   virtual int joints() const = 0;
   virtual AxisScale axis(int joint) const = 0;
 
-  // Opens the storage, boots and listens; port 0: any free one. Empty, or what is wrong, as a line. Context:
-  // background, as the next five.
-  virtual std::string Start(const std::string& storage, const std::string& address, int port, PlayedMotion& motion) = 0;
+  // Opens the storage, boots and listens. Empty, or what is wrong, as a line. Context: background, as the next five.
+  virtual std::string Start(const std::string& storage, const Access& access, PlayedMotion& motion) = 0;
   virtual int port() const = 0;
+  virtual int read_port() const = 0;  // 0: none
   // Some slices of lib's work. False: nothing was left to do. With `wait` a streaming reader holds the estimators up.
   virtual bool Work(bool wait) = 0;
-  // Looks at the sockets, for so long at most.
+  // Looks at the sockets and the serial line, for so long at most.
   virtual void Serve(int timeout_ms) = 0;
   // Makes the estimators publish, if samples came since the last time.
   virtual void Publish() = 0;

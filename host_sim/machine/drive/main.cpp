@@ -1,6 +1,8 @@
 // drive - the program of the simulated drive. Its firmware is linked in, or loaded from a shared object.
-//   armcal-drive[-ROBOT] [--firmware FILE] --scenario FILE --robot FILE --storage FILE [--port N] [--truth-log FILE]
-//   armcal-drive-ROBOT --schema    says which model is linked in
+//   armcal-drive[-ROBOT] [--firmware FILE] --scenario FILE --robot FILE --storage FILE [--port N] [--read-port N]
+//     [--serial DEVICE] [--truth-log FILE]
+//   armcal-drive-ROBOT --schema
+//     prints which model is linked in
 #include <dlfcn.h>
 
 #include <csignal>
@@ -44,6 +46,8 @@ int Main(int argc, char** argv) {
     else if (!std::strcmp(argv[i], "--storage")) o.storage = value(i);
     else if (!std::strcmp(argv[i], "--truth-log")) o.truth_log = value(i);
     else if (!std::strcmp(argv[i], "--port")) o.port = std::stoi(value(i));
+    else if (!std::strcmp(argv[i], "--read-port")) o.read_address = o.address, o.read_port = std::stoi(value(i));
+    else if (!std::strcmp(argv[i], "--serial")) o.serial = value(i);
     else if (!std::strcmp(argv[i], "--firmware")) firmware = value(i);
     else if (!std::strcmp(argv[i], "--real-time")) o.real_time = true;
     else if (!std::strcmp(argv[i], "--schema")) schema = true;
@@ -56,8 +60,9 @@ int Main(int argc, char** argv) {
   }
   drive::SimulatedDrive drive(o, std::move(loaded));
   drive.Run(quit, [&](const drive::Firmware& f) {
-    std::printf("drive: %s, schema %08X, listening on %s:%d\n", f.name(), static_cast<unsigned>(f.schema()),
-                o.address.c_str(), f.port());
+    const std::string read = f.read_port() == 0 ? "" : ", reading alone on port " + std::to_string(f.read_port());
+    std::printf("drive: %s, schema %08X%s, listening on %s:%d\n", f.name(), static_cast<unsigned>(f.schema()),
+                read.c_str(), o.address.c_str(), f.port());
     std::fflush(stdout);
   });
   return 0;

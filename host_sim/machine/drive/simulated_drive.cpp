@@ -72,7 +72,9 @@ SimulatedDrive::~SimulatedDrive() {
 }
 
 void SimulatedDrive::Run(const std::atomic<bool>& quit, const std::function<void(const Firmware&)>& on_listen) {
-  const std::string wrong = firmware_->Start(options_.storage, options_.address, options_.port, player_);
+  const std::string wrong = firmware_->Start(
+      options_.storage, {options_.address, options_.port, options_.serial, options_.read_address, options_.read_port},
+      player_);
   if (!wrong.empty()) throw io::InputError(wrong);
   on_listen(*firmware_);
   std::thread tick([&] { TickLoop(quit); });

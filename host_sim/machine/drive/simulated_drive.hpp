@@ -16,8 +16,8 @@
 namespace armcal::drive {
 
 struct DriveOptions {
-  std::string scenario, robot, storage, truth_log, address = "127.0.0.1";
-  int port = 0;
+  std::string scenario, robot, storage, truth_log, serial, address = "127.0.0.1", read_address;
+  int port = 0, read_port = 0;
   bool real_time = false;
 };
 

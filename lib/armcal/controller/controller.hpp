@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "armcal/controller/table_check.hpp"
 #include "armcal/controller/trace_records.hpp"
 #include "armcal/estimator/estimator.hpp"
 #include "armcal/estimator/intake.hpp"
@@ -14,7 +15,6 @@
 #include "armcal/link/device.hpp"
 #include "armcal/link/table_transaction.hpp"
 #include "armcal/link/trace.hpp"
-#include "armcal/model/friction_grid.hpp"
 #include "armcal/table/table_store.hpp"
 
 namespace armcal::controller {
@@ -67,11 +67,12 @@ class Controller {
     const core::Status served = Serve(std::make_index_sequence<kFilters>());
     if (!core::IsOk(served)) return served;
     const core::Status stored = transaction_.Boot();
+    RestartAll();
     if (core::IsOk(stored)) return stored;
-    table_ = estimator::DefaultTable<Model>();
-    const core::Status built = BuildSpare();
+    const core::Status built = check_.BuildDefaults(generation_ + 1, &Suits, Spare());
     if (!core::IsOk(built)) return built;
     PutInForce();
+    RestartAll();
     return stored;
   }
 
@@ -84,7 +85,7 @@ class Controller {
   core::Status Record(RawTrace<Model, kRingWords>& ring) {
     const core::Status served = ring.Serve(device_.map(), 0);
     if (!core::IsOk(served)) return served;
-    device_.Declare(link::reg::kHasRawTrace);
+    device_.Declare(link::reg::kHasRawTrace | link::reg::kHasPacked);
     trace_ = &ring;
     return served;
   }
@@ -114,11 +115,14 @@ class Controller {
     return status;
   }
 
-  // One bounded slice of all work that is not the tick's. False: nothing was left to do. Context: background.
+  // One bounded slice of all work that is not the tick's: of a table, of the restart after it, or of one of the
+  // estimators. False: nothing was left to do. Context: background.
   bool Step() {
+    table_slice_ = false;
     device_.Step(clock_.Ms());
-    bool busy = store_.busy() || transaction_.state() == link::TransactionState::kCommitting;
-    ForEach([&](auto& estimator) { busy |= estimator.Step(); });
+    bool busy = transaction_.busy() || table_slice_;
+    if (restarts_due_ != 0u) busy = RestartNext();
+    else if (!table_slice_) busy |= StepEstimator();
     Show(std::make_index_sequence<kFilters>());
     return busy;
   }
@@ -208,8 +212,12 @@ class Controller {
     if (turn.first) record_.Clear();
     record_.Add(raw, told_q_, told_Nm_);
     if (!turn.last) return;
+    static_assert(RawRecordWords<n>(kRawAll) >= PackedRecordWords<n>());
     std::uint16_t words[RawRecordWords<n>(kRawAll)];
-    record_.Write(trace_->recording().channels, words);
+    const std::uint32_t channels = trace_->recording().channels;
+    if (trace_->pushed() == 0) packed_ = {};
+    if (channels == kRawPacked) record_.WritePacked(packed_, words);
+    else record_.Write(channels, words);
     (void)trace_->Push(words, feed_forward_.generation());
   }
 
@@ -236,23 +244,16 @@ class Controller {
     return status;
   }
 
-  // What link::TableTransaction asks for when a table is flashed. Check decodes and builds the table, once. What it has
-  // built waits in the spare until it is adopted or until another table is checked. Context: background.
-  static core::Refusal Check(void* self, const std::uint16_t* words) {
+  // What link::TableTransaction asks for when a table is flashed. Check decodes and builds the table, once and in
+  // slices. What it has built waits in the spare until it is adopted or until another table is checked. Context:
+  // background.
+  static core::Refusal Check(void* self, const std::uint16_t* words, bool first) {
     auto& c = *static_cast<Controller*>(self);
+    c.table_slice_ = true;
     c.spare_is_checked_ = false;
-    const core::Refusal refusal = c.Judge(words);
+    if (first) c.check_.Begin(words, c.ceilings_, c.rules_.adopt_while_enabled, c.generation_ + 1, &Suits, c.Spare());
+    const core::Refusal refusal = c.check_.Step();
     c.spare_is_checked_ = core::IsOk(refusal.status);
-    return refusal;
-  }
-  core::Refusal Judge(const std::uint16_t* words) {
-    core::Refusal refusal;
-    refusal.status = model::CheckHeading<n, Model::kParameters>(words, Model::kSchema);
-    if (core::IsOk(refusal.status)) refusal = model::CheckWords(ceilings_, rules_.adopt_while_enabled, words);
-    if (core::IsOk(refusal.status)) refusal.status = model::Decode(words, Model::kSchema, table_);
-    if (core::IsOk(refusal.status)) refusal.status = BuildSpare();
-    if (core::IsOk(refusal.status))
-      refusal = model::CheckFriction(Spare().committed, ceilings_, friction_memory_, friction_rows_);
     return refusal;
   }
   static core::Status Permit(void* self) {
@@ -271,22 +272,47 @@ class Controller {
   bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
   // The adopted table that nobody reads: the estimators read the other one, and the feed-forward has a copy.
   estimator::AdoptedTable<Model>& Spare() { return adopted_[1 - in_force_.load(std::memory_order_relaxed)]; }
-  // Answers as BuildAdoptedTable; kOutOfRange also if a filter's form cannot hold what the table asks for.
-  core::Status BuildSpare() {
-    const core::Status built = estimator::BuildAdoptedTable(table_, generation_ + 1, rigid_, Spare());
-    if (!core::IsOk(built)) return built;
-    bool suits = true;
-    ForEach([&](auto& estimator) { suits &= estimator.Suits(Spare()); });
-    return suits ? core::Status::kOk : core::Status::kOutOfRange;
+  // False: a filter's form cannot hold what the table asks for.
+  static bool Suits(const estimator::AdoptedTable<Model>& spare) {
+    return (estimator::Estimator<Model, Filters, estimator::Intake<Model>&>::Suits(spare) && ...);
   }
+  // The estimators restart in slices after this, and do nothing else until then.
   void PutInForce() {
     spare_is_checked_ = false;  // from now on the spare is the table before
     const std::uint32_t now = clock_.Ticks();
     adopted_tick_.store(now, std::memory_order_relaxed);
-    ForEach([&](auto& estimator) { estimator.Restart(Spare(), now); });
+    restarts_due_ = (1u << kFilters) - 1u;
+    restart_tick_ = now;
     intake_.Adopt(Spare(), now);
     generation_ = Spare().committed.generation;
     in_force_.store(1 - in_force_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+  }
+  bool RestartNext() {
+    bool done = false;
+    std::uint32_t bit = 1;
+    ForEach([&](auto& estimator) {
+      if (!done && (restarts_due_ & bit) != 0u) {
+        estimator.Restart(adopted(), restart_tick_);
+        restarts_due_ &= ~bit;
+        done = true;
+      }
+      bit <<= 1;
+    });
+    return done;
+  }
+  void RestartAll() {
+    while (RestartNext()) {
+    }
+  }
+  // A slice of the estimator whose turn it is, or of the other one if it has nothing to do.
+  bool StepEstimator() {
+    bool worked = false;
+    for (int k = 0; k < kFilters && !worked; ++k) {
+      turn_ = turn_ + 1 < kFilters ? turn_ + 1 : 0;
+      int index = 0;
+      ForEach([&](auto& estimator) { worked |= index++ == turn_ && estimator.Step(); });
+    }
+    return worked;
   }
 
   hardware::Clock clock_;
@@ -300,18 +326,20 @@ class Controller {
 
   feedforward::FeedForward<Model> feed_forward_;
   link::Trace* trace_ = nullptr;
-  RawRecord<n> record_;                     // the tick's, as the two below
+  RawRecord<n> record_;  // the tick's, as the three below
+  PackedHistory<n> packed_;
   float told_q_[n] = {}, told_Nm_[n] = {};  // by the last FeedForward
   estimator::Intake<Model> intake_;
   std::tuple<estimator::Estimator<Model, Filters, estimator::Intake<Model>&>...> estimators_;
   estimator::Estimates<Model> estimates_[kFilters];
   monitor::ResidualStatistics<n> residuals_;
-  model::Memory<Model> friction_memory_;  // work space of a check, as the next one
-  model::Rows<Model> friction_rows_;
-  estimator::Table<Model> table_;  // the last one that was decoded
-  estimator::RigidPrior<Model, float> rigid_;
+  TableCheck<Model> check_;
   estimator::AdoptedTable<Model> adopted_[2];
-  bool spare_is_checked_ = false;  // the spare is what the last Check was given
+  bool spare_is_checked_ = false;   // the spare is what the last Check was given
+  bool table_slice_ = false;        // this Step has worked on a table
+  std::uint32_t restarts_due_ = 0;  // estimators, a bit each
+  std::uint32_t restart_tick_ = 0;
+  int turn_ = 0;  // the estimator that worked last
   std::uint32_t generation_ = 0;
   std::atomic<int> in_force_{0};
   std::atomic<std::uint32_t> adopted_tick_{0}, enabled_axes_{0}, feedforward_state_{0}, clamp_count_{0};

@@ -16,6 +16,15 @@ namespace armcal::controller {
 //   bit 2  flags, u16: RawSample flags of all ticks (enabled: and; saturated, stale: or)
 //   bit 3  set-point position, f32, and feed-forward torque, f32, joint side
 inline constexpr std::uint32_t kRawMotion = 1, kRawTemperature = 2, kRawFlags = 4, kRawSetPoint = 8, kRawAll = 15;
+//   bit 4  alone: motion and state, packed for a slow line, in 2 n + (n + 1) / 2 + 1 words (16 for six joints):
+//     n words   position p: its lowest 16 bits, in 1/16 count
+//     n words   current: its lowest 16 bits, in 1/4 LSB, two's complement
+//     a byte a joint, the first in the high byte: 4 bits p >> 16, 2 bits current >> 16, 2 bits state: 0 not enabled,
+//               1 enabled, 2 enabled and saturated, 3 stale, or p changed more than a reader can tell
+//     a word    joint in 4 bits, from 0, in turn; p >> 20 of this joint in 12 bits
+//   A reader continues p by its last two values; so p's second difference from record to record may be -2^19 to 2^19 -
+//   1, which is 32768 counts.
+inline constexpr std::uint32_t kRawPacked = 16;
 
 // Trace 1: one record for each estimator sample. Per joint: q, qd, qdd, tau and temperature as f32, flags as u16
 // (kUsed: the row changed the estimate of filter A), and the committed model's torque at this state as f32.
@@ -23,9 +32,15 @@ inline constexpr std::uint32_t kSampleAll = 1;
 inline constexpr int kSampleWordsPerJoint = 13;
 
 template <int n>
+constexpr std::uint16_t PackedRecordWords() {
+  return static_cast<std::uint16_t>(2 * n + (n + 1) / 2 + 1);
+}
+
+template <int n>
 constexpr std::uint16_t RawRecordWords(std::uint32_t channels) {
   const int per_joint = (channels & kRawMotion ? 4 : 0) + (channels & kRawTemperature ? 2 : 0) +
                         (channels & kRawFlags ? 1 : 0) + (channels & kRawSetPoint ? 4 : 0);
+  if (channels == kRawPacked) return PackedRecordWords<n>();
   return channels > kRawAll ? std::uint16_t{0} : static_cast<std::uint16_t>(n * per_joint);
 }
 
@@ -33,6 +48,14 @@ template <int n>
 constexpr std::uint16_t SampleRecordWords(std::uint32_t channels) {
   return channels == kSampleAll ? static_cast<std::uint16_t>(n * kSampleWordsPerJoint) : std::uint16_t{0};
 }
+
+// What packed records need of those before them. Context: tick.
+template <int n>
+struct PackedHistory {
+  std::uint32_t last[n] = {}, before[n] = {};  // positions in 1/16 count
+  int records = 0;                             // up to 2
+  int turn = 0;                                // joint whose highest bits come next
+};
 
 // Sums up the ticks of one record. Context: tick.
 template <int n>
@@ -73,6 +96,35 @@ class RawRecord {
         w += 4;
       }
     }
+  }
+
+  // words [PackedRecordWords<n>()].
+  void WritePacked(PackedHistory<n>& history, std::uint16_t* w) const {
+    constexpr int kBytes = 2 * n;  // where the bytes begin
+    constexpr std::uint32_t kHalf = 1u << 19;
+    std::uint32_t p[n];
+    for (int k = kBytes; k < PackedRecordWords<n>(); ++k) w[k] = 0;
+    for (int j = 0; j < n; ++j) {
+      p[j] = first_[j] * 16u + static_cast<std::uint32_t>(Sixteenths(counts_[j]));
+      const std::uint32_t bend = p[j] - 2 * history.last[j] + history.before[j];
+      const bool beyond = history.records == 2 && bend + kHalf >= 2 * kHalf;
+      const bool stale = (any_[j] & model::kStale) != 0, saturated = (any_[j] & model::kSaturated) != 0;
+      const std::uint32_t state = beyond || stale                        ? 3u
+                                  : (enabled_[j] & model::kEnabled) == 0 ? 0u
+                                  : saturated                            ? 2u
+                                                                         : 1u;
+      const auto current = static_cast<std::uint32_t>((Sixteenths(current_[j]) + 2) >> 2);
+      w[j] = static_cast<std::uint16_t>(p[j]);
+      w[n + j] = static_cast<std::uint16_t>(current);
+      const std::uint32_t byte = ((p[j] >> 16 & 0xFu) << 4) | ((current >> 16 & 3u) << 2) | state;
+      w[kBytes + j / 2] = static_cast<std::uint16_t>(w[kBytes + j / 2] | (j % 2 == 0 ? byte << 8 : byte));
+      history.before[j] = history.last[j];
+      history.last[j] = p[j];
+    }
+    const auto turn = static_cast<std::uint32_t>(history.turn);
+    w[PackedRecordWords<n>() - 1] = static_cast<std::uint16_t>((turn << 12) | (p[history.turn] >> 20));
+    history.turn = history.turn + 1 == n ? 0 : history.turn + 1;
+    if (history.records < 2) ++history.records;
   }
 
  private:

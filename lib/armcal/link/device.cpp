@@ -21,6 +21,7 @@ Status Device::ServeOwn() {
       FilledBlock<reg::kStatusBlock, &Device::FillStatus>(this),
       FilledBlock<reg::kDoubtBlock, &Device::FillDoubt>(this),
       FilledBlock<reg::kWritingBlock, &Device::FillWriting>(this),
+      DirectBlock<&Device::ReadOverview>(SpanOf(reg::kOverview), this),
       FilledBlock<reg::kResidualHeaderBlock, &Device::FillResidualHeader>(this),
       DirectBlock<&FloatList::Read>(reg::kResidualValuesBlock, &residual_values_),
       FilledBlock<reg::kCommandBlock, &Device::FillCommand, &Device::TakeCommand>(this),
@@ -124,6 +125,23 @@ void Device::FillWriting(Words<reg::kWritingBlock>& w) {
   const bool there = writer != Sessions::kNobody && map_.sessions().IsPresent(writer);
   w.Set<reg::kWriterSeat>(static_cast<std::uint16_t>(Seated() ? 1 : there ? 2 : 0));
   w.Set<reg::kSaveWait>(static_cast<std::uint16_t>((transaction_.save_wait_ms() + 999) / 1000));
+}
+
+Status Device::ReadOverview(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
+  std::uint16_t all[reg::kOverview.count];
+  std::uint16_t* at = all;
+  const auto append = [&at](const auto& block) {
+    std::memcpy(at, block.data(), 2u * block.size());
+    at += block.size();
+  };
+  Words<reg::kIdentityBlock> identity;
+  Words<reg::kStatusBlock> status;
+  Words<reg::kDoubtBlock> doubt;
+  Words<reg::kWritingBlock> writing;
+  FillIdentity(identity), FillStatus(status), FillDoubt(doubt), FillWriting(writing);
+  append(identity), append(status), append(doubt), append(writing);
+  static_assert(identity.size() + status.size() + doubt.size() + writing.size() == reg::kOverview.count);
+  return CopyWords(all, offset, count, words);
 }
 
 // Seat and tables ----------------------------------------------------------------------------------------------------

@@ -112,6 +112,7 @@ class Device {
   core::Status TakeUnlock(const Words<reg::kUnlock>& w);
   void FillCommand(Words<reg::kCommandBlock>& w);
   core::Status TakeCommand(const Words<reg::kCommandBlock>& w);
+  core::Status ReadOverview(std::uint16_t offset, std::uint16_t count, std::uint16_t* words);
   core::Status ReadStaged(std::uint16_t offset, std::uint16_t count, std::uint16_t* words);
   core::Status WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
   core::Status ReadActive(std::uint16_t offset, std::uint16_t count, std::uint16_t* words);

@@ -9,6 +9,8 @@
 namespace armcal::link {
 
 inline constexpr std::size_t kMaxPdu = 253;
+// Instead of a reply's length: the answer takes more slices of the background.
+inline constexpr std::size_t kReplyLater = ~std::size_t{0};
 
 // Texts of function 43/14. Each has at most 60 characters, so that one reply holds them all.
 struct DeviceIdentification {
@@ -17,7 +19,10 @@ struct DeviceIdentification {
   const char* revision;
 };
 
-// Serves functions 3, 4, 6, 16 and 43/14. The whole request is checked before anything is applied. The order of the
+// What a connection may do. kRead: reading functions alone; the others are refused with kForbidden.
+enum class Rights : std::uint8_t { kReadWrite, kRead };
+
+// Serves functions 3, 4, 6, 16, 23 and 43/14. The whole request is checked before anything is applied. The order of the
 // checks is: function (01), quantity and byte count (03), address (02), values (03), state (04), busy (06). Reference:
 // MODBUS Application Protocol Specification V1.1b3, section 6. Context: background.
 class PduEngine {
@@ -26,8 +31,10 @@ class PduEngine {
       : map_(map), identification_(identification) {}
 
   // `request` [count], `reply` [kMaxPdu]. `session`: whose request it is. Returns the reply's length. An empty request
-  // has no answer: 0.
-  std::size_t Handle(const std::uint8_t* request, std::size_t count, std::uint8_t* reply, std::uint32_t session = 0);
+  // has no answer: 0. kReplyLater: serve others, and call it again with the same request, session and rights in the next
+  // turn of the background; it counts as one request.
+  std::size_t Handle(const std::uint8_t* request, std::size_t count, std::uint8_t* reply, std::uint32_t session = 0,
+                     Rights rights = Rights::kReadWrite);
 
   Sessions& sessions() { return map_.sessions(); }
 
@@ -36,6 +43,7 @@ class PduEngine {
   std::size_t ReadRegisters(RegisterKind kind, const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
   std::size_t WriteOne(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
   std::size_t WriteMany(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
+  std::size_t WriteThenRead(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
   std::size_t Identify(const std::uint8_t* request, std::size_t count, std::uint8_t* reply);
 
   RegisterMap& map_;

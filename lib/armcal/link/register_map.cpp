@@ -42,14 +42,20 @@ const Block* RegisterMap::Find(RegisterKind kind, std::uint32_t address) const {
   return nullptr;
 }
 
-Status RegisterMap::Read(RegisterKind kind, std::uint16_t first, std::uint16_t count, std::uint16_t* words) const {
+bool RegisterMap::Has(RegisterKind kind, std::uint16_t first, std::uint16_t count) const {
   const std::uint32_t end = static_cast<std::uint32_t>(first) + count;
-  for (std::uint32_t at = first;
-       at < end;) {  // a read may have a side effect, so look first whether all of the range is there
+  for (std::uint32_t at = first; at < end;) {
     const Block* block = Find(kind, at);
-    if (block == nullptr) return Status::kBadAddress;
+    if (block == nullptr) return false;
     at = static_cast<std::uint32_t>(block->first) + block->count;
   }
+  return true;
+}
+
+// A read may have a side effect, so it looks first whether all of the range is there.
+Status RegisterMap::Read(RegisterKind kind, std::uint16_t first, std::uint16_t count, std::uint16_t* words) const {
+  const std::uint32_t end = static_cast<std::uint32_t>(first) + count;
+  if (!Has(kind, first, count)) return Status::kBadAddress;
   for (std::uint32_t at = first; at < end;) {
     const Block* block = Find(kind, at);
     const std::uint32_t block_end = static_cast<std::uint32_t>(block->first) + block->count;

@@ -48,7 +48,7 @@ std::uint8_t ExceptionOf(core::Status status);
 // Context: background.
 class RegisterMap {
  public:
-  static constexpr int kMaxBlocks = 36;
+  static constexpr int kMaxBlocks = 40;
 
   // kFull; kOutOfRange: empty or beyond 0xFFFF; kBadAddress: overlaps another block of its kind.
   core::Status Add(const Block& block);
@@ -64,11 +64,15 @@ class RegisterMap {
   // answers.
   core::Status Read(RegisterKind kind, std::uint16_t first, std::uint16_t count, std::uint16_t* words) const;
 
+  // Whether all registers of the range exist.
+  bool Has(RegisterKind kind, std::uint16_t first, std::uint16_t count) const;
+
   // One request writes one block. kBadAddress: the range leaves the block; kReadOnly; kWrongSize: half a 32-bit value
   // or part of a block that is written whole; kNotFinite; else what the block answers. Nothing is applied unless kOk.
   core::Status Write(std::uint16_t first, std::uint16_t count, const std::uint16_t* words) const;
 
   void CountRequest() { ++requests_; }
+  void UncountRequest() { --requests_; }  // it comes again
   void Refused(std::uint8_t function, std::uint16_t address, core::Status status) {
     last_error_ = {ExceptionOf(status), function, address, status, requests_};
   }

@@ -20,7 +20,7 @@ enum class Access : std::uint8_t { kRead, kWrite, kWriteBlock };  // kWriteBlock
 
 constexpr std::uint16_t WordsOf(RegisterType type) { return type == RegisterType::kU16 ? 1 : 2; }
 
-// The values that a client may write. If no range is given, the text says what may be written.
+// The values that a client may write. If no range is given, any value of the type, and of floats any finite one.
 struct Range {
   bool given = false;
   double low = 0.0, high = 0.0;
@@ -97,6 +97,10 @@ constexpr Register Twice(Register r, const char* second_name, std::uint16_t stri
   r.second_name = second_name, r.stride = stride;
   return r;
 }
+constexpr Register Within(double low, double high, Register r) {
+  r.range = {true, low, high};
+  return r;
+}
 constexpr std::uint16_t kPageStride = 0x2000, kStartStride = 0x0010;  // from trace 0 to trace 1
 }  // namespace declare
 
@@ -109,12 +113,13 @@ inline constexpr std::uint16_t kResidualSignals = 4, kResidualQuarters = 4, kRes
 inline constexpr std::uint16_t kResidualBinValues = kResidualSignals * 2 * kResidualQuarters * kResidualSums;
 inline constexpr std::uint16_t kResidualSliceValues = 3 * kResidualSlices;
 inline constexpr std::uint16_t kResidualValues = 2 * kResidualBinValues + kResidualSliceValues;
-inline constexpr int kTraces = 2;  // 0 raw samples, 1 processed samples
+inline constexpr std::uint16_t kWindowWords = 114;  // with its header they fill one reply
+inline constexpr int kTraces = 2;                   // 0 raw samples, 1 processed samples
 inline constexpr std::uint16_t kVendor = 0x8000;
 
 // Values that never change.
 inline constexpr std::uint32_t kMagicValue = 0x41524D43;  // "ARMC"
-inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 3;
+inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 4;
 inline constexpr float kProbeFloatValue = 123456.789f;  // reads 123456.79 only with the right word order
 inline constexpr std::uint32_t kProbeU32Value = 0x12345678;
 
@@ -126,7 +131,8 @@ inline constexpr std::uint32_t kUnlockKey = 0x6B6C6E75;  // "unlk"
 
 // Bits of `capabilities`.
 inline constexpr std::uint32_t kHasFilterA = 1, kHasFilterB = 2, kHasRawTrace = 4, kHasSampleTrace = 8;
-inline constexpr std::uint32_t kHasFeedForward = 16, kHasMonitor = 32, kHasResiduals = 64, kHasLearning = 128;
+inline constexpr std::uint32_t kHasFeedForward = 16, kHasMonitor = 32, kHasResiduals = 64, kHasLearning = 128,
+                               kHasPacked = 256;
 
 // clang-format off
 using namespace declare;
@@ -145,7 +151,7 @@ inline constexpr Register kAxes = In(0x0010, 1, kU16, "axes", "", "joints of the
 inline constexpr Register kParameters = In(0x0011, 1, kU16, "parameters", "", "entries of the parameter table");
 inline constexpr Register kColumns = In(0x0012, 1, kU16, "columns", "", "filter coordinates: estimates served");
 inline constexpr Register kTableWords = In(0x0013, 1, kU16, "table_words", "", "registers of the staged and the active table");
-inline constexpr Register kCapabilities = In(0x0014, 1, kU32, "capabilities", "", "bits: 1 filter A, 2 filter B, 4 raw trace, 8 sample trace, 16 feed-forward, 32 monitor, 64 residual statistics, 128 learning");
+inline constexpr Register kCapabilities = In(0x0014, 1, kU32, "capabilities", "", "bits: 1 filter A, 2 filter B, 4 raw trace, 8 sample trace, 16 feed-forward, 32 monitor, 64 residual statistics, 128 learning, 256 packed raw records");
 inline constexpr Register kTickRate = In(0x0016, 1, kU32, "tick_rate", "Hz", "control ticks a second");
 inline constexpr Register kSampleTicks = In(0x0018, 1, kU16, "sample_ticks", "", "control ticks of one estimator sample");
 inline constexpr Register kPageDataWords = In(0x0019, 1, kU16, "page_data_words", "", "most registers of one trace page's data");
@@ -213,6 +219,9 @@ inline constexpr Register kResidualHistory = In(0x1408, kResidualSliceValues, kF
 inline constexpr Span kResidualHeaderBlock = Between(kResidualJoint, kResidualSigma);
 inline constexpr Span kResidualValuesBlock = Between(kResidualReference, kResidualHistory);
 
+// The identity and everything about the state, for one request.
+inline constexpr Register kOverview = In(0x0C00, kIdentityBlock.count + kWritingBlock.end() - kStatusBlock.first, kU16, "overview", "", "copy of 0x0000-0x0019, and behind it of 0x0040-0x0077");
+
 // A page of a trace: a header, then records. The names trace0_arm and trace0_arm_number mean the recording. Programs use them, so they stay.
 inline constexpr Register kTraceFirstRecord = Twice(In(0x4000, 1, kU32, "trace0_first_record", "", "number of the page's first record, counted from the start of the recording"), "trace1_first_record", kPageStride);
 inline constexpr Register kTraceFirstTick = Twice(In(0x4002, 1, kU32, "trace0_first_tick", "", "its tick (first tick of its window)"), "trace1_first_tick", kPageStride);
@@ -228,12 +237,25 @@ inline constexpr Register kTraceChannels = Twice(In(0x400E, 1, kU32, "trace0_cha
 inline constexpr Register kTraceData = Twice(In(0x4010, kMaxPageWords, kU16, "trace0_data", "", "the page's records, one after the other"), "trace1_data", kPageStride);
 inline constexpr Span kTracePageBlock = Between(kTraceFirstRecord, kTraceChannels);
 
+// The same page for a slow line: a short header and the first records, which one request of function 23 acknowledges and reads.
+inline constexpr Register kWindowFirstRecord = Twice(Hold(0x4000, 1, kU32, kRead, "trace0_window_first_record", "", "as trace0_first_record"), "trace1_window_first_record", kPageStride);
+inline constexpr Register kWindowFirstTick = Twice(Hold(0x4002, 1, kU32, kRead, "trace0_window_first_tick", "", "as trace0_first_tick"), "trace1_window_first_tick", kPageStride);
+inline constexpr Register kWindowLost = Twice(Hold(0x4004, 1, kU32, kRead, "trace0_window_lost", "", "as trace0_lost"), "trace1_window_lost", kPageStride);
+inline constexpr Register kWindowCount = Twice(Hold(0x4006, 1, kU16, kRead, "trace0_window_count", "", "records of the page that lie whole in the window"), "trace1_window_count", kPageStride);
+inline constexpr Register kWindowRecording = Twice(Hold(0x4007, 1, kU16, kRead, "trace0_window_arm_number", "", "as trace0_arm_number"), "trace1_window_arm_number", kPageStride);
+inline constexpr Register kWindowGeneration = Twice(Hold(0x4008, 1, kU16, kRead, "trace0_window_generation", "", "as trace0_generation"), "trace1_window_generation", kPageStride);
+inline constexpr Register kWindowState = Twice(Hold(0x4009, 1, kU16, kRead, "trace0_window_state", "", "as trace0_state"), "trace1_window_state", kPageStride);
+inline constexpr Register kWindowWaiting = Twice(Hold(0x400A, 1, kU16, kRead, "trace0_window_waiting", "", "records behind these"), "trace1_window_waiting", kPageStride);
+inline constexpr Register kWindowData = Twice(Hold(0x400B, kWindowWords, kU16, kRead, "trace0_window_data", "", "the page's first records; 0 behind the page's end"), "trace1_window_data", kPageStride);
+inline constexpr Span kWindowHeader = Between(kWindowFirstRecord, kWindowWaiting);
+inline constexpr Span kWindowBlock = Between(kWindowFirstRecord, kWindowData);
+
 // A command of a table transaction.
-inline constexpr Register kSequence = Hold(0x0000, 1, kU32, kBlock, "sequence", "", "client's number of this command, not 0");
+inline constexpr Register kSequence = Within(1, 4294967295.0, Hold(0x0000, 1, kU32, kBlock, "sequence", "", "client's number of this command, not 0"));
 inline constexpr Register kCommand = Hold(0x0002, 1, kU32, kBlock, "command", "", "open 0x6E65706F, check 0x6B656863, save 0x65766173");
 inline constexpr Register kCommandSchema = Hold(0x0004, 1, kU32, kBlock, "command_schema", "", "schema of the table");
-inline constexpr Register kCommandWords = Hold(0x0006, 1, kU16, kBlock, "command_words", "", "registers of the table");
-inline constexpr Register kCommandReserved = Hold(0x0007, 1, kU16, kBlock, "command_reserved", "", "0");
+inline constexpr Register kCommandWords = Within(1, kMaxTableWords, Hold(0x0006, 1, kU16, kBlock, "command_words", "", "registers of the table"));
+inline constexpr Register kCommandReserved = Within(0, 0, Hold(0x0007, 1, kU16, kBlock, "command_reserved", "", "0"));
 inline constexpr Register kCommandCrc = Hold(0x0008, 1, kU32, kBlock, "command_crc", "", "CRC-32 over the table's registers; open: ignored");
 inline constexpr Span kCommandBlock = Between(kSequence, kCommandCrc);
 
@@ -245,9 +267,9 @@ inline constexpr Register kScratchU32 = Hold(0x0058, kScratchValues, kU32, kWrit
 
 // These start a recording and release its pages.
 inline constexpr Register kTraceRecording = Twice(Hold(0x0100, 1, kU16, kBlock, "trace0_arm", "", "client's number of this recording"), "trace1_arm", kStartStride);
-inline constexpr Register kTraceMode = Twice(Hold(0x0101, 1, kU16, kBlock, "trace0_mode", "", "0 off, 1 one-shot, 2 streaming"), "trace1_mode", kStartStride);
-inline constexpr Register kTraceDecimation = Twice(Hold(0x0102, 1, kU16, kBlock, "trace0_decimation", "", "samples averaged into one record, at least 1"), "trace1_decimation", kStartStride);
-inline constexpr Register kTraceReserved = Twice(Hold(0x0103, 1, kU16, kBlock, "trace0_reserved", "", "0"), "trace1_reserved", kStartStride);
+inline constexpr Register kTraceMode = Twice(Within(0, 2, Hold(0x0101, 1, kU16, kBlock, "trace0_mode", "", "0 off, 1 one-shot, 2 streaming")), "trace1_mode", kStartStride);
+inline constexpr Register kTraceDecimation = Twice(Within(1, 65535, Hold(0x0102, 1, kU16, kBlock, "trace0_decimation", "", "samples averaged into one record, at least 1")), "trace1_decimation", kStartStride);
+inline constexpr Register kTraceReserved = Twice(Within(0, 0, Hold(0x0103, 1, kU16, kBlock, "trace0_reserved", "", "0")), "trace1_reserved", kStartStride);
 inline constexpr Register kTraceStartTick = Twice(Hold(0x0104, 1, kU32, kBlock, "trace0_start_tick", "", "first tick; one that has passed starts at once"), "trace1_start_tick", kStartStride);
 inline constexpr Register kTraceLimit = Twice(Hold(0x0106, 1, kU32, kBlock, "trace0_limit", "", "records to take, 0: until full or switched off"), "trace1_limit", kStartStride);
 inline constexpr Register kTraceChannelMask = Twice(Hold(0x0108, 1, kU32, kBlock, "trace0_channel_mask", "", "which channels a record holds"), "trace1_channel_mask", kStartStride);
@@ -255,9 +277,9 @@ inline constexpr Register kTraceAcknowledge = Twice(Hold(0x010C, 1, kU32, kWrite
 inline constexpr Span kTraceStartBlock = Between(kTraceRecording, kTraceChannelMask);
 
 // Residual statistics, learning, and the two tables.
-inline constexpr Register kResidualSelect = Hold(0x0140, 1, kU16, kWrite, "residual_select", "", "joint from 1: takes a snapshot of its statistics");
-inline constexpr Register kLearningHold = Hold(0x0150, 1, kU16, kWrite, "learning_hold", "", "1: rows no longer change the estimates, 0: they do; needs unlock");
-inline constexpr Register kLearningReset = Hold(0x0151, 1, kU16, kWrite, "learning_reset", "", "joint from 1, or axes + 1 (links and what else joints share): what was known of it no longer counts; reads 0; needs unlock");
+inline constexpr Register kResidualSelect = Within(1, kMaxJoints, Hold(0x0140, 1, kU16, kWrite, "residual_select", "", "joint, 1 to axes: takes a snapshot of its statistics"));
+inline constexpr Register kLearningHold = Within(0, 1, Hold(0x0150, 1, kU16, kWrite, "learning_hold", "", "1: rows no longer change the estimates, 0: they do; needs unlock"));
+inline constexpr Register kLearningReset = Within(1, kMaxJoints + 1, Hold(0x0151, 1, kU16, kWrite, "learning_reset", "", "joint from 1, or axes + 1 (links and what else joints share): what was known of it no longer counts; reads 0; needs unlock"));
 inline constexpr Register kStagedTable = Hold(0x1000, kMaxTableWords, kU16, kWrite, "staged_table", "", "the table being loaded");
 inline constexpr Register kActiveTable = Hold(0x2000, kMaxTableWords, kU16, kRead, "active_table", "", "the table in force");
 
@@ -274,7 +296,9 @@ inline constexpr const Register* kDeclared[] = {
   &kResidualJoint, &kResidualSnapshot, &kResidualGeneration, &kResidualElapsed, &kResidualSigma, &kResidualReference, &kResidualRecent,
   &kResidualHistory,
   &kTraceFirstRecord, &kTraceFirstTick, &kTraceTickStep, &kTraceCount, &kTraceRecordWords, &kTraceLost, &kTracePageRecording,
-  &kTraceGeneration, &kTraceState, &kTraceWaiting, &kTraceChannels, &kTraceData,
+  &kTraceGeneration, &kTraceState, &kTraceWaiting, &kTraceChannels, &kTraceData, &kOverview,
+  &kWindowFirstRecord, &kWindowFirstTick, &kWindowLost, &kWindowCount, &kWindowRecording, &kWindowGeneration, &kWindowState,
+  &kWindowWaiting, &kWindowData,
   &kSequence, &kCommand, &kCommandSchema, &kCommandWords, &kCommandReserved, &kCommandCrc,
   &kScratch, &kUnlock, &kScratchFloat, &kScratchU32,
   &kTraceRecording, &kTraceMode, &kTraceDecimation, &kTraceReserved, &kTraceStartTick, &kTraceLimit, &kTraceChannelMask,
@@ -354,7 +378,7 @@ constexpr bool IsWhole(const Span& block) {
 static_assert(IsWhole(reg::kIdentityBlock) && IsWhole(reg::kStatusBlock) && IsWhole(reg::kWritingBlock) &&
                   IsWhole(reg::kErrorBlock) && IsWhole(reg::kResidualHeaderBlock) &&
                   IsWhole(reg::kResidualValuesBlock) && IsWhole(reg::kTracePageBlock) && IsWhole(reg::kCommandBlock) &&
-                  IsWhole(reg::kTraceStartBlock),
+                  IsWhole(reg::kWindowHeader) && IsWhole(reg::kWindowBlock) && IsWhole(reg::kTraceStartBlock),
               "a block has a gap, or a register of it is not listed in kDeclared");
 
 constexpr std::uint32_t LayoutCrc() {

@@ -18,6 +18,8 @@ std::size_t RequestBytes(const std::uint8_t* frame, std::size_t filled) {
       return 8;
     case 16:
       return filled > 6 ? 9u + frame[6] : kNever;
+    case 23:
+      return filled > 10 ? 13u + frame[10] : kNever;
     case 43:
       return 7;
     default:
@@ -31,6 +33,7 @@ std::size_t ReplyBytes(const std::uint8_t* frame, std::size_t filled) {
   switch (frame[1]) {
     case 3:
     case 4:
+    case 23:
       return filled > 2 ? 5u + frame[2] : kNever;
     case 6:
     case 16:
@@ -110,15 +113,20 @@ void RtuService::Poll() {
     sent_ += serial_.Write(reply_ + sent_, reply_bytes_ - sent_);
     return;
   }
-  if (taken_ == there_) {
-    taken_ = 0;
-    there_ = serial_.Read(bytes_, sizeof bytes_);
+  RtuFramer::Result result = asked_;
+  if (result == RtuFramer::Result::kNothing) {
+    if (taken_ == there_) {
+      taken_ = 0;
+      there_ = serial_.Read(bytes_, sizeof bytes_);
+    }
+    std::size_t used = 0;
+    result = framer_.OnBytes(bytes_ + taken_, there_ - taken_, clock_.Ms(), used);
+    taken_ += used;
+    if (result == RtuFramer::Result::kNothing) return;
   }
-  std::size_t used = 0;
-  const RtuFramer::Result result = framer_.OnBytes(bytes_ + taken_, there_ - taken_, clock_.Ms(), used);
-  taken_ += used;
-  if (result == RtuFramer::Result::kNothing) return;
   const std::size_t pdu = engine_.Handle(framer_.pdu(), framer_.pdu_bytes(), reply_ + 1, session_);
+  asked_ = pdu == kReplyLater ? result : RtuFramer::Result::kNothing;
+  if (pdu == kReplyLater) return;
   sent_ = 0;
   reply_bytes_ = result == RtuFramer::Result::kBroadcast || pdu == 0 ? 0 : framer_.FinishReply(reply_, pdu);
 }

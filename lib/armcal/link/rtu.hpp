@@ -60,7 +60,8 @@ class RtuService {
         framer_(address, silence_ms),
         session_(engine.sessions().Begin()) {}
 
-  // Reads one portion of bytes and answers at most one request. It never waits. Context: background.
+  // Reads one portion of bytes and answers at most one request. It never waits. While an answer takes more slices of
+  // the background, it reads nothing. Context: background.
   void Poll();
 
  private:
@@ -71,6 +72,7 @@ class RtuService {
   std::uint32_t session_;  // the line's: whoever writes on it
   std::uint8_t bytes_[64] = {};
   std::size_t there_ = 0, taken_ = 0;
+  RtuFramer::Result asked_ = RtuFramer::Result::kNothing;  // a request whose answer is not ready
   std::uint8_t reply_[kMaxRtuFrame] = {};
   std::size_t reply_bytes_ = 0, sent_ = 0;
 };

@@ -10,7 +10,7 @@ namespace armcal::link {
 // owns is free for others when it has ended, or when it has not asked for kPatience_ms. Context: background.
 class Sessions {
  public:
-  static constexpr int kMost = 8;
+  static constexpr int kMost = 12;
   static constexpr std::uint32_t kPatience_ms = 10000;
   static constexpr std::uint32_t kNobody = 0xFFFFFFFF;
 

@@ -10,6 +10,8 @@ namespace armcal::link {
 using core::Status;
 
 namespace {
+constexpr std::uint16_t kSummedWords = 64;  // of a checksum, in a slice
+
 bool Same(const TableCommand& a, const TableCommand& b) {
   return a.sequence == b.sequence && a.command == b.command && a.schema == b.schema && a.words == b.words &&
          a.crc == b.crc;
@@ -34,11 +36,19 @@ Status TableTransaction::Boot() {
   table_status_ = store_.Load(staged_);
   if (!core::IsOk(table_status_)) return table_status_;
   // A record that the application refuses is as good as none: the older one has its turn.
-  why_ = application_.check(application_.context, staged_);
+  const auto check = [this] {
+    bool first = true;
+    do {
+      why_ = application_.check(application_.context, staged_, first);
+      first = false;
+    } while (why_.status == Status::kBusy);
+  };
+  check();
   for (int slot = 0; slot < table::TableStore::kSlots && !core::IsOk(why_.status); ++slot) {
     if (!core::IsOk(store_.LoadOlder(staged_))) break;
-    why_ = application_.check(application_.context, staged_);
+    check();
   }
+  checked_crc_ = core::Crc32Words(staged_, words_);
   table_status_ = why_.status;
   if (!core::IsOk(table_status_)) return table_status_;
   state_ = TransactionState::kCommitting;
@@ -50,8 +60,17 @@ Status TableTransaction::Boot() {
 Status TableTransaction::Command(const TableCommand& command) {
   if (command.sequence == 0) return Status::kWrongOrder;
   if (command.sequence == last_.sequence) return IsRepeat(command) ? Status::kOk : Status::kWrongOrder;
+  if (Same(command, checking_)) {
+    if (phase_ == Phase::kChecking) return Status::kUnfinished;
+    if (answered_) {
+      answered_ = false;
+      return answer_;
+    }
+  }
   if (phase_ != Phase::kNone) return Status::kBusy;
+  answered_ = false;
   const Status status = Apply(command);
+  if (status == Status::kUnfinished) return status;
   status_ = status;
   if (core::IsOk(status)) {
     last_ = command;
@@ -65,7 +84,9 @@ bool TableTransaction::IsRepeat(const TableCommand& command) const {
 }
 
 void TableTransaction::Abandon() {
-  if (phase_ == Phase::kNone && staging()) Finish(TransactionState::kIdle, Status::kTimeout);
+  answered_ = false;
+  if ((phase_ == Phase::kNone || phase_ == Phase::kChecking) && staging())
+    Finish(TransactionState::kIdle, Status::kTimeout);
 }
 
 std::uint32_t TableTransaction::save_wait_ms() const {
@@ -89,13 +110,43 @@ Status TableTransaction::Open() {
 
 Status TableTransaction::Check(const TableCommand& command) {
   if (state_ != TransactionState::kLoading && state_ != TransactionState::kChecked) return Status::kWrongOrder;
-  if (core::Crc32Words(staged_, words_) != command.crc) return Status::kBadCrc;
-  why_ = application_.check(application_.context, staged_);
-  const Status status = why_.status;
+  checking_ = command;
+  summed_ = 0;
+  sum_ = 0;
+  phase_ = Phase::kChecking;
+  return Status::kUnfinished;
+}
+
+// First the checksum, then what the application does with the words.
+void TableTransaction::CheckNext() {
+  if (summed_ < words_) {
+    const auto rest = static_cast<std::uint16_t>(words_ - summed_);
+    const std::uint16_t count = rest < kSummedWords ? rest : kSummedWords;
+    sum_ = core::Crc32Words(staged_ + summed_, count, sum_);
+    summed_ = static_cast<std::uint16_t>(summed_ + count);
+    if (summed_ < words_) return;
+    if (sum_ != checking_.crc) return Answer(Status::kBadCrc);
+    first_ = true;
+    return;
+  }
+  const core::Refusal why = application_.check(application_.context, staged_, first_);
+  first_ = false;
+  if (why.status == Status::kBusy) return;
+  why_ = why;
   // A refused check has thrown away what an earlier one built, so nothing is left that could be saved.
-  state_ = core::IsOk(status) ? TransactionState::kChecked : TransactionState::kLoading;
-  checked_crc_ = command.crc;
-  return status;
+  state_ = core::IsOk(why.status) ? TransactionState::kChecked : TransactionState::kLoading;
+  checked_crc_ = checking_.crc;
+  Answer(why.status);
+}
+
+void TableTransaction::Answer(Status status) {
+  phase_ = Phase::kNone;
+  status_ = status;
+  answer_ = status;
+  answered_ = !core::IsOk(status);
+  if (answered_) return;
+  last_ = checking_;
+  touched_ms_ = now_ms_;
 }
 
 Status TableTransaction::Save(const TableCommand& command) {
@@ -116,6 +167,7 @@ Status TableTransaction::WriteStaged(std::uint16_t offset, std::uint16_t count, 
   if (phase_ != Phase::kNone) return Status::kBusy;
   if (!staging()) return Status::kWrongOrder;
   std::memcpy(staged_ + offset, words, 2u * count);
+  answered_ = false;
   state_ = TransactionState::kLoading;  // the staged words are no longer those that were checked
   touched_ms_ = now_ms_;
   return Status::kOk;
@@ -133,6 +185,8 @@ void TableTransaction::Step(std::uint32_t now_ms) {
     case Phase::kNone:
       if (now_ms - touched_ms_ >= kStageTimeout_ms) Abandon();
       return;
+    case Phase::kChecking:
+      return CheckNext();
     case Phase::kStoring: {
       const Status stored = store_.Step();
       if (stored == Status::kBusy) return;
@@ -176,7 +230,7 @@ void TableTransaction::Adopt() {
 
 void TableTransaction::Activate() {
   std::memcpy(active_, staged_, 2u * words_);
-  active_crc_ = core::Crc32Words(active_, words_);
+  active_crc_ = checked_crc_;
   table_status_ = Status::kOk;
 }
 

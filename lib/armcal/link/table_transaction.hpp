@@ -13,9 +13,10 @@ namespace armcal::link {
 // Context: background.
 struct TableApplication {
   void* context;
-  // Decodes `words`, judges them and builds what adopt() will put in force. Status kOk, or the reason of refusal. What
-  // was built stays ready until the next check; nothing is in force yet.
-  core::Refusal (*check)(void* context, const std::uint16_t* words);
+  // Decodes `words`, judges them and builds what adopt() will put in force, in slices. kBusy: call again with the same
+  // words. Else kOk, or the reason of refusal. What was built stays ready until the next check; nothing is in force
+  // yet. `first`: a new check begins, whatever became of the one before.
+  core::Refusal (*check)(void* context, const std::uint16_t* words, bool first);
   // Answers what adopt() would answer now: kOk or kAxisEnabled. It has no effect. The transaction asks before it stores
   // anything.
   core::Status (*permit)(void* context);
@@ -60,21 +61,23 @@ class TableTransaction {
   core::Status Boot();
 
   // kWrongOrder: not in this state, or the sequence is 0 or was used with other content. kOutOfRange: no such command.
-  // kWrongSchema, kWrongSize: not a table of this firmware. kBadCrc. kBusy: committing. kTooSoon: the rate of saves.
-  // Or the application's answer.
+  // kWrongSchema, kWrongSize: not a table of this firmware. kBadCrc. kBusy: committing, or another command is being
+  // checked. kTooSoon: the rate of saves. Or the application's answer. kUnfinished: it is being checked; the same
+  // command again gives the answer when Step() has done the rest.
   core::Status Command(const TableCommand& command);
   // True if it is the last command that was accepted, come again: it would have no effect.
   bool IsRepeat(const TableCommand& command) const;
-  // Drops a stage, because its writer is gone. A commit goes on.
+  // Drops a stage and a check, because their writer is gone. A commit goes on.
   void Abandon();
 
   // offset + count <= words(). kWrongOrder: no stage is open. kBusy: committing.
   core::Status WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
 
-  // Does one bounded piece of a commit. Drops a stage without writes (state kIdle, status kTimeout).
+  // Does one bounded piece of a check or a commit. Drops a stage without writes (state kIdle, status kTimeout).
   void Step(std::uint32_t now_ms);
 
   TransactionState state() const { return state_; }
+  bool busy() const { return phase_ != Phase::kNone; }  // Step() has something to do
   core::Status status() const { return status_; }
   core::Status table_status() const { return table_status_; }
   const core::Refusal& refusal() const { return why_; }  // what the last check said
@@ -87,7 +90,7 @@ class TableTransaction {
   const table::TableStore& store() const { return store_; }
 
  private:
-  enum class Phase : std::uint8_t { kNone, kStoring, kAdopting, kRevoking, kBooting };
+  enum class Phase : std::uint8_t { kNone, kChecking, kStoring, kAdopting, kRevoking, kBooting };
 
   core::Status Apply(const TableCommand& command);
   bool staging() const {
@@ -96,6 +99,8 @@ class TableTransaction {
   }
   core::Status Open();
   core::Status Check(const TableCommand& command);
+  void CheckNext();
+  void Answer(core::Status status);
   core::Status Save(const TableCommand& command);
   void Adopt();
   void Activate();
@@ -115,6 +120,12 @@ class TableTransaction {
   core::Refusal why_;
   core::Status refusal_ = core::Status::kOk;  // why the adoption failed, while the record is taken back
   TableCommand last_;
+  TableCommand checking_;                    // the check that runs, or whose answer waits
+  core::Status answer_ = core::Status::kOk;  // of checking_, if it was refused
+  bool answered_ = false;                    // answer_ has not been taken
+  std::uint16_t summed_ = 0;                 // words whose checksum is in sum_
+  std::uint32_t sum_ = 0;
+  bool first_ = false;  // the application has not begun
   std::uint32_t checked_crc_ = 0;
   std::uint32_t active_crc_ = 0;
   std::uint32_t now_ms_ = 0;

@@ -44,7 +44,7 @@ class TcpService {
  public:
   static constexpr std::size_t kMaxReply = kMaxTcpFrame;
 
-  explicit TcpService(PduEngine& engine) : engine_(engine) {}
+  explicit TcpService(PduEngine& engine, Rights rights = Rights::kReadWrite) : engine_(engine), rights_(rights) {}
 
   // A new connection has taken the slot.
   static void Open(void* context, int slot) {
@@ -64,16 +64,25 @@ class TcpService {
   static bool Receive(void* context, int slot, const std::uint8_t* bytes, std::size_t count, std::size_t* used,
                       std::uint8_t* reply, std::size_t* reply_bytes) {
     TcpFramer& framer = Self(context).framers_[slot];
-    *reply_bytes = 0;
-    const TcpFramer::Result result = framer.OnBytes(bytes, count, *used);
-    if (result == TcpFramer::Result::kBroken) return false;
-    if (result == TcpFramer::Result::kNeedMore) return true;
+    bool& asked = Self(context).asked_[slot];
+    *reply_bytes = *used = 0;
+    if (!asked) {
+      const TcpFramer::Result result = framer.OnBytes(bytes, count, *used);
+      if (result == TcpFramer::Result::kBroken) return false;
+      if (result == TcpFramer::Result::kNeedMore) return true;
+    }
     const std::size_t pdu = Self(context).engine_.Handle(framer.pdu(), framer.pdu_bytes(), reply + kMbapBytes,
-                                                         Self(context).session_[slot]);
+                                                         Self(context).session_[slot], Self(context).rights_);
+    asked = pdu == kReplyLater;
+    if (asked) return true;
     framer.PutReplyHeader(pdu, reply);
     *reply_bytes = kMbapBytes + pdu;
     return true;
   }
+
+  // True if the slot's request takes more slices of the background. Call Receive again in the next turn, also without
+  // bytes, until this is false; it takes none of them before.
+  static bool Asked(void* context, int slot) { return Self(context).asked_[slot]; }
 
   // True if a part of a frame is there. The rest should follow soon.
   static bool MidFrame(void* context, int slot) { return Self(context).framers_[slot].mid_frame(); }
@@ -82,12 +91,15 @@ class TcpService {
   static TcpService& Self(void* context) { return *static_cast<TcpService*>(context); }
   void Restart(int slot, std::uint32_t session) {
     if (session_[slot] != 0) engine_.sessions().End(session_[slot]);
+    asked_[slot] = false;
     session_[slot] = session;
   }
 
   PduEngine& engine_;
+  Rights rights_;
   TcpFramer framers_[kSlots];
   std::uint32_t session_[kSlots] = {};
+  bool asked_[kSlots] = {};  // a request whose answer is not ready
 };
 
 }  // namespace armcal::link

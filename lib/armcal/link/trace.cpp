@@ -88,6 +88,27 @@ Status Trace::ReadPage(std::uint32_t offset, std::uint16_t count, std::uint16_t*
   return Status::kOk;
 }
 
+Status Trace::ReadWindow(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
+  const TraceState state = this->state();  // as in FillPageHeader
+  const TracePage& page = Page();
+  const std::uint32_t fit = requested_.record_words == 0 ? 0 : reg::kWindowWords / requested_.record_words;
+  const std::uint32_t shown = page.count < fit ? page.count : fit;
+  const std::uint32_t waiting = this->waiting() + page.count - shown;
+  Words<reg::kWindowBlock> w;
+  w.Set<reg::kWindowFirstRecord>(page.first_record);
+  w.Set<reg::kWindowFirstTick>(page.first_tick);
+  w.Set<reg::kWindowLost>(lost());
+  w.Set<reg::kWindowCount>(static_cast<std::uint16_t>(shown));
+  w.Set<reg::kWindowRecording>(requested_.number);
+  w.Set<reg::kWindowGeneration>(page.generation);
+  w.Set<reg::kWindowState>(state);
+  w.Set<reg::kWindowWaiting>(static_cast<std::uint16_t>(waiting > 0xFFFFu ? 0xFFFFu : waiting));
+  if (shown == 0) return CopyWords(w.data(), offset, count, words);
+  const auto data_words = static_cast<std::uint16_t>(shown * requested_.record_words);
+  const Status copied = ReadPage(0, data_words, w.data() + reg::kWindowHeader.count);
+  return core::IsOk(copied) ? CopyWords(w.data(), offset, count, words) : copied;
+}
+
 std::uint32_t Trace::waiting() const {
   if (!Ready()) return 0;
   return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_relaxed) - page_.count;
@@ -164,6 +185,7 @@ Status Trace::Serve(RegisterMap& map, int number) {
   const Block blocks[] = {
       FilledBlock<reg::kTracePageBlock, &Trace::FillPageHeader>(this, number),
       DirectBlock<&Trace::ReadPage>(SpanOf(reg::kTraceData).Of(number), this),
+      DirectBlock<&Trace::ReadWindow>(SpanOf(reg::kWindowBlock).Of(number), this),
       FilledBlock<reg::kTraceStartBlock, &Trace::FillStart, &Trace::TakeStart>(this, number),
       FilledBlock<reg::kTraceAcknowledge, &Trace::FillAcknowledge, &Trace::TakeAcknowledge>(this, number),
   };

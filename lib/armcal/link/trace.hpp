@@ -65,6 +65,9 @@ class Trace {
   // Copies words of the present page. kBadAddress: they lie beyond it.
   core::Status ReadPage(std::uint32_t offset, std::uint16_t count, std::uint16_t* words) const;
 
+  // The window of the present page, which is formed if there is none: header and as many whole records as fit.
+  core::Status ReadWindow(std::uint16_t offset, std::uint16_t count, std::uint16_t* words);
+
   // Serves this as trace `number`: 0 (raw samples) or 1 (processed samples). kOutOfRange: no such number. Else what
   // RegisterMap::Add answers.
   core::Status Serve(RegisterMap& map, int number);
@@ -82,6 +85,8 @@ class Trace {
   // a one-shot recording ends instead.
   core::Status Push(const std::uint16_t* record, std::uint32_t generation);
   const Recording& recording() const { return recording_; }
+  // Records of this recording that were accepted.
+  std::uint32_t pushed() const { return head_.load(std::memory_order_relaxed); }
   // How many records still fit. A simulation may wait for room; a real tick never does.
   std::uint32_t room() const {
     return slots_ - (head_.load(std::memory_order_relaxed) - tail_.load(std::memory_order_acquire));

@@ -60,7 +60,7 @@ class TestServer {
   Service service_{drive.device.engine()};
   std::atomic<std::uint32_t> jumped_ms_{0};
   port_linux::TcpServer server_{{&service_, Service::kMaxReply, &Service::Open, &Service::Receive, &Service::MidFrame,
-                                 &Service::Close, &Service::Keep},
+                                 &Service::Close, &Service::Keep, &Service::Asked},
                                 {this, &Ticks, &Ms}};
   std::atomic<int> connections_{0};
   std::atomic<bool> stop_{false};

@@ -77,7 +77,9 @@ struct Bench {
     w.template Set<reg::kCommandSchema>(Model::kSchema);
     w.template Set<reg::kCommandWords>(kWords);
     w.template Set<reg::kCommandCrc>(crc);
-    return Write(w);
+    Status status = Write(w);
+    for (; status == Status::kUnfinished; status = Write(w)) EXPECT_TRUE(controller.Step());
+    return status;
   }
   // Stages a table and checks it. Answers the status of the first step that is refused.
   Status Check(const estimator::Table<Model>& table, std::uint32_t& crc) {
@@ -167,6 +169,18 @@ TEST(Controller, ATableFlashed_IsInForceAndStaysSoAfterPowerUp) {
   controller::Controller<Model, Forgetting> again(bench->flash.storage(), bench->clock);
   EXPECT_EQ(again.Boot(), Status::kOk);
   EXPECT_EQ(again.generation(), 1u);
+}
+
+// The filters restart one after the other, and work on no sample in between.
+TEST(Controller, AfterAFlash_BothFiltersBeginAnew) {
+  const auto bench = std::make_unique<Bench<Forgetting, Block>>();
+  bench->Run(4000);
+  const std::uint32_t before = bench->Value<reg::kRowsUsedB>();
+  ASSERT_EQ(bench->Flash(estimator::DefaultTable<Model>()), Status::kOk);
+  bench->Run(2000);
+  EXPECT_GT(bench->Value<reg::kRowsUsedB>(), 0u);
+  EXPECT_LT(bench->Value<reg::kRowsUsedB>(), before);
+  EXPECT_EQ(bench->Value<reg::kRowsUsedB>(), bench->Value<reg::kRowsUsedA>());
 }
 
 // What check has built waits for save. A table that was checked and left, or refused, must not be adopted in its place.
@@ -341,6 +355,74 @@ TEST(Controller, ATraceThatAClientStarts_HoldsWhatTheTickWasGiven) {
       EXPECT_NEAR(core::GetF32(r + 7), told / kTicks, 1e-6);
       EXPECT_EQ(core::GetF32(r + 9), 0.0f);  // no table: no feed-forward
     }
+}
+
+// Positions, currents and states lie where SPEC.md has them.
+TEST(Controller, APackedRecord_HoldsTheLowBitsOfAllJointsAndTheHighBitsOfOne) {
+  const auto bench = std::make_unique<Bench<Forgetting>>();
+  const auto trace = std::make_unique<controller::RawTrace<Model, 8192>>();
+  ASSERT_EQ(bench->controller.Record(*trace), Status::kOk);
+  EXPECT_EQ(bench->Value<reg::kCapabilities>() & reg::kHasPacked, reg::kHasPacked);
+  constexpr int kWords = 2 * n + (n + 1) / 2 + 1;
+  for (std::uint16_t recording = 1; recording <= 2; ++recording) {  // the second one begins anew, in another place
+    const std::uint32_t start = bench->now + 10;
+    link::Words<reg::kTraceStartBlock> w;
+    w.Set<reg::kTraceRecording>(recording);
+    w.Set<reg::kTraceMode>(link::TraceMode::kStreaming);
+    w.Set<reg::kTraceDecimation>(std::uint16_t{1});
+    w.Set<reg::kTraceStartTick>(start);
+    w.Set<reg::kTraceChannelMask>(controller::kRawPacked);
+    ASSERT_EQ(bench->Write(w), Status::kOk);
+    bench->Run(10 + 2 * n + 1);
+    const auto page = bench->Read<reg::kTracePageBlock>();
+    ASSERT_EQ(page.Get<reg::kTraceRecordWords>(), kWords);
+    ASSERT_GE(page.Get<reg::kTraceCount>(), 2 * n);
+    const auto words = bench->Read(SpanOf(reg::kTraceData, 2 * n * kWords));
+    for (int record = 0; record < 2 * n; ++record) {
+      model::RawSample<n> raw;
+      controller::SetPoint<n> set;
+      (void)bench->axes.Read(start + static_cast<std::uint32_t>(record), raw, set);
+      const std::uint16_t* r = &words[kWords * record];
+      for (int j = 0; j < n; ++j) {
+        const auto p = static_cast<std::uint32_t>(raw.counts[j]) * 16u;
+        const auto current = static_cast<std::uint32_t>(4 * raw.current[j]) & 0x3FFFFu;
+        const unsigned byte = j % 2 == 0 ? r[2 * n + j / 2] >> 8 : r[2 * n + j / 2] & 0xFFu;
+        EXPECT_EQ(r[j], p & 0xFFFFu);
+        EXPECT_EQ(r[n + j], current & 0xFFFFu);
+        EXPECT_EQ(byte >> 4, p >> 16 & 0xFu);
+        EXPECT_EQ(byte >> 2 & 3u, current >> 16);
+        EXPECT_EQ(byte & 3u, 1u) << "enabled, and no change is out of range, record " << record;
+        EXPECT_TRUE(r[kWords - 1] >> 12 != j || (r[kWords - 1] & 0xFFFu) == p >> 20);
+      }
+      EXPECT_EQ(r[kWords - 1] >> 12, record % n);
+    }
+    bench->Run(500);
+  }
+}
+
+TEST(Controller, APackedRecord_MarksWhatAReaderCannotContinue) {
+  controller::PackedHistory<n> history;
+  const auto state = [&](std::int32_t counts, std::uint8_t flags) {
+    model::RawSample<n> raw;
+    raw.counts[0] = counts, raw.flags[0] = flags;
+    const float nothing[n] = {};
+    controller::RawRecord<n> record;
+    record.Add(raw, nothing, nothing);
+    std::uint16_t words[2 * n + (n + 1) / 2 + 1];
+    record.WritePacked(history, words);
+    return words[2 * n] >> 8 & 3;
+  };
+  EXPECT_EQ(state(0, model::kEnabled), 1);
+  EXPECT_EQ(state(1000000, model::kEnabled), 1) << "a reader has no two values yet";
+  EXPECT_EQ(state(2000000 + 32767, model::kEnabled), 1);
+  EXPECT_EQ(state(3000000 + 2 * 32767 + 32768, model::kEnabled), 3);
+  EXPECT_EQ(state(4000000 + 3 * 32767 + 2 * 32768 - 32768, model::kEnabled), 1);
+  EXPECT_EQ(state(5000000 + 4 * 32767 + 3 * 32768 - 2 * 32768 - 32769, model::kEnabled), 3);
+  history = {};
+  EXPECT_EQ(state(0, 0), 0);
+  EXPECT_EQ(state(0, model::kSaturated), 0);
+  EXPECT_EQ(state(0, model::kEnabled | model::kSaturated), 2);
+  EXPECT_EQ(state(0, model::kEnabled | model::kStale), 3);
 }
 
 TEST(Controller, NoiseFarBeyondTheTables_IsServedAsTheFiltersHealth) {

@@ -120,6 +120,22 @@ TEST(RtuFramer, Requests_BackToBackWithoutSilence_AreBothFound) {
   EXPECT_EQ(heard.last, (Bytes{16, 0, 0x20, 0, 2, 4, 1, 2, 3, 4}));
 }
 
+TEST(RtuFramer, WriteThenRead_EndsByItsLength) {
+  const Bytes pdu = {23, 0x40, 0, 0, 125, 0x01, 0x0C, 0, 2, 4, 0, 0, 0, 7};
+  Bytes ours = {kUs}, others = {5};
+  ours.insert(ours.end(), pdu.begin(), pdu.end()), others.insert(others.end(), pdu.begin(), pdu.end());
+  RtuFramer framer(kUs, 100);
+  for (const Bytes& frame :
+       {Rtu(ours), Rtu(others), Rtu({5, 23, 4, 1, 2, 3, 4}), kRead}) {  // another device's reply, too
+    std::size_t used = 0, at = 0;
+    RtuFramer::Result result = RtuFramer::Result::kNothing;
+    for (; at < frame.size(); at += used) result = framer.OnBytes(frame.data() + at, frame.size() - at, 1, used);
+    const bool is_ours = frame[0] == kUs;
+    EXPECT_EQ(result, is_ours ? RtuFramer::Result::kRequest : RtuFramer::Result::kNothing);
+    EXPECT_TRUE(!is_ours || framer.pdu_bytes() == frame.size() - 3);
+  }
+}
+
 TEST(RtuFramer, Frame_WithAnyBitFlipped_IsSilentlyDropped_AndTheNextIsHeard) {
   for (std::size_t bit = 0; bit < 8 * kWrite.size(); ++bit) {
     RtuFramer framer(kUs, kSilence_ms);

@@ -55,7 +55,12 @@ class Connection {
     w.Set<reg::kCommandSchema>(test::kSchema);
     w.Set<reg::kCommandWords>(kTableWords);
     w.Set<reg::kCommandCrc>(core::Crc32Words(table.data(), table.size()));
-    return Write(w);
+    Status status = Write(w);
+    for (int k = 0; k < 100 && status == Status::kUnfinished; ++k) {
+      drive_->transaction.Step(0);
+      status = Write(w);
+    }
+    return status;
   }
   Status Stage(const Words& words) {
     Ask();

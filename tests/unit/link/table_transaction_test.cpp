@@ -25,7 +25,16 @@ class Transaction : public testing::Test {
     return {++sequence_, command, core::GetU32(words.data()), static_cast<std::uint16_t>(words.size()),
             core::Crc32Words(words.data(), words.size())};
   }
-  Status Do(std::uint32_t command, const Words& words) { return t().Command(Make(command, words)); }
+  Status Do(std::uint32_t command, const Words& words) { return Finish(t(), Make(command, words)); }
+  // The command, and again until its answer is there.
+  Status Finish(link::TableTransaction& transaction, const TableCommand& command) {
+    Status status = transaction.Command(command);
+    for (int k = 0; k < 100 && status == Status::kUnfinished; ++k) {
+      transaction.Step(now_ms_);
+      status = transaction.Command(command);
+    }
+    return status;
+  }
   void Stage(const Words& words) {
     for (std::uint16_t at = 0; at < words.size(); at = static_cast<std::uint16_t>(at + 100)) {
       const auto count = static_cast<std::uint16_t>(std::min<std::size_t>(100, words.size() - at));
@@ -95,6 +104,58 @@ TEST_F(Transaction, SecondCheckThatIsRefused_LeavesNothingToSave) {
   EXPECT_EQ(Do(reg::kSave, words), Status::kWrongOrder);
   Run();
   ExpectInForce(1);
+}
+
+// The answer is held, and what others ask meanwhile is refused. Nothing is checked twice.
+TEST_F(Transaction, CheckInSlices_IsAnsweredOnce_WhenTheLastSliceIsDone) {
+  drive_.application.slices = 5;
+  const Words words = MakeTable(1);
+  for (const bool refuse : {true, false}) {
+    drive_.application.refuse_check = refuse;
+    ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+    Stage(words);
+    const TableCommand check = Make(reg::kCheck, words);
+    ASSERT_EQ(t().Command(check), Status::kUnfinished);
+    EXPECT_TRUE(t().busy());
+    int turns = 0;
+    for (; t().Command(check) == Status::kUnfinished && turns < 100; ++turns) {
+      EXPECT_EQ(t().Command(Make(reg::kSave, words)), Status::kBusy);
+      EXPECT_EQ(t().WriteStaged(0, 1, words.data()), Status::kBusy);
+      EXPECT_EQ(drive_.application.checks, refuse ? 0 : 1);
+      t().Step(now_ms_);
+    }
+    EXPECT_GE(turns, 5);
+    EXPECT_FALSE(t().busy());
+    EXPECT_EQ(t().status(), refuse ? Status::kUnphysical : Status::kOk);
+    EXPECT_EQ(t().state(), refuse ? TransactionState::kLoading : TransactionState::kChecked);
+    EXPECT_EQ(drive_.application.checks, refuse ? 1 : 2);
+  }
+  ASSERT_EQ(Do(reg::kSave, words), Status::kOk);
+  Run();
+  ExpectInForce(1);
+}
+
+// A stage that changed after a refusal is checked anew, also under the number of the refused command.
+TEST_F(Transaction, CheckWhoseWriterIsGone_Ends_AndTheNextOneBeginsAnew) {
+  drive_.application.slices = 5;
+  const Words words = MakeTable(1);
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Stage(words);
+  const TableCommand check = Make(reg::kCheck, words);
+  ASSERT_EQ(t().Command(check), Status::kUnfinished);
+  for (int k = 0; k < 8; ++k) t().Step(now_ms_);
+  t().Abandon();
+  EXPECT_FALSE(t().busy());
+  EXPECT_EQ(t().Command(check), Status::kWrongOrder) << "there is no stage";
+  ASSERT_EQ(Do(reg::kOpen, words), Status::kOk);
+  Words other = words;
+  other[5] = test::kBadPhysics;
+  Stage(other);
+  const TableCommand again = Make(reg::kCheck, other);
+  ASSERT_EQ(Finish(t(), again), Status::kUnphysical);
+  EXPECT_EQ(drive_.application.checks, 1) << "only whole checks";
+  Stage(other);
+  EXPECT_EQ(t().Command(again), Status::kUnfinished);
 }
 
 TEST_F(Transaction, Commands_OutOfOrder_AreRefused) {
@@ -317,7 +378,7 @@ TEST_F(Transaction, PowerCutAtAnyOperation_BootsTheOldOrTheNewTable) {
       const Words words = MakeTable(2);
       ASSERT_EQ(first.Command(Make(reg::kOpen, words)), Status::kOk);
       ASSERT_EQ(first.WriteStaged(0, kTableWords, words.data()), Status::kOk);
-      ASSERT_EQ(first.Command(Make(reg::kCheck, words)), Status::kOk);
+      ASSERT_EQ(Finish(first, Make(reg::kCheck, words)), Status::kOk);
       ASSERT_EQ(first.Command(Make(reg::kSave, words)), Status::kOk);
       for (int i = 0; i < 1000 && !flash.dead(); ++i) first.Step(0);
     }

@@ -34,13 +34,17 @@ struct FakeApplication {
   std::atomic<bool> enable_on_save{false};  // becomes enabled between permission and adoption
   std::atomic<int> busy{0};                 // answers kBusy this many times before it adopts
   std::atomic<bool> refuse_check{false};    // every check refuses
+  std::atomic<int> slices{1};               // calls that a check needs
   std::atomic<int> checks{0}, adoptions{0};
+  int slices_done = 0;
   std::vector<std::uint16_t> built, adopted;  // by the last check; by the last adoption
 
   link::TableApplication Functions() { return {this, &Check, &Permit, &Adopt}; }
 
-  static core::Refusal Check(void* self, const std::uint16_t* words) {
+  static core::Refusal Check(void* self, const std::uint16_t* words, bool first) {
     auto& a = *static_cast<FakeApplication*>(self);
+    if (first) a.slices_done = 0;
+    if (++a.slices_done < a.slices) return {core::Status::kBusy};
     ++a.checks;
     a.built.clear();
     if (a.refuse_check || words[5] == kBadPhysics) return {core::Status::kUnphysical, 5, 1.0f, 0.0f};

@@ -74,6 +74,36 @@ TEST(Trace, Page_StaysAsItIsUntilAcknowledged) {
   ExpectPage(trace, 7, 107, 3);
 }
 
+TEST(Trace, Window_ShowsTheWholeRecordsThatFit_AndZerosBehindThem) {
+  namespace reg = link::reg;
+  link::TraceRing<400> trace(1, &test::RecordWords, nullptr);  // 50 records
+  const auto window = [&] {
+    link::Words<reg::kWindowBlock> w;
+    EXPECT_EQ(trace.ReadWindow(0, w.size(), w.data()), Status::kOk);
+    return w;
+  };
+  EXPECT_EQ(window().Get<reg::kWindowCount>(), 0) << "no recording yet";
+  ASSERT_EQ(trace.Start(Streaming(7)), Status::kOk);
+  for (std::uint32_t tick = 100; tick < 130; ++tick) (void)Produce(trace, tick, 3);
+  for (int look = 0; look < 2; ++look) {  // it stays
+    const auto w = window();
+    EXPECT_EQ(w.Get<reg::kWindowFirstRecord>(), 0u);
+    EXPECT_EQ(w.Get<reg::kWindowFirstTick>(), 100u);
+    EXPECT_EQ(w.Get<reg::kWindowCount>(), 22) << "22 * 5 of 114 registers";
+    EXPECT_EQ(w.Get<reg::kWindowWaiting>(), 8);
+    EXPECT_EQ(w.Get<reg::kWindowRecording>(), 7);
+    EXPECT_EQ(w.Get<reg::kWindowGeneration>(), 3);
+    for (std::uint32_t k = 0; k < 114; ++k) EXPECT_EQ(w.data()[11 + k], k < 110 ? WordOf(100 + k / 5, k % 5) : 0) << k;
+    std::uint16_t part[4];
+    EXPECT_EQ(trace.ReadWindow(9, 4, part), Status::kOk);
+    for (int k = 0; k < 4; ++k) EXPECT_EQ(part[k], w.data()[9 + k]);
+  }
+  ASSERT_EQ(trace.Acknowledge(22), Status::kOk);
+  EXPECT_EQ(window().Get<reg::kWindowFirstRecord>(), 22u);
+  EXPECT_EQ(window().Get<reg::kWindowCount>(), 8);
+  EXPECT_EQ(window().Get<reg::kWindowWaiting>(), 0);
+}
+
 TEST(Trace, WhenFull_RefusesTheNewRecord_CountsIt_AndThePageEndsAtTheGap) {
   Ring trace(1, &test::RecordWords, nullptr);
   ASSERT_EQ(trace.Start(Streaming()), Status::kOk);

@@ -1,0 +1,416 @@
+// tool - the verbs for a technician at a drive: info, get, set, watch, scan, map, and what is done with the table in
+// force.
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <thread>
+
+#include "armcal/core/crc.hpp"
+#include "armcal/core/words.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/register_text.hpp"
+#include "host_sim/client/table_flash.hpp"
+#include "host_sim/client/writer_seat.hpp"
+#include "host_sim/tool/connect.hpp"
+#include "host_sim/tool/interrupt.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+namespace {
+
+namespace reg = link::reg;
+using link::Register;
+using link::RegisterKind;
+using link::RegisterType;
+using nlohmann::ordered_json;
+
+struct DeviceOptions {
+  std::string connect, json, name, value, file;
+  int from = 1, to = 247, count = 0;
+  bool csv = false, markdown = false;
+};
+
+constexpr char kNameHelp[] = "name, as armcal map lists it; an element in brackets, from 0";
+constexpr char kWhoMayWrite[] = "Without a key anyone who reaches the line may write within the ceilings.";
+
+std::string Hex(std::uint32_t value) { return fmt::format("{:08X}", value); }
+
+// info ---------------------------------------------------------------------------------------------------------------
+
+int RunInfo(const DeviceOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  const client::Identity id = drive.ReadIdentity();
+  const client::DriveStatus s = drive.ReadStatus();
+  static const char* const states[] = {"idle", "open", "loading", "checked", "committing", "active", "failed"};
+  static const char* const slots[] = {"blank", "good", "other schema", "corrupt", "refused at boot"};
+  static const char* const feed[] = {"off", "on", "cross-fading"};
+  const auto word = [](const auto& list, std::size_t k) { return k < std::size(list) ? list[k] : "?"; };
+  const auto state = static_cast<std::size_t>(s.transaction_state);
+  fmt::print("{}: serial number {}, firmware {}, map {}.{}, schema {}\n", drive.name(), id.serial_number,
+             id.firmware_version, id.map_major, id.map_minor, Hex(id.schema));
+  fmt::print("model: {} axes, {} parameters, {} columns; {} ticks a second, {} a sample\n", id.axes, id.parameters,
+             id.columns, id.tick_rate_Hz, id.sample_ticks);
+  fmt::print("table: {}; CRC {}, generation {}, stored as {}; slots {} and {}; feed-forward {}\n",
+             client::StatusName(s.table_status), Hex(s.active_crc), s.generation, s.store_sequence,
+             word(slots, s.slot_state[0]), word(slots, s.slot_state[1]), word(feed, s.feedforward_state));
+  fmt::print("now: tick {}, transaction {}, axes enabled 0x{:X}, health {}, {} samples lost\n", s.tick,
+             word(states, state), s.enabled_axes, s.health, s.sample_gaps);
+  ordered_json json{{"address", drive.name()},
+                    {"serial_number", id.serial_number},
+                    {"firmware_version", id.firmware_version},
+                    {"map", fmt::format("{}.{}", id.map_major, id.map_minor)},
+                    {"schema", Hex(id.schema)},
+                    {"axes", id.axes},
+                    {"parameters", id.parameters},
+                    {"columns", id.columns},
+                    {"capabilities", id.capabilities},
+                    {"tick_rate_Hz", id.tick_rate_Hz},
+                    {"sample_ticks", id.sample_ticks},
+                    {"table_status", static_cast<int>(s.table_status)},
+                    {"table_crc", Hex(s.active_crc)},
+                    {"generation", s.generation},
+                    {"store_sequence", s.store_sequence},
+                    {"slots", {word(slots, s.slot_state[0]), word(slots, s.slot_state[1])}},
+                    {"feedforward", word(feed, s.feedforward_state)},
+                    {"transaction", word(states, state)},
+                    {"tick", s.tick},
+                    {"enabled_axes", s.enabled_axes},
+                    {"health", s.health},
+                    {"sample_gaps", s.sample_gaps}};
+  if (id.map_minor >= 3) {
+    const auto w = drive.Read<reg::kWritingBlock>();
+    static const char* const seats[] = {"free", "this connection", "another connection"};
+    json["writer"] = word(seats, w.Get<reg::kWriterSeat>());
+    json["save_wait_s"] = w.Get<reg::kSaveWait>();
+    fmt::print("writer: {}; next save in {} s\n", word(seats, w.Get<reg::kWriterSeat>()), w.Get<reg::kSaveWait>());
+  }
+  fmt::print("{}\n", kWhoMayWrite);
+  json["who_may_write"] = kWhoMayWrite;
+  WriteJson(o.json, json);
+  return kOk;
+}
+
+// get, set -----------------------------------------------------------------------------------------------------------
+
+// "generation", or "estimate_a[3]": elements count from 0.
+struct Named {
+  const Register* r;
+  int element;  // -1: all
+};
+
+Named Find(const std::string& name) {
+  const auto bracket = name.find('[');
+  const std::string plain = name.substr(0, bracket);
+  int element = -1;
+  if (bracket != std::string::npos) {
+    const char* const first = name.c_str() + bracket + 1;
+    const auto [end, error] = std::from_chars(first, name.c_str() + name.size(), element);
+    if (error != std::errc() || std::string(end) != "]" || element < 0)
+      throw io::InputError(name + ": expected an element as in estimate_a[3], from 0");
+  }
+  for (const Register& r : link::kRegisters)
+    if (plain == r.name) {
+      if (element >= r.count) throw io::InputError(fmt::format("{}: has elements 0 to {}", name, r.count - 1));
+      return {&r, element};
+    }
+  throw io::InputError(name + ": no such register; armcal map lists them");
+}
+
+ordered_json ValueOf(const Register& r, const std::uint16_t* w) {
+  if (r.type == RegisterType::kU16) return *w;
+  if (r.type == RegisterType::kU32) return core::GetU32(w);
+  const float value = core::GetF32(w);
+  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
+}
+
+// How many elements the drive has of a register.
+int Elements(const client::Identity& id, const Register& r) {
+  const std::string name = r.name;
+  if (name == "residual_rms" || name == "consistency") return id.axes;
+  if (name.rfind("estimate_", 0) == 0 || name.rfind("deviation_", 0) == 0) return id.columns;
+  if (name == "active_table" || name == "staged_table") return id.table_words;
+  return r.count;
+}
+
+ordered_json ReadRegister(client::DriveClient& drive, const Named& named) {
+  const Register& r = *named.r;
+  const int size = link::WordsOf(r.type);
+  const int first = named.element < 0 ? 0 : named.element;
+  const int count = named.element < 0 ? Elements(drive.ReadIdentity(), r) : 1;
+  const auto words = r.kind == RegisterKind::kInput ? drive.ReadInput(r + first * size, count * size)
+                                                    : drive.ReadHolding(r + first * size, count * size);
+  ordered_json values = ordered_json::array();
+  for (int k = 0; k < count; ++k) values.push_back(ValueOf(r, words.data() + k * size));
+  return count == 1 ? values[0] : values;
+}
+
+int RunGet(const DeviceOptions& o) {
+  const Named named = Find(o.name);
+  client::DriveClient drive = ConnectTo(o.connect);
+  const ordered_json value = ReadRegister(drive, named);
+  fmt::print("{} = {}{}{}\n", o.name, value.dump(), *named.r->unit ? " " : "", named.r->unit);
+  WriteJson(o.json, {{"name", o.name}, {"value", value}, {"unit", named.r->unit}, {"meaning", named.r->meaning}});
+  return kOk;
+}
+
+std::vector<std::uint16_t> WordsOf(const Named& named, const std::string& text) {
+  const Register& r = *named.r;
+  char* end = nullptr;
+  const bool hex = text.rfind("0x", 0) == 0;
+  const double value =
+      hex ? static_cast<double>(std::strtoull(text.c_str(), &end, 16)) : std::strtod(text.c_str(), &end);
+  const double most = r.type == RegisterType::kU16 ? 65535 : 4294967295.0;
+  const bool number = !text.empty() && *end == '\0' && std::isfinite(value);
+  if (!number || (r.type != RegisterType::kF32 && (value < 0 || value > most || value != std::floor(value))))
+    throw io::InputError(fmt::format(
+        "{}: {}: expected {}", r.name, text,
+        r.type == RegisterType::kF32 ? "a finite number" : fmt::format("an integer from 0 to {:.0f}", most)));
+  if (r.range.given && (value < r.range.low || value > r.range.high))
+    throw io::InputError(fmt::format("{}: {}: expected {:.0f} to {:.0f}", r.name, text, r.range.low, r.range.high));
+  std::vector<std::uint16_t> words(link::WordsOf(r.type));
+  if (r.type == RegisterType::kU16) words[0] = static_cast<std::uint16_t>(value);
+  if (r.type == RegisterType::kU32) core::PutU32(words.data(), static_cast<std::uint32_t>(value));
+  if (r.type == RegisterType::kF32) core::PutF32(words.data(), static_cast<float>(value));
+  return words;
+}
+
+int RunSet(const DeviceOptions& o) {
+  const Named named = Find(o.name);
+  const Register& r = *named.r;
+  if (r.access != link::Access::kWrite)
+    throw io::InputError(fmt::format(
+        "{}: {}", o.name,
+        r.access == link::Access::kRead ? "can only be read" : "is written with its whole block, by the verb for it"));
+  const std::vector<std::uint16_t> words = WordsOf(named, o.value);
+  if (named.element < 0 && r.count > 1) throw io::InputError(o.name + ": expected an element, as in " + o.name + "[0]");
+  client::DriveClient drive = ConnectTo(o.connect);
+  std::optional<client::WriterSeat> seat;
+  if (std::string(r.name).rfind("learning_", 0) == 0) seat.emplace(drive);
+  const int at = r + std::max(0, named.element) * link::WordsOf(r.type);
+  if (words.size() == 1) drive.WriteSingle(at, words[0]);
+  else drive.Write(at, words);
+  const ordered_json value = ReadRegister(drive, named);
+  fmt::print("{} was set to {}, reads {}\n", o.name, o.value, value.dump());
+  WriteJson(o.json, {{"name", o.name}, {"set", o.value}, {"reads", value}});
+  return kOk;
+}
+
+// watch --------------------------------------------------------------------------------------------------------------
+
+// Whatever else is on the screen scrolls away; each look is one block of lines.
+int RunWatch(const DeviceOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  const client::Identity id = drive.ReadIdentity();
+  const InterruptGuard guard;
+  const bool monitor = (id.capabilities & reg::kHasFilterA) != 0;
+  ordered_json looks = ordered_json::array();
+  for (int look = 0; (o.count == 0 || look < o.count) && !InterruptGuard::interrupted(); ++look) {
+    if (look > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+    const client::DriveStatus s = drive.ReadStatus();
+    ordered_json json{{"tick", s.tick},           {"generation", s.generation},
+                      {"health", s.health},       {"enabled_axes", s.enabled_axes},
+                      {"clamped", s.clamp_count}, {"sample_gaps", s.sample_gaps}};
+    fmt::print("tick {}  generation {}  health {}  enabled 0x{:X}  clamped {}  lost {}\n", s.tick, s.generation,
+               s.health, s.enabled_axes, s.clamp_count, s.sample_gaps);
+    if (monitor) {
+      const auto rms = drive.ReadFloats(reg::kResidualRms, id.axes), nis = drive.ReadFloats(reg::kConsistency, id.axes);
+      fmt::print("  residual / N*m {:>9.3f}\n  consistency    {:>9.3f}\n", fmt::join(rms, " "), fmt::join(nis, " "));
+      json["residual_rms_Nm"] = rms, json["consistency"] = nis;
+    }
+    std::fflush(stdout);
+    if (!o.json.empty()) looks.push_back(json);
+  }
+  WriteJson(o.json, looks);
+  return kOk;
+}
+
+// map, scan ----------------------------------------------------------------------------------------------------------
+
+int RunMap(const DeviceOptions& o) {
+  const std::string text = o.csv        ? client::RegisterCsv()
+                           : o.markdown ? client::RegisterMarkdown()
+                                        : client::RegisterJson();
+  if (o.json.empty() || o.csv || o.markdown) fmt::print("{}", text);
+  if (!o.json.empty()) WriteJson(o.json, ordered_json::parse(client::RegisterJson()));
+  return kOk;
+}
+
+// Units of a serial line, or ports of a host.
+int RunScan(const DeviceOptions& o) {
+  ordered_json found = ordered_json::array();
+  const bool serial = IsSerialLine(o.connect);
+  if (o.from > o.to) throw io::InputError(fmt::format("--from {}: expected at most --to {}", o.from, o.to));
+  for (int k = o.from; k <= o.to; ++k) {
+    const std::string address =
+        serial ? fmt::format("{}:{}:{}:{}", o.connect, 115200, 'E', k) : fmt::format("{}:{}", o.connect, k);
+    try {
+      client::DriveClient drive = ConnectTo(address);
+      const client::Identity id = drive.ReadIdentity();
+      fmt::print("{}: serial number {}, schema {}, {} axes\n", address, id.serial_number, Hex(id.schema), id.axes);
+      found.push_back(
+          {{"address", address}, {"serial_number", id.serial_number}, {"schema", Hex(id.schema)}, {"axes", id.axes}});
+    } catch (const client::LinkError&) {
+    } catch (const client::RefusedError&) {
+    }
+  }
+  if (found.empty()) fmt::print("no drive found\n");
+  WriteJson(o.json, found);
+  return found.empty() ? kLink : kOk;
+}
+
+// The table in force as a file, and back ------------------------------------------------------------------------------
+
+// What a backup holds: the words, and what they belong to.
+ordered_json Backup(client::DriveClient& drive) {
+  const client::Identity id = drive.ReadIdentity();
+  const auto words = client::ReadActiveTable(drive);
+  const client::DriveStatus s = drive.ReadStatus();
+  const std::uint32_t crc = core::Crc32Words(words.data(), words.size());
+  if (s.table_status != core::Status::kOk)
+    throw client::RefusedError(
+        fmt::format("{}: has no valid table: {}", drive.name(), client::StatusName(s.table_status)), 0, s.table_status);
+  if (s.active_crc != crc)
+    throw client::VerifyError(fmt::format("{}: the table was read with CRC {}, the drive says {}", drive.name(),
+                                          Hex(crc), Hex(s.active_crc)));
+  return {{"armcal_backup", 1},
+          {"schema", Hex(id.schema)},
+          {"serial_number", id.serial_number},
+          {"table_crc", Hex(crc)},
+          {"words", words}};
+}
+
+std::vector<std::uint16_t> ReadBackup(const std::string& path) {
+  const auto json = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
+  const auto bad = [&](const char* what) {
+    return io::InputError(path + ": expected a file of armcal backup: " + what);
+  };
+  if (!json.is_object() || json.value("armcal_backup", ordered_json()) != 1 || !json.contains("words"))
+    throw bad("with \"armcal_backup\": 1 and \"words\"");
+  std::vector<std::uint16_t> words;
+  if (!json["words"].is_array()) throw bad("\"words\" is no list");
+  for (const auto& w : json["words"]) {
+    if (!w.is_number_unsigned() || w.get<std::uint64_t>() > 0xFFFF) throw bad("a word is no number from 0 to 65535");
+    words.push_back(w.get<std::uint16_t>());
+  }
+  if (json.value("table_crc", ordered_json()) != Hex(core::Crc32Words(words.data(), words.size())))
+    throw bad("words and \"table_crc\" differ");
+  return words;
+}
+
+int RunBackup(const DeviceOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  const ordered_json backup = Backup(drive);
+  files::WriteWholeFile(o.file, backup.dump(1) + "\n");
+  fmt::print("{}: {} registers, CRC {}, written to {}\n", drive.name(), backup["words"].size(),
+             backup["table_crc"].get<std::string>(), o.file);
+  WriteJson(o.json, {{"file", o.file}, {"table_crc", backup["table_crc"]}, {"registers", backup["words"].size()}});
+  return kOk;
+}
+
+int RunRestore(const DeviceOptions& o) {
+  const std::vector<std::uint16_t> words = ReadBackup(o.file);
+  client::DriveClient drive = ConnectTo(o.connect);
+  const client::FlashReport report = client::FlashTable(drive, words);
+  fmt::print("{}: {} registers stored, adopted and read back: CRC {}, generation {}, store sequence {}\n", drive.name(),
+             words.size(), Hex(report.crc), report.generation, report.store_sequence);
+  WriteJson(o.json, {{"table_crc", Hex(report.crc)},
+                     {"readback_ok", true},
+                     {"generation", report.generation},
+                     {"store_sequence", report.store_sequence}});
+  return kOk;
+}
+
+int RunDiff(const DeviceOptions& o) {
+  const std::vector<std::uint16_t> words = ReadBackup(o.file);
+  client::DriveClient drive = ConnectTo(o.connect);
+  const auto active = client::ReadActiveTable(drive);
+  ordered_json differ = ordered_json::array();
+  for (std::size_t k = 0; k < std::max(words.size(), active.size()); ++k) {
+    const auto is = k < active.size() ? ordered_json(active[k]) : ordered_json(),
+               was = k < words.size() ? ordered_json(words[k]) : ordered_json();
+    if (is == was) continue;
+    differ.push_back({{"word", k}, {"drive", is}, {"file", was}});
+    fmt::print("word {}: drive {}, file {}\n", k, is.dump(), was.dump());
+  }
+  fmt::print("{}: {}\n", drive.name(),
+             differ.empty() ? "the table in force is this file's" : fmt::format("{} words differ", differ.size()));
+  WriteJson(o.json, {{"same", differ.empty()}, {"differ", differ}});
+  return differ.empty() ? kOk : kMismatch;
+}
+
+CLI::App* Add(CLI::App& app, Action& action, const char* name, const char* help,
+              const std::shared_ptr<DeviceOptions>& o, int (*run)(const DeviceOptions&), bool connects = true) {
+  auto* verb = app.add_subcommand(name, help);
+  if (connects) verb->add_option("--connect", o->connect, kConnectHelp)->required();
+  verb->add_option("--json", o->json, "write the result here");
+  verb->callback([o, &action, run] { action = [o, run] { return Reported(o->json, [&] { return run(*o); }); }; });
+  return verb;
+}
+
+}  // namespace
+
+void AddDevice(CLI::App& app, Action& action) {
+  const auto options = [] { return std::make_shared<DeviceOptions>(); };
+  Add(app, action, "info",
+      "what a drive is and does now, and who may write\nexample: armcal info --connect 127.0.0.1:1502", options(),
+      RunInfo);
+  auto o = options();
+  auto* verb = Add(app, action, "get",
+                   "read a register by its name\nexample: armcal get generation --connect 127.0.0.1:1502\nexample: "
+                   "armcal get estimate_a[3] --connect 127.0.0.1:1502",
+                   o, RunGet);
+  verb->add_option("name", o->name, kNameHelp)->required();
+  o = options();
+  verb = Add(app, action, "set",
+             "write a register by its name, within its range\nexample: armcal set learning_hold 1 --connect "
+             "127.0.0.1:1502",
+             o, RunSet);
+  verb->add_option("name", o->name, kNameHelp)->required();
+  verb->add_option("value", o->value, "number; integers also as 0x1F")->required();
+  o = options();
+  verb = Add(app, action, "watch",
+             "show state, residuals and consistency once a second, until Ctrl-C\nexample: armcal watch --connect "
+             "127.0.0.1:1502",
+             o, RunWatch);
+  verb->add_option("--count", o->count, "so many times (default: until Ctrl-C)")->check(CLI::Range(1, 1000000));
+  o = options();
+  verb = Add(app, action, "scan",
+             "find drives: units of a serial line, or ports of a host\nexit code 3: none\nexample: armcal scan "
+             "/dev/ttyUSB0 --to 10\nexample: armcal scan 192.168.0.10 --from 502 --to 502",
+             o, RunScan, false);
+  verb->add_option("line", o->connect, "serial line or host")->required();
+  verb->add_option("--from", o->from, "first unit or port")->capture_default_str()->check(CLI::Range(1, 65535));
+  verb->add_option("--to", o->to, "last one")->capture_default_str()->check(CLI::Range(1, 65535));
+  o = options();
+  verb = app.add_subcommand("map", "print the register map of this version\nexample: armcal map --csv > registers.csv");
+  auto* json =
+      verb->add_option("--json", o->json, "as JSON, into this file, or without one to the terminal")->expected(0, 1);
+  verb->add_flag("--csv", o->csv, "as CSV")->excludes(json);
+  verb->add_flag("--md", o->markdown, "as the tables of SPEC.md")->excludes(json);
+  verb->callback([o, &action] { action = [o] { return RunMap(*o); }; });
+  o = options();
+  verb = Add(app, action, "backup",
+             "write the table in force to a file, word for word\nexample: armcal backup drive.json --connect "
+             "127.0.0.1:1502",
+             o, RunBackup);
+  verb->add_option("file", o->file, "file to write")->required();
+  o = options();
+  verb = Add(app, action, "restore",
+             "store and adopt the table of a backup\nexample: armcal restore drive.json --connect 127.0.0.1:1502", o,
+             RunRestore);
+  verb->add_option("file", o->file, "file of armcal backup")->required();
+  o = options();
+  verb = Add(app, action, "diff",
+             "compare the table in force with a backup\nexit code 5: they differ\nexample: armcal diff drive.json "
+             "--connect 127.0.0.1:1502",
+             o, RunDiff);
+  verb->add_option("file", o->file, "file of armcal backup")->required();
+}
+
+}  // namespace armcal::tool

@@ -1,0 +1,99 @@
+// controller - decodes, judges and builds a table in slices, so that no call takes long.
+#pragma once
+
+#include "armcal/estimator/adopted_table.hpp"
+#include "armcal/model/ceilings.hpp"
+#include "armcal/model/friction_grid.hpp"
+
+namespace armcal::controller {
+
+// The check of one table. Begin, then Step until it no longer answers kBusy. Context: background.
+template <class Model>
+class TableCheck {
+ public:
+  static constexpr int n = Model::kJoints;
+
+  // `words`: a table in its layout. It stays as it is until the end, and so does `spare`, which the check fills in.
+  // suits: whether the filters can hold what the table asks for. The other two as model::CheckWords.
+  void Begin(const std::uint16_t* words, const model::CeilingView& ceilings, bool bumpless_allowed,
+             std::uint32_t generation, bool (*suits)(const estimator::AdoptedTable<Model>&),
+             estimator::AdoptedTable<Model>& spare) {
+    words_ = words;
+    ceilings_ = ceilings;
+    bumpless_allowed_ = bumpless_allowed;
+    generation_ = generation;
+    suits_ = suits;
+    spare_ = &spare;
+    stage_ = Stage::kWords;
+  }
+
+  // One slice. kBusy: call again. Otherwise what the first check that refuses says: of the heading and the numbers
+  // (model::CheckHeading, CheckWords), of the build (estimator::TableBuild), kOutOfRange (a filter's form cannot hold
+  // it), of the friction (model::CheckFriction). kOk: `spare` is ready.
+  core::Refusal Step() {
+    core::Refusal refusal;
+    switch (stage_) {
+      case Stage::kWords:
+        refusal.status = model::CheckHeading<n, Model::kParameters>(words_, Model::kSchema);
+        if (core::IsOk(refusal.status)) refusal = model::CheckWords(ceilings_, bumpless_allowed_, words_);
+        return Next(Stage::kDecode, refusal);
+      case Stage::kDecode:
+        refusal.status = model::Decode(words_, Model::kSchema, table_);
+        build_.Begin(table_, generation_, rigid_, *spare_);
+        return Next(Stage::kBuild, refusal);
+      case Stage::kBuild:
+        refusal.status = build_.Step();
+        if (core::IsOk(refusal.status) && !suits_(*spare_)) refusal.status = core::Status::kOutOfRange;
+        memory_.running = false;
+        point_ = 0;
+        return Next(Stage::kFriction, refusal);
+      case Stage::kFriction:
+        return TryFriction();
+    }
+    return refusal;
+  }
+
+  // Builds the model's defaults into `spare`, at once. They are not compared with the ceilings. Answers as Step.
+  core::Status BuildDefaults(std::uint32_t generation, bool (*suits)(const estimator::AdoptedTable<Model>&),
+                             estimator::AdoptedTable<Model>& spare) {
+    table_ = estimator::DefaultTable<Model>();
+    const core::Status built = estimator::BuildAdoptedTable(table_, generation, rigid_, spare);
+    return core::IsOk(built) && !suits(spare) ? core::Status::kOutOfRange : built;
+  }
+
+ private:
+  enum class Stage : std::uint8_t { kWords, kDecode, kBuild, kFriction };
+  static constexpr int kPoints = 4;  // of the grid, in a slice
+
+  core::Refusal Next(Stage next, core::Refusal refusal) {
+    if (!core::IsOk(refusal.status)) return refusal;
+    stage_ = next;
+    refusal.status = core::Status::kBusy;
+    return refusal;
+  }
+
+  core::Refusal TryFriction() {
+    core::Refusal refusal;
+    constexpr int kAll = model::GridPoints(Model::kFrictionReads);
+    for (int k = 0; k < kPoints && point_ < kAll && core::IsOk(refusal.status); ++k, ++point_)
+      refusal = model::CheckFrictionAt(point_, spare_->committed, ceilings_, memory_, rows_);
+    if (core::IsOk(refusal.status) && point_ < kAll) refusal.status = core::Status::kBusy;
+    return refusal;
+  }
+
+  const std::uint16_t* words_ = nullptr;
+  model::CeilingView ceilings_ = {};
+  bool (*suits_)(const estimator::AdoptedTable<Model>&) = nullptr;
+  estimator::AdoptedTable<Model>* spare_ = nullptr;
+  estimator::Table<Model> table_;  // the last one that was decoded
+  estimator::RigidPrior<Model, float> rigid_;
+  estimator::TableBuild<Model> build_;
+  model::Memory<Model> memory_;
+  model::Rows<Model> rows_;
+  std::uint32_t generation_ = 0;
+  int point_ = 0;
+  bool bumpless_allowed_ = false;
+  Stage stage_ = Stage::kWords;
+};
+
+}  // namespace armcal::controller

@@ -1,0 +1,100 @@
+// end-to-end tests - the verbs for a technician at a drive, and a port that may only be read.
+#include <fmt/core.h>
+
+#include "armcal/core/crc.hpp"
+#include "codegen/src/generator/load.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
+#include "tests/e2e/tool.hpp"
+
+namespace armcal::tests {
+namespace {
+
+class DeviceVerbs : public testing::Test {
+ protected:
+  Outcome Ask(std::vector<std::string> words, const std::string& address = "") {
+    words.insert(words.end(), {"--connect", address.empty() ? drive_.address() : address, "--json",
+                               (folder_ / "out.json").string()});
+    return Tool(words);
+  }
+  nlohmann::json Json() const { return ReadJson(folder_ / "out.json"); }
+
+  fs::path folder_ = FreshFolder("device_verbs");
+  RunningDrive drive_{folder_};
+};
+
+TEST_F(DeviceVerbs, Info_SaysWhatTheDriveIsAndWhoMayWrite) {
+  const Outcome o = Ask({"info"});
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.out.find("Without a key anyone who reaches the line may write within the ceilings."), std::string::npos);
+  EXPECT_EQ(Json()["axes"], 6);
+  EXPECT_EQ(Json()["map"], "1.4");
+  EXPECT_EQ(Json()["writer"], "free");
+}
+
+TEST_F(DeviceVerbs, GetAndSet_GoByNameAndKeepTheRange) {
+  ASSERT_EQ(Ask({"set", "scratch[3]", "0x1F"}).code, 0);
+  EXPECT_EQ(Json()["reads"], 31);
+  ASSERT_EQ(Ask({"get", "scratch[3]"}).code, 0);
+  EXPECT_EQ(Json()["value"], 31);
+  ASSERT_EQ(Ask({"get", "residual_rms"}).code, 0);
+  EXPECT_EQ(Json()["value"].size(), 6u);
+  ASSERT_EQ(Ask({"set", "learning_hold", "1"}).code, 0) << "it takes the writer's seat itself, and leaves it";
+  EXPECT_EQ(Json()["reads"], 1);
+  ExpectOneLine(Ask({"set", "learning_hold", "2"}), 2, "expected 0 to 1");
+  ExpectOneLine(Ask({"set", "generation", "2"}), 2, "can only be read");
+  ExpectOneLine(Ask({"get", "no_such"}), 2, "armcal map");
+  EXPECT_EQ(Json()["exit_code"], 2);
+  ExpectOneLine(Ask({"set", "residual_select", "9"}), 4, "OutOfRange");
+  EXPECT_EQ(Json()["exit_code"], 4);
+}
+
+TEST_F(DeviceVerbs, ABackup_ComesBackWordForWord_AndADamagedOneIsRefused) {
+  const std::string file = (folder_ / "backup.json").string();
+  ExpectOneLine(Ask({"backup", file}), 4, "no valid table");
+  const auto write = [&](const std::vector<std::uint16_t>& words, std::uint32_t crc) {
+    std::ofstream(file) << nlohmann::json{
+        {"armcal_backup", 1}, {"table_crc", fmt::format("{:08X}", crc)}, {"words", words}};
+  };
+  auto words = calibration::EncodeTable(calibration::DefaultTable(codegen::LoadModel("er20_like")));
+  const std::uint32_t crc = core::Crc32Words(words.data(), words.size());
+  write(words, crc + 1);
+  ExpectOneLine(Ask({"restore", file}), 2, "table_crc");
+  write(words, crc);
+  ASSERT_EQ(Ask({"restore", file}).code, 0);
+  EXPECT_EQ(Ask({"diff", file}).code, 0);
+  fs::remove(file);
+  ASSERT_EQ(Ask({"backup", file}).code, 0);
+  EXPECT_EQ(ReadJson(file)["words"].get<std::vector<std::uint16_t>>(), words);
+  words[17] ^= 1;
+  write(words, core::Crc32Words(words.data(), words.size()));
+  EXPECT_EQ(Ask({"diff", file}).code, 5);
+  EXPECT_EQ(Json()["differ"][0]["word"], 17);
+}
+
+TEST_F(DeviceVerbs, WatchScanAndMap_WriteWhatTheyShow) {
+  ASSERT_EQ(Ask({"watch", "--count", "1"}).code, 0);
+  EXPECT_EQ(Json().size(), 1u);
+  EXPECT_EQ(Json()[0]["residual_rms_Nm"].size(), 6u);
+  const std::string port = std::to_string(drive_.port());
+  ASSERT_EQ(Tool({"scan", "127.0.0.1", "--from", port, "--to", port, "--json", (folder_ / "out.json").string()}).code,
+            0);
+  EXPECT_EQ(Json()[0]["address"], drive_.address());
+  const Outcome csv = Tool({"map", "--csv"});
+  EXPECT_NE(csv.out.find("holding,337,1,u16,rw,learning_reset,,1 to 17"), std::string::npos);
+  EXPECT_NE(Tool({"map", "--md"}).out.find("### Holding registers"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(Tool({"map", "--json"}).out)["map_minor"], 4);
+}
+
+TEST(ReadPort, MayBeReadButNotWritten) {
+  const fs::path folder = FreshFolder("read_port");
+  const TakenPort free_one(false);
+  const int port = free_one.port() + 1;
+  const RunningDrive drive(folder, "none", {"--read-port", std::to_string(port)});
+  const std::string address = "127.0.0.1:" + std::to_string(port);
+  ASSERT_EQ(Tool({"get", "generation", "--connect", address}).code, 0);
+  ExpectOneLine(Tool({"set", "scratch[0]", "1", "--connect", address}), 4, "Forbidden");
+  EXPECT_EQ(Tool({"set", "scratch[0]", "1", "--connect", drive.address()}).code, 0);
+}
+
+}  // namespace
+}  // namespace armcal::tests

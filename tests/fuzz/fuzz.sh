@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# fuzz - runs libFuzzer on every target, or on those named, for so many seconds each. Needs clang (toolchains/install.sh fuzz).
+#   tests/fuzz/fuzz.sh SECONDS [TARGET...]
+# What it finds is kept in build/fuzz, so the next run goes on from there; the counts of all runs add up in build/fuzz/<target>.runs.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+seconds=${1:?how many seconds}
+shift
+targets=("$@")
+[[ ${#targets[@]} -gt 0 ]] || targets=(rtu tcp engine table vendor csv gzip robot)
+mkdir -p build/fuzz
+
+flags=(-std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined -I. -Ilib
+  -isystem /usr/include/eigen3 -DFMT_HEADER_ONLY -DNDEBUG)
+wire=(tests/fuzz/wire_targets.cpp host_sim/machine/drive/vendor_block.cpp lib/armcal/link/*.cpp lib/armcal/table/*.cpp)
+readers=(tests/fuzz/reader_targets.cpp host_sim/data/files/*.cpp codegen/src/io/*.cpp
+  codegen/src/robot/{robot,payload,import_urdf,no_urdf}.cpp)
+for part in wire readers; do
+  declare -n sources=$part
+  mkdir -p "build/fuzz/$part"
+  for source in "${sources[@]}"; do
+    object=build/fuzz/$part/$(echo "$source" | tr / _).o
+    [[ $object -nt $source ]] || clang++ "${flags[@]}" -fsanitize=fuzzer-no-link -c "$source" -o "$object"
+  done
+done
+
+for target in "${targets[@]}"; do
+  part=wire libraries=()
+  case $target in csv | gzip | robot) part=readers libraries=(-lz) ;; esac
+  clang++ "${flags[@]}" -fsanitize=fuzzer -DARMCAL_FUZZ="${target^}" tests/fuzz/entry.cpp build/fuzz/$part/*.o \
+    "${libraries[@]}" -o "build/fuzz/fuzz_$target"
+  mkdir -p "build/fuzz/corpus/$target"
+  log=build/fuzz/$target.log
+  "build/fuzz/fuzz_$target" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=1500 -print_final_stats=1 \
+    -artifact_prefix="build/fuzz/$target-" "build/fuzz/corpus/$target" "tests/fuzz/corpus/$target" >"$log" 2>&1 ||
+    { tail -n 40 "$log"; echo "$target: FAILED"; exit 1; }
+  runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
+  total=$((runs + $(cat "build/fuzz/$target.runs" 2>/dev/null || echo 0)))
+  echo "$total" >"build/fuzz/$target.runs"
+  echo "$target: $runs executions, $total in all runs"
+done

@@ -1,0 +1,30 @@
+// fuzz - what arbitrary bytes are given to. Each target ends the program if something that must never happen does.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace armcal::fuzz {
+
+struct Target {
+  const char* name;  // also of its folder in tests/fuzz/corpus
+  void (*run)(const std::uint8_t* bytes, std::size_t count);
+};
+
+// The bytes that come over a line, and the words of a table.
+void Rtu(const std::uint8_t* bytes, std::size_t count);
+void Tcp(const std::uint8_t* bytes, std::size_t count);
+// Requests of three connections, and whole steps of flashing: the table in force is the one before or one that was
+// checked.
+void Engine(const std::uint8_t* bytes, std::size_t count);
+void Table(const std::uint8_t* bytes, std::size_t count);
+void Vendor(const std::uint8_t* bytes, std::size_t count);
+// Files. Bad ones are io::InputError, nothing else.
+void Csv(const std::uint8_t* bytes, std::size_t count);
+void Gzip(const std::uint8_t* bytes, std::size_t count);
+void Robot(const std::uint8_t* bytes, std::size_t count);
+
+inline constexpr Target kTargets[] = {{"rtu", Rtu},       {"tcp", Tcp}, {"engine", Engine}, {"table", Table},
+                                      {"vendor", Vendor}, {"csv", Csv}, {"gzip", Gzip},     {"robot", Robot}};
+
+}  // namespace armcal::fuzz

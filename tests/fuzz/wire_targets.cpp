@@ -1,0 +1,215 @@
+// fuzz - framers, the engine with a whole device, the trajectory player's registers, and the check of a table.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+#include "armcal/estimator/adopted_table.hpp"
+#include "armcal/link/rtu.hpp"
+#include "armcal/link/tcp.hpp"
+#include "armcal/model/ceilings.hpp"
+#include "armcal/model/parameters.hpp"
+#include "codegen/generated/er20_like/model.hpp"
+#include "host_sim/machine/drive/vendor_block.hpp"
+#include "tests/fuzz/targets.hpp"
+#include "tests/unit/link/test_device.hpp"
+
+namespace armcal::fuzz {
+namespace {
+
+void Must(bool holds, const char* what) {
+  if (holds) return;
+  std::fprintf(stderr, "must never happen: %s\n", what);
+  std::abort();
+}
+
+// Takes numbers off the front; zeros when nothing is left.
+struct Source {
+  const std::uint8_t* bytes;
+  std::size_t left;
+  std::uint8_t Byte() { return left == 0 ? std::uint8_t{0} : (--left, *bytes++); }
+  std::uint16_t Word() {
+    const auto high = static_cast<std::uint16_t>(Byte() << 8);
+    return static_cast<std::uint16_t>(high | Byte());
+  }
+};
+
+class StillArm final : public drive::PlayedMotion {
+ public:
+  bool Load(double step_s, std::uint32_t points, const float* q) override {
+    Must(step_s > 0 && points > 0, "an empty trajectory is played");
+    for (std::uint32_t k = 0; k < 6 * points; ++k) Must(std::isfinite(q[k]), "a point that is not finite is played");
+    return true;
+  }
+  void SetSpeed(double share) override { Must(share > 0 && share <= 1, "a speed beyond 100 %"); }
+  void Command(client::PlayerCommand command) override { enabled_ = command != client::PlayerCommand::kDisable; }
+  client::PlayerState state() const override {
+    return enabled_ ? client::PlayerState::kHolding : client::PlayerState::kDisabled;
+  }
+  client::StopReason reason() const override { return client::StopReason::kNone; }
+  std::uint32_t first_tick() const override { return 0; }
+  std::uint32_t last_tick() const override { return 0; }
+
+ private:
+  bool enabled_ = false;
+};
+
+}  // namespace
+
+void Rtu(const std::uint8_t* bytes, std::size_t count) {
+  link::RtuFramer framer(17, 10);
+  Source in{bytes, count};
+  std::uint32_t now_ms = in.Byte();
+  while (in.left > 0) {
+    const std::uint8_t how = in.Byte();
+    now_ms += how % 16;
+    std::size_t part = std::min<std::size_t>(in.left, how / 4u), used = 0;
+    const auto result = framer.OnBytes(in.bytes, part, now_ms, used);
+    Must(used <= part, "more bytes taken than given");
+    if (result != link::RtuFramer::Result::kNothing)
+      Must(framer.pdu_bytes() >= 1 && framer.pdu_bytes() <= link::kMaxPdu, "a request of impossible length");
+    in.bytes += used, in.left -= used;
+  }
+}
+
+void Tcp(const std::uint8_t* bytes, std::size_t count) {
+  link::TcpFramer framer;
+  for (std::size_t at = 0, used = 0; at < count; at += used) {
+    const std::size_t part = std::min<std::size_t>(count - at, 1 + bytes[at] % 40u);
+    const auto result = framer.OnBytes(bytes + at, part, used);
+    if (result == link::TcpFramer::Result::kBroken) return;
+    Must(used <= part && used > 0, "a stream that stands still");
+    if (result == link::TcpFramer::Result::kFrame)
+      Must(framer.pdu_bytes() >= 1 && framer.pdu_bytes() <= link::kMaxPdu, "a request of impossible length");
+  }
+}
+
+void Engine(const std::uint8_t* bytes, std::size_t count) {
+  namespace reg = link::reg;
+  const auto drive = std::make_unique<test::TestDevice>();
+  Source in{bytes, count};
+  const std::vector<std::uint16_t> before = drive->active;
+  const std::uint32_t sessions[] = {0, drive->device.engine().sessions().Begin(),
+                                    drive->device.engine().sessions().Begin()};
+  std::vector<std::uint16_t> stage = test::MakeTable(1);
+  std::uint32_t now_ms = 0, sequence = 0;
+  std::vector<std::vector<std::uint16_t>> checked;
+  while (in.left > 0) {
+    const std::uint8_t what = in.Byte();
+    const std::uint32_t session = sessions[what / 8 % 3];
+    std::uint8_t reply[link::kMaxPdu];
+    const auto ask = [&](const std::vector<std::uint8_t>& pdu) {
+      std::size_t length = drive->device.engine().Handle(pdu.data(), pdu.size(), reply, session);
+      for (int turn = 0; turn < 100 && length == link::kReplyLater; ++turn) {
+        drive->device.Step(now_ms);
+        length = drive->device.engine().Handle(pdu.data(), pdu.size(), reply, session);
+      }
+      Must(length <= link::kMaxPdu && (pdu.empty() ? length == 0 : length >= 2), "a reply of impossible length");
+    };
+    const auto write = [&](int first, const std::vector<std::uint16_t>& words) {
+      std::vector<std::uint8_t> pdu{
+          16, static_cast<std::uint8_t>(first >> 8),   static_cast<std::uint8_t>(first),
+          0,  static_cast<std::uint8_t>(words.size()), static_cast<std::uint8_t>(2 * words.size())};
+      for (const std::uint16_t w : words)
+        pdu.push_back(static_cast<std::uint8_t>(w >> 8)), pdu.push_back(static_cast<std::uint8_t>(w));
+      ask(pdu);
+    };
+    const auto command = [&](std::uint32_t name) {
+      link::Words<reg::kCommandBlock> w;
+      w.Set<reg::kSequence>(++sequence);
+      w.Set<reg::kCommand>(name);
+      w.Set<reg::kCommandSchema>(test::kSchema);
+      w.Set<reg::kCommandWords>(test::kTableWords);
+      w.Set<reg::kCommandCrc>(core::Crc32Words(stage.data(), stage.size()));
+      write(reg::kSequence.address, {w.data(), w.data() + w.size()});
+    };
+    switch (what % 8) {
+      case 0: {
+        std::vector<std::uint8_t> pdu(in.Byte());
+        for (std::uint8_t& byte : pdu) byte = in.Byte();
+        ask(pdu);
+        break;
+      }
+      case 1:
+        write(reg::kUnlock.address, {0x6B6C, 0x6E75});
+        break;
+      case 2:
+        command(reg::kOpen);
+        break;
+      case 3:
+        stage = test::MakeTable(in.Byte());
+        stage[2 + in.Byte() % 250u] = in.Word();
+        for (std::size_t at = 0; at < stage.size(); at += 120)
+          write(reg::kStagedTable.address + static_cast<int>(at),
+                {stage.begin() + static_cast<std::ptrdiff_t>(at),
+                 stage.begin() + static_cast<std::ptrdiff_t>(std::min(at + 120, stage.size()))});
+        break;
+      case 4:
+        command(reg::kCheck);
+        break;
+      case 5:
+        command(reg::kSave);
+        break;
+      case 6:
+        drive->application.enabled = in.Byte() % 4 == 0;
+        now_ms += in.Word();
+        break;
+      default:
+        for (int tick = 0; tick < 30; ++tick)
+          if (drive->raw.Offer(now_ms + static_cast<std::uint32_t>(tick)).last) {
+            const std::uint16_t record[8] = {};
+            (void)drive->raw.Push(record, 1);
+          }
+        break;
+    }
+    if (!drive->application.built.empty()) checked.push_back(drive->application.built);
+    for (int step = 0; step < 40; ++step) drive->device.Step(now_ms);
+    const bool old = drive->active == before;
+    Must(old || std::find(checked.begin(), checked.end(), drive->active) != checked.end(),
+         "a table in force that nobody has checked");
+    Must(old || drive->active == drive->application.adopted ||
+             drive->transaction.state() == link::TransactionState::kCommitting,
+         "a table in force that was not adopted");
+  }
+}
+
+// The model's own table, with words changed.
+void Table(const std::uint8_t* bytes, std::size_t count) {
+  using Model = generated::Er20Like;
+  std::vector<std::uint16_t> words(estimator::Table<Model>::kWords);
+  model::Encode(estimator::DefaultTable<Model>(), words.data());
+  for (Source in{bytes, count}; in.left > 0;) words[in.Word() % words.size()] = in.Word();
+  const bool head = core::IsOk(model::CheckHeading<Model::kJoints, Model::kParameters>(words.data(), Model::kSchema));
+  if (!head || !core::IsOk(model::CheckWords(model::View(Model::kCeilings), true, words.data()).status)) return;
+  estimator::Table<Model> table;
+  if (!core::IsOk(model::Decode(words.data(), Model::kSchema, table))) return;
+  for (int j = 0; j < Model::kJoints; ++j)
+    Must(table.joint[j].torque_limit_Nm > 0 && table.joint[j].torque_limit_Nm <= Model::kCeilings.joint[j].torque_Nm,
+         "a torque limit beyond the ceiling is accepted");
+  for (const auto& parameter : table.parameter)
+    Must(std::isfinite(parameter.mean), "a mean that is not finite is accepted");
+}
+
+void Vendor(const std::uint8_t* bytes, std::size_t count) {
+  StillArm arm;
+  drive::VendorBlock block(arm, 6);
+  link::RegisterMap map;
+  Must(core::IsOk(block.Serve(map)), "the player's registers do not fit the map");
+  Source in{bytes, count};
+  while (in.left > 0) {
+    constexpr std::uint16_t kFirst[] = {client::kPlayerCommand, client::kPlayerSpeed, client::kPlayerSetup,
+                                        client::kPlayerPoints};
+    const std::uint8_t how = in.Byte();
+    const auto first = static_cast<std::uint16_t>(kFirst[how % 4] + (how < 240 ? 0 : how % 16));
+    std::uint16_t words[123] = {};
+    const std::size_t most[] = {1, 1, 4, 14};
+    const std::size_t number = how < 200 ? most[how % 4] : in.Byte() % 123u;
+    for (std::size_t k = 0; k < number; ++k) words[k] = in.Word();
+    (void)map.Write(first, static_cast<std::uint16_t>(number), words);
+    (void)map.Read(how % 2 == 0 ? link::RegisterKind::kInput : link::RegisterKind::kHolding, first, 8, words);
+  }
+}
+
+}  // namespace armcal::fuzz

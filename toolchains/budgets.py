@@ -21,6 +21,8 @@ FILTER_KEYS = ["instructions", "solve", "read_out", "slice_max", "slice_min", "t
                "stack_bytes"]
 REGRESSOR_KEYS = ["instructions", "text_bytes", "stack_bytes"]
 ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "slice_min", "state_bytes"]
+CONTROLLER_KEYS = ["push", "feed_forward", "feed_forward_new", "step_learning", "step_checking", "step_saving", "request",
+                   "state_bytes"]
 READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "state_bytes", "stack_bytes"]
 NOT_THE_FILTERS = re.compile(r"Get_|Calls|MakeParts|\.rodata.*\.str")  # the bench's own part of an object
 # One filter's own: code that knows the layout, and the rotations that the forgetting filter alone has. One copy of the rest serves
@@ -55,8 +57,11 @@ def stack_bytes(file, root, faults):
 def measure(rows, objects, size, faults):
     """The rows of the JSON file, by kind."""
     by_name = {Path(o).name.split(".")[0]: o for o in objects}
-    figures = {"filters": [], "regressors": [], "estimators": [], "read_outs": []}
+    figures = {"filters": [], "regressors": [], "estimators": [], "controllers": [], "read_outs": []}
     for row in rows:
+        if row["kind"] == "controller":
+            figures["controllers"].append({"controller": row["name"]} | {k: row[k] for k in CONTROLLER_KEYS})
+            continue
         if row["kind"] == "estimator":
             figures["estimators"].append({"estimator": row["name"]} | {k: row[k] for k in ESTIMATOR_KEYS})
             continue
@@ -85,7 +90,7 @@ def measure(rows, objects, size, faults):
 def label(row):
     if "filter" in row:
         return f"{row['filter']}_{row['n']}"
-    return row.get("robot") or row.get("estimator") or row["read_out"]
+    return row.get("robot") or row.get("estimator") or row.get("controller") or row["read_out"]
 
 
 def compare(rows, keys, accepted, limits, section, rise, faults):
@@ -140,6 +145,10 @@ def tables(figures, core, budgets):
     whole += grid(figures["estimators"], [
         ("estimator, er20_like", 24, "", "estimator"), ("tick", 8, "", "push"), ("longest", 9, "", "push_max"),
         ("sample", 9, "", "sample"), *slices, state])
+    whole += grid(figures["controllers"], [
+        ("longest call, two filters", 26, "", "controller"), ("push", 8, "", "push"), ("torque", 8, "", "feed_forward"),
+        ("of a new table", 16, "", "feed_forward_new"), ("learning", 10, "", "step_learning"),
+        ("checking", 10, "", "step_checking"), ("saving", 8, "", "step_saving"), ("request", 9, "", "request"), state])
     if figures["read_outs"]:
         whole += grid(figures["read_outs"], [
             ("physical read-out", 24, "", "read_out"), ("instr.", 10, "", "instructions"), ("slices", 8, "", "slices"),
@@ -162,6 +171,7 @@ def main():
     print(text)
     accepted, rise = budgets.get(options.core, {}), budgets["rise"]
     for kind, keys in ("filters", FILTER_KEYS), ("regressors", REGRESSOR_KEYS), ("estimators", ESTIMATOR_KEYS), \
+            ("controllers", CONTROLLER_KEYS), \
             ("read_outs", READ_OUT_KEYS):
         compare(figures[kind], keys, accepted.get(kind, {}), budgets["limits"], f"{options.core}.{kind}", rise, faults)
     for fault in faults:

@@ -38,7 +38,15 @@
 // DESIGN.md says why things are as they are, SPEC.md has every bit on the wire and in storage.
 #pragma once
 
+// GCC's -Wsign-conversion names each array whose length is an int of a template.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+#endif
 #include "armcal/controller/controller.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
 #include "armcal/link/rtu.hpp"
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif

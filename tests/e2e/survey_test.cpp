@@ -13,13 +13,16 @@ class Survey : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = FreshFolder("survey");
+    unsetenv("ARMCAL_DATA");  // Table 12 on measured arms takes minutes, and no goal judges it
     run_ = Tool({"survey",
                  "--draws",
                  "3",
                  "--slow-draws",
                  "1",
-                 "--search-seconds",
-                 "3",
+                 "--search-seconds",  // never reached: the seed decides, not the machine
+                 "600",
+                 "--searches",
+                 "8",
                  "--table",
                  "5",
                  "--table",
@@ -38,6 +41,8 @@ class Survey : public testing::Test {
                  "12",
                  "--table",
                  "priors",
+                 "--table",
+                 "shipped",
                  "--table",
                  "figures",
                  "--json",
@@ -111,19 +116,22 @@ TEST_F(Survey, ForgettingFollowsBetterThanKalman_TheBankBetterThanBoth) {
   EXPECT_LT(bank, 0.6 * forgetting);
 }
 
-TEST_F(Survey, EveryTableAndFigureIsThere_AndGoalsThatNoSearchDecides_AreMet) {
-  for (const char* table :
-       {"trajectories", "5", "6", "7", "8", "9", "10", "10 tier 2", "11", "12", "(9)", "priors", "figure 4", "slips"})
+TEST_F(Survey, EveryTableAndFigureIsThere_AndEveryGoalIsMet) {
+  for (const char* table : {"trajectories", "5", "6", "7", "8", "9", "10", "10 tier 2", "11", "12", "(9)", "priors",
+                            "shipped prior", "figure 4", "slips"})
     EXPECT_TRUE(all_.at("tables").contains(table)) << table;
   const std::string page = ReadText(folder_ / "out.html");
   for (const char* figure : {"Figure 1", "Figure 2", "Figure 3", "Figure 4"})
     EXPECT_NE(page.find(figure), std::string::npos) << figure;
   EXPECT_GE(all_.at("goals").size(), 30U);
+  int shipped = 0;
   for (const auto& goal : all_.at("goals")) {
     const std::string name = goal.at("name");
-    const bool of_a_long_run = name.find("trajectory") != std::string::npos || name.find("draws") != std::string::npos;
-    EXPECT_TRUE(goal.at("met") || of_a_long_run) << name << ": " << goal.at("value");
+    EXPECT_TRUE(goal.at("met")) << name << ": " << goal.at("value");
+    EXPECT_TRUE(name.starts_with("Table ") || name.starts_with("Section ")) << name;
+    shipped += name.find("shipped prior") != std::string::npos;
   }
+  EXPECT_GE(shipped, 7);
 }
 
 TEST(Excite, WithEveryCurveAndCriterion_WritesATrajectoryWithinTheLimits) {

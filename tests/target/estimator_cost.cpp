@@ -1,5 +1,8 @@
-// tests - what an estimator takes from the tick and from the background, on an arm whose joints all move.
-#include "armcal/estimator/estimator.hpp"
+// tests - what an estimator takes from the tick and from the background, on an arm whose joints all move; and the
+// longest of each call that a firmware makes of a whole controller.
+#include <cstring>
+
+#include "armcal/controller/controller.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
 #include "codegen/generated/er20_like/model.hpp"
@@ -14,6 +17,7 @@ using Model = generated::Er20Like;
 
 estimator::RigidPrior<Model, float> rigid;
 estimator::AdoptedTable<Model> adopted;
+const estimator::Table<Model> defaults = estimator::DefaultTable<Model>();
 
 // Push: the tick's share, of a tick that completes a sample and of the others. Sample: all slices of one.
 template <class Filter>
@@ -50,10 +54,154 @@ void Measure(const char* name) {
       .End();
 }
 
+// Two sectors of RAM in the place of a flash memory.
+constexpr std::uint32_t kSector = 4096;
+std::uint8_t memory[2 * kSector];
+std::uint32_t now = 0;
+
+hardware::Storage RamStorage() {
+  return {nullptr,
+          2,
+          kSector,
+          8,
+          0xFF,
+          [](void*, std::uint32_t at, std::uint8_t* bytes, std::uint32_t count) {
+            std::memcpy(bytes, memory + at, count);
+            return core::Status::kOk;
+          },
+          [](void*, std::uint32_t at, const std::uint8_t* bytes, std::uint32_t count) {
+            std::memcpy(memory + at, bytes, count);
+            return core::Status::kOk;
+          },
+          [](void*, std::uint32_t sector) {
+            std::memset(memory + sector * kSector, 0xFF, kSector);
+            return core::Status::kOk;
+          }};
+}
+std::uint32_t Now(void*) { return now; }
+
+// A controller with two filters and a client that flashes a table.
+struct Drive {
+  static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
+
+  controller::Controller<Model, filter::ForgettingFilter<Model>, filter::KalmanFilter<Model, filter::Form::kBlock>>
+      controller{RamStorage(), {nullptr, Now, Now}};
+  controller::RawTrace<Model, 4096> trace;
+  std::uint8_t request[link::kMaxPdu] = {}, reply[link::kMaxPdu] = {};
+  std::uint16_t words[kWords] = {};
+  std::uint32_t sequence = 0;
+  Range step, request_cost;
+
+  // Function 16.
+  std::size_t Write(std::uint16_t address, std::uint16_t count, const std::uint16_t* values) {
+    request[0] = 16;
+    core::PutBytes16(request + 1, address);
+    core::PutBytes16(request + 3, count);
+    request[5] = static_cast<std::uint8_t>(2 * count);
+    for (std::uint16_t k = 0; k < count; ++k) core::PutBytes16(request + 6 + 2 * k, values[k]);
+    std::size_t bytes = 0;
+    request_cost.Add(CostOf([&] { bytes = controller.engine().Handle(request, 6u + request[5], reply); }));
+    return bytes;
+  }
+  std::size_t Read(std::uint8_t function, std::uint16_t address, std::uint16_t count) {
+    request[0] = function;
+    core::PutBytes16(request + 1, address);
+    core::PutBytes16(request + 3, count);
+    std::size_t bytes = 0;
+    request_cost.Add(CostOf([&] { bytes = controller.engine().Handle(request, 5, reply); }));
+    return bytes;
+  }
+  bool Step() {
+    bool busy = false;
+    step.Add(CostOf([&] { busy = controller.Step(); }));
+    return busy;
+  }
+  // Answers whether it was accepted.
+  bool Command(std::uint32_t command) {
+    link::Words<link::reg::kCommandBlock> w;
+    w.Set<link::reg::kSequence>(++sequence);
+    w.Set<link::reg::kCommand>(command);
+    w.Set<link::reg::kCommandSchema>(Model::kSchema);
+    w.Set<link::reg::kCommandWords>(kWords);
+    w.Set<link::reg::kCommandCrc>(core::Crc32Words(words, kWords));
+    while (Write(w.span().first, w.size(), w.data()) == link::kReplyLater) (void)Step();
+    return reply[0] == 16;
+  }
+};
+
+// Each figure is the longest call: of the tick, of one that takes a new table, of the background while it learns, while
+// it checks a table, and while it stores and adopts one; of a request.
+void MeasureController() {
+  static Drive drive;
+  std::memset(memory, 0xFF, sizeof memory);
+  auto& c = drive.controller;
+  if (!core::IsOk(c.Record(drive.trace)) || c.Boot() != core::Status::kBlank) return;
+  RawTicks<Model::kJoints> ticks;
+  Range push, feed;
+  const auto tick = [&] {
+    const model::RawSample<Model::kJoints>& raw = ticks.Next();
+    now = raw.tick;
+    controller::SetPoint<Model::kJoints> set = {};
+    float tau_Nm[Model::kJoints];
+    feed.Add(CostOf([&] { (void)c.FeedForward(set, raw.temperature_degC, tau_Nm); }));
+    push.Add(CostOf([&] { (void)c.Push(raw); }));
+  };
+  const auto work = [&] {
+    drive.step = {};
+    while (drive.Step()) {
+    }
+    return drive.step.most;
+  };
+  (void)work();
+  std::uint32_t learn = 0;
+  for (int k = 0; k < 3000; ++k) {
+    tick();
+    const std::uint32_t slice = work();
+    learn = slice > learn ? slice : learn;
+  }
+
+  model::Encode(defaults, drive.words);
+  const std::uint16_t key[] = {link::reg::kUnlockKey >> 16, link::reg::kUnlockKey & 0xFFFF};
+  (void)drive.Write(link::reg::kUnlock.address, 2, key);
+  bool accepted = drive.Command(link::reg::kOpen);
+  for (std::uint16_t at = 0; at < Drive::kWords; at = static_cast<std::uint16_t>(at + 123)) {
+    const int rest = Drive::kWords - at;
+    (void)drive.Write(static_cast<std::uint16_t>(link::reg::kStagedTable.address + at),
+                      static_cast<std::uint16_t>(rest < 123 ? rest : 123), drive.words + at);
+  }
+  drive.step = {};
+  accepted &= drive.Command(link::reg::kCheck);
+  const std::uint32_t check = drive.step.most;
+  accepted &= drive.Command(link::reg::kSave);
+  const std::uint32_t save = work();
+  const std::uint32_t fed = feed.most, read = [&] {
+    (void)drive.Read(3, link::reg::kStagedTable.address, 125);
+    (void)drive.Read(4, link::reg::kStatusBlock.first, 28);
+    const std::uint16_t joint = 1;
+    (void)drive.Write(link::reg::kResidualSelect.address, 1, &joint);
+    return drive.request_cost.most;
+  }();
+  feed = {};
+  tick();
+  if (!accepted || c.generation() != 2) return;
+  port::runner::Line("controller")
+      .Text(Model::kName)
+      .Value("push", push.most)
+      .Value("feed_forward", fed)
+      .Value("feed_forward_new", feed.most)
+      .Value("step_learning", learn)
+      .Value("step_checking", check)
+      .Value("step_saving", save)
+      .Value("request", read)
+      .Value("state_bytes", sizeof c)
+      .End();
+}
+
 }  // namespace
 
 void MeasureEstimators() {
-  if (!core::IsOk(estimator::BuildAdoptedTable(estimator::DefaultTable<Model>(), 1, rigid, adopted))) return;
+  MeasureController();
+  if (!core::IsOk(estimator::BuildAdoptedTable(defaults, 1, rigid, adopted))) return;
   Measure<filter::ForgettingFilter<Model>>("forgetting");
   Measure<filter::KalmanFilter<Model, filter::Form::kBlock>>("kalman_block");
   Measure<filter::KalmanFilter<Model>>("kalman_dense");

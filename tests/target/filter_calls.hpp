@@ -67,7 +67,6 @@ void MakePrior(filter::Prior<Layout>& prior) {
     prior.noise[k] = k < Layout::kFront || k >= Layout::kColumns ? 1e-6f : 0.0f;
   }
   prior.link_floor = 1e-6f;
-  prior.gate_sigma = 4.0f;
 }
 
 // One filter at a time lives here, with its prior and its read-out, so that a small board has room for the bench.

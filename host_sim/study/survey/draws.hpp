@@ -44,6 +44,7 @@ struct Settings {
   std::uint64_t seed = 1;
   bool cad_feedforward = false;  // the loop's controller uses CAD values instead of the set parameters
   double search_s = 55;          // of each trajectory search at most; given enough time, the seed decides the results
+  int searches = 0;              // starts of each trajectory search at most; 0: as many as it has
   std::vector<std::string> tables;  // "5" .. "12", "figures"; empty: all
   const std::atomic<bool>* stop = nullptr;
   std::function<void(const std::string& what, double share)> progress = [](const std::string&, double) {};

@@ -119,7 +119,7 @@ void Simulated(const Settings& settings, const Motions& motions, Findings& out) 
     std::vector<double> train, held_out, mean, spread;
     bool nested = true;
     std::string by, why;
-    for (int d = 0; d < kNoiseDraws && !settings.Stopped(); ++d) {
+    for (int d = 0; d < std::min(kNoiseDraws, settings.draws) && !settings.Stopped(); ++d) {
       const auto seed = settings.seed * 977 + 2 * static_cast<std::uint64_t>(d);
       const int samples = truth->train.samples();
       const calibration::Dataset log = Measured(truth->train, truth->tau + Noise(samples, truth->sigma_Nm, seed));

@@ -305,7 +305,7 @@ void ShowOnline(const Settings& settings, const Motions& motions, Findings& out)
                           Mean(scores, &Score::J_e), Cell(base.mean, base.low, base.high), over_bound,
                           Mean(scores, &Score::coverage), Over(scores, &Score::physical).mean, inconsistent / count,
                           converged / count, Over(scores, &Score::seconds).p95});
-    const std::string where = "online, " + Name(protocol.filter) + ", " + protocol.name + ": ";
+    const std::string where = "Table 8, in the firmware, " + Name(protocol.filter) + ", " + protocol.name + ": ";
     if (extended) {
       out.goals.push_back({where + "mean e_f", Over(scores, &Score::e_f).mean, 0.06, true});
       out.goals.push_back({where + "share of draws with e_f < .2", near / count, 0.98, false});

@@ -1,6 +1,7 @@
 // survey - searches the trajectories, and makes samples, noise and differences.
 #include "host_sim/study/survey/platform.hpp"
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -109,7 +110,9 @@ void Examine(const codegen::Robot& file, const codegen::Catalogue& records, Exci
   std::vector<Eigen::MatrixXd> row;
   observation.Rows(Sampled(e.series), row);
   for (int j = 0; j < model.joints(); ++j) row[j] *= 1 / std::sqrt(observation.weight(j));
-  e.unweighted = excitation::Figure({}, observation.Gram(row, row[0].rows()));
+  const Eigen::MatrixXd unweighted = observation.Gram(row, row[0].rows());
+  e.unweighted = excitation::Figure({}, unweighted);
+  e.plain = Condition(unweighted);
   e.share = LimitShare(file, records, e.series);
 }
 
@@ -129,6 +132,7 @@ void Excite(const codegen::Robot& file, const codegen::Catalogue& records, const
   s.seconds = settings.seconds;
   if (e.search == excitation::Search::kGenetic) s.starts = 2;
   else s.starts = e.law == Law::kGradient ? kStartsNonlinear : kStarts;
+  if (settings.starts > 0) s.starts = std::min(s.starts, settings.starts);
   s.seed = settings.seed;
   s.stop = settings.stop;
   const excitation::Optimum best = excitation::Optimise(observation, s);

@@ -43,6 +43,7 @@ struct ExcitedBy {
   double condition = 0;    // rows divided by sigma, columns scaled to unit norm
   double raw = 0;          // rows divided by sigma, columns as they are
   double unweighted = 0;   // rows as they are, columns scaled to unit norm
+  double plain = 0;        // rows and columns as they are, SI units
   double all_sd = 0;       // the D-optimal figure: geometric mean over all of K's axes, units of the columns
   double friction_sd = 0;  // geometric mean of the standard deviations of friction's columns
   double share = 0;        // the largest share of any position, speed, acceleration or torque limit on a 1 ms grid
@@ -54,6 +55,7 @@ struct SearchSettings {
   double seconds = 55;  // at most; the number of starts is fixed, so given enough time the seed decides the result
   std::uint64_t seed = 1;
   const std::atomic<bool>* stop = nullptr;
+  int starts = 0;  // at most; 0: as many as the search has
 };
 
 // Searches ten coefficients a joint (Fourier: L = 5), period 10 s, with an offset. Fills in the result.

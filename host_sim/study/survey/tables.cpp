@@ -50,7 +50,7 @@ Motions SearchMotions(const Settings& settings) {
   Motions motions;
   const auto excite = [&](ExcitedBy& e, double seconds) {
     settings.progress("trajectory " + LawName(e.law) + ", " + excitation::Name(e.family), 0);
-    Excite(settings.robot, settings.records, {seconds, settings.seed, settings.stop}, e);
+    Excite(settings.robot, settings.records, {seconds, settings.seed, settings.stop, settings.searches}, e);
   };
   motions.nonlinear.law = Law::kGradient;
   excite(motions.linear, settings.search_s);
@@ -113,6 +113,7 @@ Findings RunSurvey(const Settings& asked) {
   ShowModels(settings, motions, out);
   ShowLoad(settings, motions, out);
   if (settings.Wants("priors")) ShowPriors(settings, motions, out);
+  if (settings.Wants("shipped")) ShowShippedPrior(settings, motions, out);
   if (settings.Wants("online")) ShowOnline(settings, motions, out);
   out.sheets.push_back(Slips());
   return out;

@@ -1,6 +1,7 @@
 // survey - fills all of the survey's tables and figures from one robot file: Tables 5 to 12, Figures 1 to 4.
 #pragma once
 
+#include "host_sim/study/survey/cad_error.hpp"
 #include "host_sim/study/survey/draws.hpp"
 #include "host_sim/study/survey/sheet.hpp"
 
@@ -26,6 +27,8 @@ void ShowParameters(const Settings& settings, const Motions& motions, const Evid
 void ShowErrors(const Settings& settings, const Evidence& evidence, Findings& out);
 // The better methods under every prior, and the goals that they must reach.
 void ShowPriors(const Settings& settings, const Motions& motions, Findings& out);
+// The prior of the robot file as it ships on logs of the plant, under errors of the CAD values that it is not told.
+void ShowShippedPrior(const Settings& settings, const Motions& motions, Findings& out);
 // The firmware's own estimator on fresh draws, and whether it reports that its deviations cannot be trusted.
 void ShowOnline(const Settings& settings, const Motions& motions, Findings& out);
 // Table 10: in the closed loop, and without one.

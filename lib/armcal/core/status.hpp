@@ -7,8 +7,8 @@
 namespace armcal::core {
 
 // 0: ok. 1-31: refused because of what the caller gave. 32-63: fault of a device or a partner. 64-95: limited, that
-// is, carried out in part: a value was cut, or an update was not taken. A refused call changes nothing, unless the
-// comment of the function says what it changes.
+// is, carried out in part: a value was cut, or an update was not taken. 96: only inside the firmware. A refused call
+// changes nothing, unless the comment of the function says what it changes.
 enum class [[nodiscard]] Status : std::uint8_t{
     kOk = 0,
     kNotFinite = 1,       // a number is NaN or infinite
@@ -37,7 +37,8 @@ enum class [[nodiscard]] Status : std::uint8_t{
     kTimeout = 35,        // a partner did not answer in time
     kGated = 64,          // accepted, but no row of the sample may update an estimate
     kClamped = 65,        // a value was cut to its limit; the limit's counter went up
-    kHeld = 66,           // the supervisor keeps the last good value
+    kHeld = 66,           // the last good value is kept
+    kUnfinished = 96,     // never sent: the same call again gives the answer
 };
 
 // Why a table was refused, and which of its words. `value` was found there, `bound` would have been accepted.

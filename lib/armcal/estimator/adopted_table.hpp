@@ -112,82 +112,157 @@ void PriorOfEta(const Table<Model>& table, AdoptedTable<Model>& adopted) {
 }
 }  // namespace internal
 
-// Fills in `adopted`. `rigid` is work space; afterwards ReadBodies and BeginPhysical may read it. kWrongSchema;
-// kUnphysical (a link's body, or a negative rotor inertia); kNotFinite (the map overflows). On refusal `adopted` is
-// unchanged. This is the longest call of lib (see FactorPrior), once for each table. Context: background.
+// Fills in an AdoptedTable in slices: Begin, then Step until it no longer answers kBusy. Context: background.
 template <class Model>
-core::Status BuildAdoptedTable(const Table<Model>& table, std::uint32_t generation, RigidPrior<Model, float>& rigid,
-                               AdoptedTable<Model>& adopted) {
-  using core::Status;
-  constexpr int kRigid = Model::kRigid, kColumns = Model::kColumns, kBlock = model::kBodyBlock;
-  if (table.schema != Model::kSchema) return Status::kWrongSchema;
-  for (int link = 0; link < Model::kJoints; ++link) {
-    float body[kBlock];
-    for (int k = 0; k < kBlock; ++k) body[k] = table.parameter[link * kBlock + k].mean;
-    if (!physical::CanExist(body)) return Status::kUnphysical;
+class TableBuild {
+ public:
+  // All four stay as they are until the end. `rigid` is work space; afterwards ReadBodies and BeginPhysical may read
+  // it.
+  void Begin(const Table<Model>& table, std::uint32_t generation, RigidPrior<Model, float>& rigid,
+             AdoptedTable<Model>& adopted) {
+    table_ = &table;
+    rigid_ = &rigid;
+    adopted_ = &adopted;
+    generation_ = generation;
+    at_ = 0;
+    stage_ = Stage::kBodies;
   }
 
-  // From bodies to base parameters: mean, covariance, and which columns are only considered.
-  for (int k = 0; k < Model::kBodyParameters; ++k) {
-    rigid.mean[k] = internal::Amplitude(table.parameter[k]);
-    rigid.sd[k] = internal::Spread(table.parameter[k]);
+  // One slice. kBusy: call again. kOk: `adopted` is filled in. kWrongSchema; kUnphysical (a link's body, or a negative
+  // rotor inertia); kNotFinite (the map overflows). On refusal `adopted` is unchanged.
+  core::Status Step() {
+    switch (stage_) {
+      case Stage::kBodies:
+        return Next(Stage::kSpread, MapMeans());
+      case Stage::kSpread:
+        SpreadLink<Model>(*rigid_, at_++);
+        if (at_ == Model::kJoints) at_ = 0, stage_ = Stage::kConsidered;
+        return core::Status::kBusy;
+      case Stage::kConsidered:
+        for (int rows = 0; rows < kRows && at_ < kRigid; ++rows, ++at_)
+          considered_[at_] = internal::RigidConsidered<Model>(*table_, rigid_->w + at_ * Model::kBodyParameters);
+        if (at_ == kRigid) stage_ = Stage::kBeginFactor;
+        return core::Status::kBusy;
+      case Stage::kBeginFactor:
+        factor_.Begin(rigid_->w, rigid_->ud);
+        stage_ = Stage::kFactor;
+        return core::Status::kBusy;
+      case Stage::kFactor:
+        if (factor_.Step(kPairs)) stage_ = Stage::kVariance;
+        return core::Status::kBusy;
+      case Stage::kVariance:
+        return Next(Stage::kColumns, Variances());
+      case Stage::kColumns:
+        FillColumns();
+        return Next(Stage::kPrior, core::Status::kOk);
+      case Stage::kPrior:
+        internal::PriorOfEta<Model>(*table_, *adopted_);
+        internal::ScaleCorrelation(*rigid_, *adopted_);
+        FillAxes();
+        return core::Status::kOk;
+    }
+    return core::Status::kOk;
   }
-  float base[kRigid];
-  bool considered[kRigid];
-  MapBodies<Model>(rigid.mean, base);
-  SpreadPrior(rigid);
-  for (int r = 0; r < kRigid; ++r)
-    considered[r] = internal::RigidConsidered<Model>(table, rigid.w + r * Model::kBodyParameters);
-  FactorPrior(rigid);
-  float variance[kRigid];
-  math::UdDiagonal<kRigid>(rigid.ud, variance);
-  bool finite = true;
-  for (int r = 0; r < kRigid; ++r) finite &= math::IsFinite(base[r]) && math::IsFinite(variance[r]);
-  for (float u : rigid.ud) finite &= math::IsFinite(u);
-  if (!finite) return Status::kNotFinite;
 
-  const auto is_rigid = [](int k) { return k >= Model::kFront && k < Model::kFront + kRigid; };
-  // The table holds bodies, front columns, dense effect columns and eta, in this order.
-  const auto entry = [&](int k) -> const model::ParameterEntry& {
-    return table.parameter[Model::kBodyParameters + (k < Model::kFront ? k : k - kRigid)];
-  };
+ private:
+  enum class Stage : std::uint8_t { kBodies, kSpread, kConsidered, kBeginFactor, kFactor, kVariance, kColumns, kPrior };
+  static constexpr int kRigid = Model::kRigid, kBlock = model::kBodyBlock;
+  // Of a slice: rows of the map, and pairs of rows of its factor. Some 12 000 instructions of a Cortex-M4F.
+  static constexpr int kRows = 1 + 900 / Model::kBodyParameters, kPairs = kRows;
 
-  model::Committed<Model>& c = adopted.committed;
-  filter::Prior<Model>& prior = adopted.prior;
-  prior.any_considered = false;
-  for (int k = 0; k < kColumns; ++k) {
-    const bool body = is_rigid(k);
-    const int r = k - Model::kFront;
-    c.p[k] = body ? base[r] : internal::Amplitude(entry(k));
-    const float sd = body ? math::Sqrt(variance[r]) : internal::Spread(entry(k));
-    const bool active = sd > kSmallestSd;
-    adopted.scale[k] = active ? sd : 0.0f;
-    prior.active[k] = math::MaskOf(active);
-    prior.considered[k] = active && (body ? considered[r] : entry(k).state == model::ParameterState::kConsidered);
-    prior.any_considered |= prior.considered[k];
-    prior.lambda[k] = table.forgetting[body ? 0 : entry(k).group];
-    const bool noisy = active && !body && entry(k).state == model::ParameterState::kEstimated;
-    prior.noise[k] = noisy ? entry(k).process_noise / sd / sd : 0.0f;
+  core::Status Next(Stage next, core::Status status) {
+    if (!core::IsOk(status)) return status;
+    stage_ = next;
+    return core::Status::kBusy;
   }
-  internal::PriorOfEta<Model>(table, adopted);
-  prior.link_floor = kLinkFloor;
-  prior.gate_sigma = 0.0f;  // RowGate decides, for every filter
-  internal::ScaleCorrelation(rigid, adopted);
 
-  c.valid = true;
-  c.generation = generation;
-  c.bumpless = (table.flags & model::kFlagBumpless) != 0;
-  // Cut to the largest float below 2^32: the cast of a larger number differs between machines.
-  const float blend = static_cast<float>(table.blend_ms) * (Model::kTickRate_Hz / 1000.0f);
-  c.blend_ticks = static_cast<std::uint32_t>(math::Min(blend, 4294967040.0f));
-  for (int i = 0; i < Model::kJoints; ++i) {
-    c.limit_Nm[i] = table.joint[i].torque_limit_Nm;
-    c.v_min_radps[i] = table.joint[i].v_min_radps;
-    c.torque_scale[i] = table.joint[i].torque_scale;
-    adopted.sigma_Nm[i] = table.joint[i].sigma_Nm;
-    adopted.gate_sigma[i] = kGateSigma;
+  // From bodies to base parameters: the mean.
+  core::Status MapMeans() {
+    if (table_->schema != Model::kSchema) return core::Status::kWrongSchema;
+    for (int link = 0; link < Model::kJoints; ++link) {
+      float body[kBlock];
+      for (int k = 0; k < kBlock; ++k) body[k] = table_->parameter[link * kBlock + k].mean;
+      if (!physical::CanExist(body)) return core::Status::kUnphysical;
+    }
+    for (int k = 0; k < Model::kBodyParameters; ++k) {
+      rigid_->mean[k] = internal::Amplitude(table_->parameter[k]);
+      rigid_->sd[k] = internal::Spread(table_->parameter[k]);
+    }
+    MapBodies<Model>(rigid_->mean, base_);
+    return core::Status::kOk;
   }
-  return Status::kOk;
+
+  core::Status Variances() {
+    math::UdDiagonal<kRigid>(rigid_->ud, variance_);
+    bool finite = true;
+    for (int r = 0; r < kRigid; ++r) finite &= math::IsFinite(base_[r]) && math::IsFinite(variance_[r]);
+    for (float u : rigid_->ud) finite &= math::IsFinite(u);
+    return finite ? core::Status::kOk : core::Status::kNotFinite;
+  }
+
+  void FillColumns() {
+    const Table<Model>& table = *table_;
+    // The table holds bodies, front columns, dense effect columns and eta, in this order.
+    const auto entry = [&](int k) -> const model::ParameterEntry& {
+      return table.parameter[Model::kBodyParameters + (k < Model::kFront ? k : k - kRigid)];
+    };
+    filter::Prior<Model>& prior = adopted_->prior;
+    prior.any_considered = false;
+    for (int k = 0; k < Model::kColumns; ++k) {
+      const bool body = k >= Model::kFront && k < Model::kFront + kRigid;
+      const int r = k - Model::kFront;
+      adopted_->committed.p[k] = body ? base_[r] : internal::Amplitude(entry(k));
+      const float sd = body ? math::Sqrt(variance_[r]) : internal::Spread(entry(k));
+      const bool active = sd > kSmallestSd;
+      adopted_->scale[k] = active ? sd : 0.0f;
+      prior.active[k] = math::MaskOf(active);
+      prior.considered[k] = active && (body ? considered_[r] : entry(k).state == model::ParameterState::kConsidered);
+      prior.any_considered |= prior.considered[k];
+      prior.lambda[k] = table.forgetting[body ? 0 : entry(k).group];
+      const bool noisy = active && !body && entry(k).state == model::ParameterState::kEstimated;
+      prior.noise[k] = noisy ? entry(k).process_noise / sd / sd : 0.0f;
+    }
+    prior.link_floor = kLinkFloor;
+  }
+
+  void FillAxes() {
+    model::Committed<Model>& c = adopted_->committed;
+    c.valid = true;
+    c.generation = generation_;
+    c.bumpless = (table_->flags & model::kFlagBumpless) != 0;
+    // Cut to the largest float below 2^32: the cast of a larger number differs between machines.
+    const float blend = static_cast<float>(table_->blend_ms) * (Model::kTickRate_Hz / 1000.0f);
+    c.blend_ticks = static_cast<std::uint32_t>(math::Min(blend, 4294967040.0f));
+    for (int i = 0; i < Model::kJoints; ++i) {
+      c.limit_Nm[i] = table_->joint[i].torque_limit_Nm;
+      c.v_min_radps[i] = table_->joint[i].v_min_radps;
+      c.torque_scale[i] = table_->joint[i].torque_scale;
+      adopted_->sigma_Nm[i] = table_->joint[i].sigma_Nm;
+      adopted_->gate_sigma[i] = kGateSigma;
+    }
+  }
+
+  const Table<Model>* table_ = nullptr;
+  RigidPrior<Model, float>* rigid_ = nullptr;
+  AdoptedTable<Model>* adopted_ = nullptr;
+  std::uint32_t generation_ = 0;
+  float base_[kRigid] = {}, variance_[kRigid] = {};
+  bool considered_[kRigid] = {};  // which columns are only considered
+  math::UdOfSquareRoot<kRigid, Model::kBodyParameters, float> factor_;
+  int at_ = 0;
+  Stage stage_ = Stage::kBodies;
+};
+
+// The same at once, and with the same answers. This is the longest call of lib: for a program that may wait. Not
+// inlined: the caller's stack frame often holds the table, and this one holds the factors.
+template <class Model>
+[[gnu::noinline]] core::Status BuildAdoptedTable(const Table<Model>& table, std::uint32_t generation,
+                                                 RigidPrior<Model, float>& rigid, AdoptedTable<Model>& adopted) {
+  TableBuild<Model> build;
+  build.Begin(table, generation, rigid, adopted);
+  core::Status status = core::Status::kBusy;
+  while (status == core::Status::kBusy) status = build.Step();
+  return status;
 }
 
 // The table that holds every default of the model's kInfo and kAxes.

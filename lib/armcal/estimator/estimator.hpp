@@ -122,8 +122,10 @@ class Estimator {
   // The latest published estimates. False: nothing new since the last call. Context: one reader, any.
   bool Take(Estimates<Model>& out) { return published_.Take(out); }
 
-  // Publishes after the sample in work, besides every `publish_every` samples. Context: background.
+  // Publishes after the sample in work. Context: background.
   void RequestReadOut() { read_out_due_ = true; }
+  // Otherwise it publishes after the first sample of each period of so many samples' ticks. The gate knows what is
+  // published there. Periods are counted from tick 0.
   void SetPublishEvery(std::uint32_t samples) { publish_every_ = math::Max<std::uint32_t>(samples, 1); }
   void SetObserver(Observer observer, void* context) {
     observer_ = observer;
@@ -145,10 +147,24 @@ class Estimator {
   const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kRow, kUpdate, kRows, kReport, kEnd, kReset, kReadOut };
+  enum class Stage : std::uint8_t {
+    kIdle,
+    kRow,
+    kUpdate,
+    kRows,
+    kReport,
+    kEnd,
+    kReset,
+    kBeginReadOut,
+    kReadOut,
+    kPublish
+  };
   // Credit of a sample's regressor, and of a row's whitening and statistics: from counts of six-axis models.
   static constexpr int kSampleCost = Intake<Model>::kEvaluationCost, kRowCost = 5 * Model::kDense / 2;
   static constexpr int kGateCost = 5 * n * Model::kDense / 2;  // of both torques of all rows, and of the gate
+
+  // Of the beginning of a read-out, and of its publication.
+  static constexpr int kReadOutCost = 25 * Model::kColumns;
 
   struct Nothing {};
 
@@ -176,8 +192,20 @@ class Estimator {
       case Stage::kReset:
         if (filter_.StepReset(credit_)) stage_ = Stage::kIdle;
         return true;
+      case Stage::kBeginReadOut:
+        filter_.BeginReadOut(read_out_);
+        credit_ -= kReadOutCost;
+        stage_ = Stage::kReadOut;
+        return true;
       case Stage::kReadOut:
-        if (filter_.StepReadOut(read_out_, credit_)) Publish();
+        if (filter_.StepReadOut(read_out_, credit_)) {
+          stage_ = Stage::kPublish;
+          credit_ = math::Min(credit_, 0);  // what is not cut begins a slice
+        }
+        return true;
+      case Stage::kPublish:
+        Publish();
+        credit_ -= kReadOutCost;
         return true;
     }
     return false;
@@ -192,8 +220,8 @@ class Estimator {
     if (table_ != nullptr && read_out_due_) {
       read_out_due_ = false;
       stands_ = false;
-      filter_.BeginReadOut(read_out_);
-      stage_ = Stage::kReadOut;
+      stage_ = Stage::kBeginReadOut;
+      if (credit_ < slice_) credit_ = math::Min(credit_, 0);  // as at kPublish
       return true;
     }
     if (!intake_.Next(reader_, credit_)) return false;
@@ -287,7 +315,7 @@ class Estimator {
     estimates_.tick = tick;
     if (observer_ != nullptr) Observe();
     intake_.Done(reader_);
-    if (++estimates_.samples % publish_every_ == 0u) read_out_due_ = true;
+    ++estimates_.samples;
     stage_ = Stage::kIdle;
   }
 

@@ -43,31 +43,33 @@ void LinkJacobian(const T* body, T* jacobian) {
   physical::BodyJacobian(body[0], centre, jacobian);
 }
 
-// W = B J S from mean and sd.
+// The columns of W = B J S of one link, from mean and sd.
 template <class Model, class T>
-void SpreadPrior(RigidPrior<Model, T>& prior) {
+void SpreadLink(RigidPrior<Model, T>& prior, int link) {
   constexpr int kBodies = Model::kBodyParameters, kBlock = model::kBodyBlock;
-  for (T& w : prior.w) w = T(0);
-  for (int link = 0; link < Model::kJoints; ++link) {
-    T jacobian[100];
-    LinkJacobian(prior.mean + link * kBlock, jacobian);
-    const T* sd = prior.sd + link * kBlock;
-    for (int r = 0; r < Model::kRigid; ++r) {
-      T* w = prior.w + r * kBodies + link * kBlock;
-      for (int e = Model::kMapBegin[r]; e < Model::kMapBegin[r + 1]; ++e) {
-        const int parameter = Model::kMapColumn[e] - link * kBlock;
-        if (parameter < 0 || parameter >= kBlock) continue;
-        const T value = T(Model::kMapValue[e]);
-        if (parameter == model::kRotor) w[model::kRotor] += value * sd[model::kRotor];
-        else
-          for (int k = 0; k < 10; ++k) w[k] += value * jacobian[parameter * 10 + k] * sd[k];
-      }
+  T jacobian[100];
+  LinkJacobian(prior.mean + link * kBlock, jacobian);
+  const T* sd = prior.sd + link * kBlock;
+  for (int r = 0; r < Model::kRigid; ++r) {
+    T* w = prior.w + r * kBodies + link * kBlock;
+    for (int k = 0; k < kBlock; ++k) w[k] = T(0);
+    for (int e = Model::kMapBegin[r]; e < Model::kMapBegin[r + 1]; ++e) {
+      const int parameter = Model::kMapColumn[e] - link * kBlock;
+      if (parameter < 0 || parameter >= kBlock) continue;
+      const T value = T(Model::kMapValue[e]);
+      if (parameter == model::kRotor) w[model::kRotor] += value * sd[model::kRotor];
+      else
+        for (int k = 0; k < 10; ++k) w[k] += value * jacobian[parameter * 10 + k] * sd[k];
     }
   }
 }
+// The same of all links.
+template <class Model, class T>
+void SpreadPrior(RigidPrior<Model, T>& prior) {
+  for (int link = 0; link < Model::kJoints; ++link) SpreadLink<Model>(prior, link);
+}
 
-// After SpreadPrior: ud = U D U', and w becomes w~. Takes about kRigid^2 kBodyParameters multiplications, once per
-// table.
+// After SpreadPrior: ud = U D U', and w becomes w~. Takes about kRigid^2 kBodyParameters multiplications in all.
 template <class Model, class T>
 void FactorPrior(RigidPrior<Model, T>& prior) {
   math::UdFromSquareRoot<Model::kRigid, Model::kBodyParameters>(prior.w, prior.ud);

@@ -30,11 +30,13 @@ class RowGate {
   bool Admit(int i, float residual, float innovation, bool moves, bool forward, float gate_sigma) {
     Joint& j = joint_[i];
     const float apart = (residual - j.reference) / (1.0f + j.refused);
-    const float change2 = math::Masked(apart * apart, math::MaskOf(j.follows & (j.forward == forward)));
+    const float change2 = math::Masked(apart * apart, math::MaskOf(j.follows) & math::MaskOf(j.forward == forward));
     const float level2 = innovation * innovation, few = kFew / math::Max(j.rows, 1.0f);
     const float gate2 = gate_sigma * gate_sigma * (1.0f + few * few);  // a spread of few rows is not known well
     const bool first = !(j.rows > 0.0f);
-    const bool inside = (level2 <= gate2 * math::Max(j.level2, 1.0f)) & (change2 <= gate2 * math::Max(j.change2, 2.0f));
+    const bool near = level2 <= gate2 * math::Max(j.level2, 1.0f),
+               steady = change2 <= gate2 * math::Max(j.change2, 2.0f);
+    const bool inside = near & steady;
     const bool opens = !(j.refused < kPatience);
     const bool taken = inside | first | opens | !(gate_sigma > 0.0f);
     j.rows += math::Select(moves & (j.rows < kMemory), 1.0f, 0.0f);

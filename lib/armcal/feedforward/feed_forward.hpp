@@ -15,6 +15,8 @@ class FeedForward {
  public:
   static constexpr int n = Model::kJoints;
 
+  FeedForward() { share_ = 1.0f; }  // not constexpr, so that a static object takes no flash
+
   // Hands over the next committed parameters. They take effect at the next tick. kAxisEnabled: an axis is enabled and
   // they are not bumpless; nothing has changed. Context: background.
   core::Status Offer(const model::Committed<Model>& next, bool any_axis_enabled) {
@@ -28,20 +30,22 @@ class FeedForward {
   // was counted); kEmpty (no valid table; torque zero); kNotFinite (set-point or model is not finite; that joint's
   // torque is zero). Constant time, because the old and the new parameters of a cross-fade are always both evaluated;
   // only the tick that takes a new table takes longer. A cross-fade starts from the present torque, also if another one
-  // is under way. A limit that the new table lowers holds at once; one that it raises rises with the fade. Context:
-  // tick.
+  // is under way. Each table is evaluated with its own v_min, and its torque is cut to its own limit before the two are
+  // mixed. So at an unchanged set-point the fade itself moves the torque by at most the sum of both limits, divided by
+  // the ticks of the fade, in a tick. Context: tick.
   core::Status Evaluate(const float* q, const float* qd, const float* qdd, const float* temperature_degC, float t_s,
                         float* tau_Nm) {
     Adopt();
+    constexpr float kTick_s = 1.0f / static_cast<float>(Model::kTickRate_Hz);
     model::ModelInput<float, n> state;
     for (int i = 0; i < n; ++i) {
       state.q[i] = q[i];
-      state.qd[i] = math::Select(math::Abs(qd[i]) < active_.v_min_radps[i], 0.0f, qd[i]);
+      state.qd[i] = Moving(previous_, qd, i);
       state.qdd[i] = qdd[i];
       state.temp[i] = temperature_degC[i];
     }
-    state.t = t_s;
-    state.dt = 1.0f / static_cast<float>(Model::kTickRate_Hz);
+    state.dt = kTick_s;
+    state.t = previous_t_s_ += kTick_s;
     blended_ticks_ += blended_ticks_ < active_.blend_ticks;
     const bool blending = blended_ticks_ < active_.blend_ticks;
     const float share =
@@ -49,19 +53,22 @@ class FeedForward {
     float before[n], now[n];
     model::EvaluateRows(previous_, state, previous_memory_, rows_);
     for (int i = 0; i < n; ++i) before[i] = model::RowTorque(previous_p_, rows_, i) + remainder_Nm_[i];
+    for (int i = 0; i < n; ++i) state.qd[i] = Moving(active_, qd, i);
+    state.t = t_s_ = t_s;
     model::ModelTorque(active_, state, active_memory_, rows_, now);
 
     core::Status status = active_.valid ? core::Status::kOk : core::Status::kEmpty;
     const std::uint32_t fading = math::MaskOf(blending && previous_.valid);
     for (int i = 0; i < n; ++i) {
-      const float tau = share * now[i] + math::Masked((1.0f - share) * before[i], fading);
-      const bool usable = active_.valid && math::IsFinite(tau);
+      const float old = math::Masked(before[i], fading);
+      const bool usable = active_.valid && math::IsFinite(now[i]) && math::IsFinite(old);
       if (active_.valid && !usable) status = core::Status::kNotFinite;
-      const float rising = first_limit_Nm_[i] + share * (active_.limit_Nm[i] - first_limit_Nm_[i]);
-      const float present = math::Select(fading != 0u, rising, active_.limit_Nm[i]);
-      limit_Nm_[i] = math::Min(active_.limit_Nm[i], present);
-      tau_Nm[i] = Clamp(math::Masked(tau, math::MaskOf(usable)), limit_Nm_[i], status);
-      unlimited_Nm_[i] = math::Masked(tau, math::MaskOf(usable));
+      const float limit = active_.limit_Nm[i], least = math::Select(fading != 0u, first_limit_Nm_[i], limit);
+      if (usable) Count(math::Abs(now[i]) > limit || math::Abs(old) > least, status);
+      const float tau = share * Cut(now[i], limit) + (1.0f - share) * Cut(old, least);
+      limit_Nm_[i] = least + share * (limit - least);
+      tau_Nm[i] = Cut(math::Masked(tau, math::MaskOf(usable)), limit_Nm_[i]);
+      last_Nm_[i] = tau_Nm[i];
     }
     share_ = share;
     return status;
@@ -96,30 +103,35 @@ class FeedForward {
       previous_p_[k] = was_fading ? from + share_ * (active_.p[k] - from) : active_.p[k];
     }
     for (int i = 0; i < n; ++i) {
-      const float rest = unlimited_Nm_[i] - model::RowTorque(previous_p_, rows_, i);
+      const float rest = last_Nm_[i] - model::RowTorque(previous_p_, rows_, i);
       remainder_Nm_[i] = math::Masked(rest, math::MaskOf(was_fading && math::IsFinite(rest)));
       first_limit_Nm_[i] = limit_Nm_[i];
     }
     previous_ = active_;
     previous_memory_ = active_memory_;
+    previous_t_s_ = t_s_;
   }
 
-  float Clamp(float tau, float limit, core::Status& status) {
-    const bool over = math::Abs(tau) > limit;
+  // A speed of the set-point, as a table sees it.
+  static float Moving(const model::Committed<Model>& table, const float* qd, int i) {
+    return math::Select(math::Abs(qd[i]) < table.v_min_radps[i], 0.0f, qd[i]);
+  }
+  static float Cut(float tau, float limit) { return math::Max(-limit, math::Min(limit, tau)); }
+  void Count(bool over, core::Status& status) {
     clamp_count_ += over;
     if (over && status == core::Status::kOk) status = core::Status::kClamped;
-    return math::Max(-limit, math::Min(limit, tau));
   }
 
   core::Mailbox<model::Committed<Model>> offered_;
   model::Committed<Model> active_, previous_;
   model::Memory<Model> active_memory_, previous_memory_;
   model::Rows<Model> rows_ = {};
-  float previous_p_[Model::kColumns] = {};  // amplitudes that a fade starts from, with the columns of previous_
-  float remainder_Nm_[n] = {};              // and a torque beside them
-  float first_limit_Nm_[n] = {}, limit_Nm_[n] = {},
-        unlimited_Nm_[n] = {};  // at the start of the fade; of the last tick
-  float share_ = 1.0f;          // of the last tick
+  float previous_p_[Model::kColumns] = {};    // amplitudes that a fade starts from, with the columns of previous_
+  float remainder_Nm_[n] = {};                // and a torque beside them
+  float first_limit_Nm_[n] = {};              // at the start of the fade
+  float limit_Nm_[n] = {}, last_Nm_[n] = {};  // of the last tick
+  float share_ = 0.0f, t_s_ = 0.0f;           // of the last tick
+  float previous_t_s_ = 0.0f;                 // the time of previous_ goes on
   std::uint32_t blended_ticks_ = 0;
   std::uint32_t clamp_count_ = 0;
 };

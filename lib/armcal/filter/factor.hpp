@@ -92,12 +92,11 @@ class FactorWork {
   }
 
   // The row y = h' x + noise of `variance` > 0. The caller has filled in h from position `first` on; before, it is
-  // zero. gate_sigma > 0: an innovation beyond so many standard deviations changes no bit.
-  ARMCAL_NOINLINE void BeginRow(Factor f, int first, Front front, float y, float variance, float gate_sigma) {
+  // zero.
+  ARMCAL_NOINLINE void BeginRow(Factor f, int first, Front front, float y, float variance) {
     first_ = first, front_ = front;
     innovation_ = y - math::Dot(f.row() + first, f.x + first, f.shape->size - first);
     alpha_ = sum_ = variance;
-    gate_sigma_ = gate_sigma;
     for (int p = 0; p < f.shape->size; ++p) f.gain()[p] = 0.0f;
     next_ = f.shape->size - 1;
     stage_ = Stage::kBegun;
@@ -119,7 +118,6 @@ class FactorWork {
   }
   float innovation() const { return innovation_; }  // of the row in work, or of the last one
   float variance() const { return sum_; }           // h' P h + noise, before the row
-  bool inside() const { return taken_ != 0u; }      // the innovation is inside the gate
 
   static constexpr int SumCost(const Shape& shape, int last) {  // of BeginUnitSum
     const int columns = last + 1 - shape.Begin(last);
@@ -204,8 +202,6 @@ class FactorWork {
     sum_ = sum;
     next_ = p;
     if (p >= first) return false;
-    const float limit = gate_sigma_ * gate_sigma_ * sum;
-    taken_ = ~(math::MaskOf(gate_sigma_ > 0.0f) & math::MaskOf(innovation_ * innovation_ > limit));
     next_ = first;
     stage_ = Stage::kMeasure;
     return true;
@@ -217,9 +213,7 @@ class FactorWork {
     int p = next_, left = credit;
     float alpha = alpha_;
     float* const gain = f.gain();
-    // A row outside the gate must act as a row of zeros. The gain lies right after the row and is still zero where it
-    // is read, so the gain is read in the place of the row.
-    const float* const row = f.row() + (static_cast<std::uint32_t>(shape.size) & ~taken_);
+    const float* const row = f.row();
     while (p < shape.size && left > 0) {
       const int begin = shape.Begin(p, front), q = shape.Above(p, front);
       const bool pair = q < shape.size && shape.Begin(q, front) == begin;
@@ -260,7 +254,7 @@ class FactorWork {
   // x moves by gain times innovation. Considered columns follow Schmidt's form: their gain is zero, and S k k' goes
   // back to P, where k is the gain that they would have had.
   void Apply(Factor f, const std::uint32_t* considered) {
-    const float scale = 1.0f / alpha_, step = math::Masked(innovation_, taken_);
+    const float scale = 1.0f / alpha_, step = innovation_;
     const int size = f.shape->size;
     if (considered == nullptr) {
       math::AddScaled(f.x, f.gain(), scale * step, size);
@@ -276,11 +270,10 @@ class FactorWork {
     BeginSum(f, alpha_, size - 1);
   }
 
-  float alpha_ = 0.0f, sum_ = 0.0f, innovation_ = 0.0f, gate_sigma_ = 0.0f;
+  float alpha_ = 0.0f, sum_ = 0.0f, innovation_ = 0.0f;
   int next_ = 0, first_ = 0;
   Front front_ = {};
   Stage stage_ = Stage::kIdle;
-  std::uint32_t taken_ = 0;  // mask: zero if the row is outside the gate
 };
 
 // The room for an estimate and its factor in a filter's order, with the work on them.
@@ -329,13 +322,12 @@ class UdEstimate {
 
   // A row and a sum in work: see FactorWork.
   float* row() { return factor().row(); }  // [kSize] by positions, for the row's h
-  void BeginRow(int first, int joint, float y, float variance, float gate_sigma) {
-    work_.BeginRow(factor(), first, Order::FrontOf(joint), y, variance, gate_sigma);
+  void BeginRow(int first, int joint, float y, float variance) {
+    work_.BeginRow(factor(), first, Order::FrontOf(joint), y, variance);
   }
   bool StepRow(const std::uint32_t* considered, int& credit) { return work_.StepRow(factor(), considered, credit); }
   float innovation() const { return work_.innovation(); }
   float variance() const { return work_.variance(); }
-  bool inside() const { return work_.inside(); }
   void BeginUnitSum(int p, float c, int last) { work_.BeginUnitSum(factor(), p, c, last); }
   bool StepSum(int& credit) { return work_.StepSum(factor(), credit); }
   void AddUnit(int p, float c, int last) {  // the whole sum

@@ -346,7 +346,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
       k = Layout::kFront + Layout::kRowBegin[joint];
     }
     Scatter(stored, at + k, kColumns - k, row);
-    estimate.BeginRow(at[column], joint, stored[kColumns - k], 1.0f / d_[column], 0.0f);
+    estimate.BeginRow(at[column], joint, stored[kColumns - k], 1.0f / d_[column]);
   }
 
   const Prior<Layout>* prior_ = nullptr;

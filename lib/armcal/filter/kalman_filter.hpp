@@ -58,15 +58,13 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
     const int first = Columns::kAt.first[joint];
     const std::uint32_t taken = FillRow<Layout, Columns>(joint, front, dense, eta, y, use, estimate_.row(), report_);
-    estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f, prior_->gate_sigma);
+    estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f);
   }
   bool StepRow(int& credit) {
     const std::uint32_t* considered = AnyConsidered() ? considered_ : nullptr;
     if (!estimate_.StepRow(considered, credit)) return false;
     report_.innovation = estimate_.innovation();
     report_.variance = estimate_.variance();
-    report_.accepted &= estimate_.inside();
-    report_.status = GatedUnless(report_.accepted, report_.status);
     return true;
   }
   const UpdateReport& report(int) const { return report_; }  // of the last row

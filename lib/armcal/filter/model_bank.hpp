@@ -143,7 +143,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
       if (!begun_) {
         float* row = e.row();
         for (int p = first; p < Columns::kSize; ++p) row[p] = row_[p];
-        e.BeginRow(first, joint_, y_, 1.0f, 0.0f);
+        e.BeginRow(first, joint_, y_, 1.0f);
       }
       begun_ = !e.StepRow(nullptr, credit);
       if (begun_) return false;

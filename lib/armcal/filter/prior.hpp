@@ -27,7 +27,6 @@ struct Prior {
   float lambda[kStates] = {};  // forgetting per sample, in (0, 1] (forgetting form)
   float noise[kStates] = {};   // variance per sample, prior units (Kalman form)
   float link_floor = 0.0f;     // the smallest D that a dense column may have (Kalman form)
-  float gate_sigma = 0.0f;     // a row with a larger innovation is not used; 0: no gate (Kalman form)
 };
 
 // The joint of a front column, or kJoints for any other column. It takes the same instructions for every column.

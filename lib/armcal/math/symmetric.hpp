@@ -34,30 +34,56 @@ void UdAdd(T* __restrict ud, T c, T* __restrict a) {
 
 // P = W W' by modified weighted Gram-Schmidt (Thornton). Shapes: w [n x m] row-major, overwritten by rows w~ with
 // W = U w~, w~ w~' = D; ud [UdSize(n)]. A row that depends on those below it (to 1e-10 of its square) gets D = 0.
+// Begin, then Step until it answers true: a call works on `pairs` pairs of rows, of which there are n (n + 1) / 2.
+template <int n, int m, class T>
+class UdOfSquareRoot {
+ public:
+  void Begin(T* w, T* ud) {
+    w_ = w;
+    ud_ = ud;
+    for (int j = 0; j < n; ++j) before_[j] = Square(w + j * m);
+    j_ = i_ = n - 1;
+  }
+  bool Step(int pairs) {
+    for (; pairs > 0 && j_ >= 0; --pairs) {
+      if (i_ == j_) Pivot();
+      else Reduce(w_ + i_ * m, w_ + j_ * m, ud_[UdIndex(i_, j_)]);
+      if (--i_ < 0) i_ = --j_;
+    }
+    return j_ < 0;
+  }
+
+ private:
+  static T Square(const T* row) {
+    T sum = T(0);
+    for (int k = 0; k < m; ++k) sum += row[k] * row[k];
+    return sum;
+  }
+  void Pivot() {
+    const T d = Square(w_ + j_ * m);
+    const bool none = !(d > T(1e-10f) * before_[j_]);
+    inverse_ = Select(none, T(0), T(1) / Select(none, T(1), d));
+    ud_[UdIndex(j_, j_)] = Select(none, T(0), d);
+  }
+  void Reduce(T* wi, const T* wj, T& u) const {
+    T dot = T(0);
+    for (int k = 0; k < m; ++k) dot += wi[k] * wj[k];
+    u = dot * inverse_;
+    for (int k = 0; k < m; ++k) wi[k] -= u * wj[k];
+  }
+
+  T* w_ = nullptr;
+  T* ud_ = nullptr;
+  T before_[n] = {};  // squares of the rows at the beginning
+  T inverse_ = T(0);  // of D of row j_
+  int j_ = -1, i_ = -1;
+};
+// The same at once.
 template <int n, int m, class T>
 void UdFromSquareRoot(T* w, T* ud) {
-  T before[n];
-  for (int j = 0; j < n; ++j) {
-    T sum = T(0);
-    for (int k = 0; k < m; ++k) sum += w[j * m + k] * w[j * m + k];
-    before[j] = sum;
-  }
-  for (int j = n - 1; j >= 0; --j) {
-    T* wj = w + j * m;
-    T d = T(0);
-    for (int k = 0; k < m; ++k) d += wj[k] * wj[k];
-    const bool none = !(d > T(1e-10f) * before[j]);
-    const T inverse = Select(none, T(0), T(1) / Select(none, T(1), d));
-    for (int i = 0; i < j; ++i) {
-      T* wi = w + i * m;
-      T dot = T(0);
-      for (int k = 0; k < m; ++k) dot += wi[k] * wj[k];
-      const T u = dot * inverse;
-      ud[UdIndex(i, j)] = u;
-      for (int k = 0; k < m; ++k) wi[k] -= u * wj[k];
-    }
-    ud[UdIndex(j, j)] = Select(none, T(0), d);
-  }
+  UdOfSquareRoot<n, m, T> factor;
+  factor.Begin(w, ud);
+  (void)factor.Step(UdSize(n));
 }
 
 // diagonal [n] of P.

@@ -59,43 +59,52 @@ inline core::Status JudgeFriction(const JointCeiling& c, float braking_Nm) {
   return braking_Nm > c.friction_Nm ? core::Status::kBeyondCeiling : core::Status::kOk;
 }
 
-// Judges the friction of parameters that BuildAdoptedTable has accepted. kFeedsEnergy; kBeyondCeiling (a joint's
-// friction is higher than the hardest); kNotFinite. The refusal's word is that of the joint's friction column with the
-// greatest part in it. It evaluates the regressor GridPoints(Model::kFrictionReads) times, twice as often if friction
-// has memory. `memory` and `rows`: work space; `rows` has been zero and belongs to this model. Context: background.
+// Judges the friction of parameters that BuildAdoptedTable has accepted at one point of the grid. kFeedsEnergy;
+// kBeyondCeiling (a joint's friction is higher than the hardest); kNotFinite. The refusal's word is that of the joint's
+// friction column with the greatest part in it. It evaluates the regressor once, or twice if friction has memory.
+// `memory` and `rows`: work space; memory.running is false before the first point, and `rows` has been zero and belongs
+// to this model. Context: background.
 template <class Model>
-core::Refusal CheckFriction(const Committed<Model>& committed, const CeilingView& ceilings, Memory<Model>& memory,
-                            Rows<Model>& rows) {
+core::Refusal CheckFrictionAt(int point, const Committed<Model>& committed, const CeilingView& ceilings,
+                              Memory<Model>& memory, Rows<Model>& rows) {
   constexpr int n = Model::kJoints;
   ModelInput<float, n> x = {};
   x.dt = kGridStep_s;
-  memory.running = false;
-  for (int point = 0; point < GridPoints(Model::kFrictionReads); ++point) {
-    GridState(ceilings, Model::kFrictionReads, point, x.q, x.qd, x.temp);
-    if constexpr ((Model::kFrictionReads & kReadsHistory) != 0) {
-      for (int i = 0; i < n; ++i) x.q[i] -= kGridStep_s * x.qd[i];
-      EvaluateRows(committed, x, memory, rows);
-      for (int i = 0; i < n; ++i) x.q[i] += kGridStep_s * x.qd[i];
-    }
+  GridState(ceilings, Model::kFrictionReads, point, x.q, x.qd, x.temp);
+  if constexpr ((Model::kFrictionReads & kReadsHistory) != 0) {
+    for (int i = 0; i < n; ++i) x.q[i] -= kGridStep_s * x.qd[i];
     EvaluateRows(committed, x, memory, rows);
-    for (int i = 0; i < n; ++i) {
-      float sum = 0.0f, greatest = -1.0f;
-      int column = Model::kFrontBegin[i];
-      for (int c = Model::kFrontBegin[i]; c < Model::kFrontBegin[i + 1]; ++c) {
-        const bool counts = Model::kFriction[c] && committed.p[c] != 0.0f;
-        const float part = math::Masked(committed.p[c] * rows.front[c], math::MaskOf(counts));
-        sum += part;
-        if (math::Abs(part) > greatest) greatest = math::Abs(part), column = c;
-      }
-      const float braking_Nm = x.qd[i] < 0.0f ? -sum : sum;
-      const core::Status judged = JudgeFriction(ceilings.joint[i], braking_Nm);
-      if (core::IsOk(judged)) continue;
-      const JointCeiling& c = ceilings.joint[i];
-      return {judged, WordOfParameter(n, Model::kBodyParameters + column), braking_Nm,
-              judged == core::Status::kFeedsEnergy ? -c.feed_Nm : c.friction_Nm};
+    for (int i = 0; i < n; ++i) x.q[i] += kGridStep_s * x.qd[i];
+  }
+  EvaluateRows(committed, x, memory, rows);
+  for (int i = 0; i < n; ++i) {
+    float sum = 0.0f, greatest = -1.0f;
+    int column = Model::kFrontBegin[i];
+    for (int c = Model::kFrontBegin[i]; c < Model::kFrontBegin[i + 1]; ++c) {
+      const bool counts = Model::kFriction[c] && committed.p[c] != 0.0f;
+      const float part = math::Masked(committed.p[c] * rows.front[c], math::MaskOf(counts));
+      sum += part;
+      if (math::Abs(part) > greatest) greatest = math::Abs(part), column = c;
     }
+    const float braking_Nm = x.qd[i] < 0.0f ? -sum : sum;
+    const core::Status judged = JudgeFriction(ceilings.joint[i], braking_Nm);
+    if (core::IsOk(judged)) continue;
+    const JointCeiling& c = ceilings.joint[i];
+    return {judged, WordOfParameter(n, Model::kBodyParameters + column), braking_Nm,
+            judged == core::Status::kFeedsEnergy ? -c.feed_Nm : c.friction_Nm};
   }
   return {};
+}
+
+// The same at all GridPoints(Model::kFrictionReads) points, up to the first refusal.
+template <class Model>
+core::Refusal CheckFriction(const Committed<Model>& committed, const CeilingView& ceilings, Memory<Model>& memory,
+                            Rows<Model>& rows) {
+  core::Refusal refusal;
+  memory.running = false;
+  for (int point = 0; point < GridPoints(Model::kFrictionReads) && core::IsOk(refusal.status); ++point)
+    refusal = CheckFrictionAt(point, committed, ceilings, memory, rows);
+  return refusal;
 }
 
 }  // namespace armcal::model

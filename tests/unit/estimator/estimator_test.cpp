@@ -212,17 +212,20 @@ TYPED_TEST(Both, AnyBudget_GivesTheSameBits) {
   EXPECT_EQ(std::memcmp(&a, &b, sizeof a), 0);
 }
 
+// With the first sample of a period of ticks: 50 samples are 400 ticks.
 TYPED_TEST(Both, PublishesByItselfEverySoManySamples) {
   ASSERT_EQ(this->host->Adopt(), Status::kOk);
   this->host->Drain();
   ASSERT_TRUE(this->host->estimator.Take(this->host->estimates));
   this->host->estimator.SetPublishEvery(50);
-  this->Move(49);
-  EXPECT_FALSE(this->host->estimator.Take(this->host->estimates));
-  this->Move(1);
-  ASSERT_TRUE(this->host->estimator.Take(this->host->estimates));
-  EXPECT_EQ(this->host->estimates.samples, 50u);
-  EXPECT_EQ(this->host->estimates.tick, 49u * 8u);
+  for (const std::uint32_t period : {1u, 2u}) {
+    this->Move(period == 1u ? 50 : 49);
+    EXPECT_FALSE(this->host->estimator.Take(this->host->estimates));
+    this->Move(1);
+    ASSERT_TRUE(this->host->estimator.Take(this->host->estimates));
+    EXPECT_EQ(this->host->estimates.samples, 50u * period + 1u);
+    EXPECT_EQ(this->host->estimates.tick, 400u * period);
+  }
 }
 
 // What a form cannot hold is said before it is adopted.

@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <random>
 #include <vector>
 
 #include "tests/unit/estimator/two_link_model.hpp"
@@ -194,7 +197,7 @@ TEST_F(FeedForwardTest, FadeInsideAFade_FollowsTheMotion) {
   }
 }
 
-TEST_F(FeedForwardTest, LimitOfTheNextTable_HoldsAtOnceOrRisesWithTheFade) {
+TEST_F(FeedForwardTest, LimitOfTheNextTable_ComesWithTheFade) {
   Set first = Example(1);
   first.limit_Nm[0] = 10.0f;
   first.limit_Nm[1] = 4.0f;
@@ -212,8 +215,48 @@ TEST_F(FeedForwardTest, LimitOfTheNextTable_HoldsAtOnceOrRisesWithTheFade) {
   for (int tick = 1; tick <= 110; ++tick) {
     ASSERT_EQ(Evaluate(), Status::kClamped);
     EXPECT_NEAR(tau[0], 10 + std::min(tick, 100) / 10.0, 1e-4);
-    EXPECT_EQ(std::abs(tau[1]), 3.0f);
+    EXPECT_NEAR(std::abs(tau[1]), 4 - std::min(tick, 100) / 100.0, 1e-4);
   }
+}
+
+// What SPEC promises of any two tables, and of tables that come while a fade is under way: amplitudes far beyond the
+// limits, limits and v_min of all sizes with the set-point's speed between them. X is the hardest limit.
+TEST_F(FeedForwardTest, HostileTables_AtAnUnchangedSetPoint_MoveTheTorqueByAtMost2XInAFade) {
+  std::mt19937 random(3);
+  const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+  const auto size = [&](double low, double high) {
+    return static_cast<float>(std::exp(between(std::log(low), std::log(high))));
+  };
+  constexpr float kX = 300.0f;
+  constexpr std::uint32_t kLeast = 50;
+  double greatest = 0;
+  for (int run = 0; run < 40; ++run) {
+    ff = std::make_unique<FeedForward<TwoLink>>();
+    Set c = Example(1);
+    for (int i = 0; i < 2; ++i) q[i] = size(0.1, 2), qd[i] = size(0.001, 2), qdd[i] = size(0.1, 20);
+    for (std::uint32_t adoption = 1; adoption < 12; ++adoption) {
+      c.generation = adoption;
+      c.bumpless = adoption > 1;
+      c.blend_ticks = kLeast + static_cast<std::uint32_t>(between(0, 60));
+      for (float& p : c.p) p = size(1e-3, 1e5) * (between(-1, 1) < 0 ? -1 : 1);
+      c.eta[0] = size(0.01, 2);
+      for (int i = 0; i < 2; ++i) c.limit_Nm[i] = size(1, kX), c.v_min_radps[i] = size(0.001, 2);
+      ASSERT_EQ(ff->Offer(c, adoption > 1), Status::kOk);
+      float last[2] = {tau[0], tau[1]};
+      for (auto ticks = static_cast<int>(between(1, 130)); ticks > 0; --ticks) {
+        const Status status = Evaluate();
+        ASSERT_TRUE(status == Status::kOk || status == Status::kClamped);
+        for (int i = 0; i < 2; ++i) {
+          ASSERT_LE(std::abs(tau[i]), kX);
+          if (adoption > 1) greatest = std::max(greatest, std::abs(static_cast<double>(tau[i]) - last[i]));
+          last[i] = tau[i];
+        }
+      }
+    }
+  }
+  const double most = 2.0 * kX / kLeast;
+  EXPECT_LE(greatest, most * (1 + 1e-4));
+  EXPECT_GT(greatest, 0.5 * most) << "the tables were not hostile";
 }
 
 TEST_F(FeedForwardTest, EachColumn_AddsItsOwnTorque) {

@@ -1,6 +1,4 @@
-// estimator - hold, reset of a block, and which estimates are kept; the truth is the motion's own.
-#include "armcal/estimator/supervisor.hpp"
-
+// estimator - hold, and reset of a block; the truth is the motion's own.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -17,7 +15,7 @@ using namespace test;  // NOLINT: the bench of these tests
 using core::Status;
 
 template <class Filter>
-class Supervised : public testing::Test {
+class HoldAndReset : public testing::Test {
  protected:
   void SetUp() override { ASSERT_EQ(host_->Adopt(), Status::kOk); }
   void Run(int samples) {
@@ -43,12 +41,12 @@ class Supervised : public testing::Test {
   Motion run_;
 };
 
-using SupervisedFilters =
+using HoldAndResetFilters =
     testing::Types<filter::KalmanFilter<TwoLink>, filter::KalmanFilter<TwoLink, filter::Form::kBlock>,
                    filter::ForgettingFilter<TwoLink>, filter::ModelBank<TwoLink>>;
-TYPED_TEST_SUITE(Supervised, SupervisedFilters);
+TYPED_TEST_SUITE(HoldAndReset, HoldAndResetFilters);
 
-TYPED_TEST(Supervised, Hold_KeepsEveryBitOfTheEstimate_AndCountsTheRows) {
+TYPED_TEST(HoldAndReset, Hold_KeepsEveryBitOfTheEstimate_AndCountsTheRows) {
   this->Run(500);
   const Estimates<TwoLink> before = this->Now();
   this->host_->estimator.Hold(true);
@@ -65,7 +63,7 @@ TYPED_TEST(Supervised, Hold_KeepsEveryBitOfTheEstimate_AndCountsTheRows) {
 }
 
 // A joint that has been taken apart: its friction is another one.
-TYPED_TEST(Supervised, AResetJoint_IsFoundAgain_TheOtherOneKeepsWhatIsKnownOfIt) {
+TYPED_TEST(HoldAndReset, AResetJoint_IsFoundAgain_TheOtherOneKeepsWhatIsKnownOfIt) {
   this->Run(4000);
   const Estimates<TwoLink> before = this->Now();
   ASSERT_LT(this->Off(before, 0, kColumns), 5);
@@ -80,7 +78,7 @@ TYPED_TEST(Supervised, AResetJoint_IsFoundAgain_TheOtherOneKeepsWhatIsKnownOfIt)
   EXPECT_LT(this->Off(this->Now(), 0, 5), 5);
 }
 
-TYPED_TEST(Supervised, ResetLinks_FollowAnotherPayload_OrTheFormSaysNo) {
+TYPED_TEST(HoldAndReset, ResetLinks_FollowAnotherPayload_OrTheFormSaysNo) {
   this->Run(4000);
   const Estimates<TwoLink> before = this->Now();
   for (int k = TwoLink::kFront; k < kColumns; ++k) this->run_.truth(k) *= 1.1;
@@ -94,57 +92,9 @@ TYPED_TEST(Supervised, ResetLinks_FollowAnotherPayload_OrTheFormSaysNo) {
   EXPECT_LT(this->Off(this->Now(), TwoLink::kFront, kColumns), 5);
 }
 
-TYPED_TEST(Supervised, ResetOfNoBlock_IsRefused) {
+TYPED_TEST(HoldAndReset, ResetOfNoBlock_IsRefused) {
   EXPECT_EQ(this->host_->estimator.Reset(-1), Status::kOutOfRange);
   EXPECT_EQ(this->host_->estimator.Reset(3), Status::kOutOfRange);
-}
-
-class KeptEstimates : public testing::Test {
- protected:
-  KeptEstimates() {
-    for (int k = 0; k < TwoLink::kBodyParameters; ++k) bodies_[k] = TwoLink::kInfo[k].mean;
-    estimates_.generation = 7;
-  }
-  void ExpectKept(Status why) {
-    Estimates<TwoLink> next = estimates_;
-    next.generation = 8;
-    EXPECT_EQ(supervisor_.Accept(next, bodies_), why);
-    EXPECT_EQ(supervisor_.good().generation, 7u);
-    EXPECT_EQ(supervisor_.kept(), 1u);
-  }
-
-  Supervisor<TwoLink> supervisor_;
-  Estimates<TwoLink> estimates_;
-  float bodies_[TwoLink::kBodyParameters];
-};
-
-TEST_F(KeptEstimates, AreTheLastGoodOnes) {
-  EXPECT_FALSE(supervisor_.any());
-  ASSERT_EQ(supervisor_.Accept(estimates_, bodies_), Status::kOk);
-  EXPECT_TRUE(supervisor_.any());
-  EXPECT_EQ(std::memcmp(supervisor_.bodies(), bodies_, sizeof bodies_), 0);
-  bodies_[0] = -1;  // a mass
-  ExpectKept(Status::kUnphysical);
-  EXPECT_GT(supervisor_.bodies()[0], 0);
-}
-
-TEST_F(KeptEstimates, StayWhereARotorIsNegative) {
-  ASSERT_EQ(supervisor_.Accept(estimates_, bodies_), Status::kOk);
-  bodies_[model::kRotor] = -1e-3f;
-  ExpectKept(Status::kUnphysical);
-}
-
-TEST_F(KeptEstimates, StayWhereANumberIsNone) {
-  ASSERT_EQ(supervisor_.Accept(estimates_, bodies_), Status::kOk);
-  estimates_.generation = 7;
-  estimates_.sd[2] = std::numeric_limits<float>::quiet_NaN();
-  ExpectKept(Status::kNotFinite);
-}
-
-TEST_F(KeptEstimates, StayWhileTheFilterIsSurprised) {
-  ASSERT_EQ(supervisor_.Accept(estimates_, bodies_), Status::kOk);
-  estimates_.inconsistent = true;
-  ExpectKept(Status::kHeld);
 }
 
 }  // namespace

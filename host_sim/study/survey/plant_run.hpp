@@ -1,0 +1,26 @@
+// survey - measures an arm that the survey did not make: the plant (KDL, stiction, sensors) follows a series in a loop.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "codegen/src/robot/robot.hpp"
+#include "host_sim/data/logs/log.hpp"
+#include "host_sim/identify/excitation/series.hpp"
+
+namespace armcal::survey {
+
+struct PlantSettings {
+  std::uint64_t truth_seed = 1, noise_seed = 1;
+  // Half widths by which the true arm differs from the robot file. The true bodies are those of the file.
+  double friction = 0.5, torque_constant = 0.03;
+  double seconds = 10;
+};
+
+// The plant starts at rest, reaches the series' pace within two seconds and is then recorded for `seconds`. A PD law
+// with feed-forward of the file's bodies (KDL) drives it by the gains in robot.control. A sample of the log is the
+// average of robot.sample_ticks readings of encoder and current. io::InputError: the plant cannot read the robot file;
+// the file has no [control] table.
+logs::Log RunPlant(const codegen::Robot& robot, const excitation::Series& series, const PlantSettings& settings);
+
+}  // namespace armcal::survey

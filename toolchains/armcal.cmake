@@ -65,6 +65,9 @@ target_compile_options(armcal_test_rules INTERFACE -O1 -Wno-double-promotion)
 # The test executables labelled fast: what the sanitizer build makes.
 add_custom_target(fast_tests)
 
+# The test executables labelled long: nothing else builds them.
+add_custom_target(long_tests)
+
 # armcal_test(NAME SOURCES ... [LIBS ...] [LABELS fast|all|long]): one GoogleTest executable, one CTest entry.
 function(armcal_test name)
   cmake_parse_arguments(A "" "LABELS;TIMEOUT" "SOURCES;LIBS" ${ARGN})
@@ -80,7 +83,17 @@ function(armcal_test name)
   set_tests_properties(${name} PROPERTIES LABELS ${A_LABELS} TIMEOUT ${A_TIMEOUT})
   if(A_LABELS STREQUAL fast)
     add_dependencies(fast_tests ${name})
+  elseif(A_LABELS STREQUAL long)
+    add_dependencies(long_tests ${name})
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
   endif()
+endfunction()
+
+# armcal_long_part(NAME TIMEOUT): the suites of NAME that begin with Long run as a CTest entry of their own, which is long.
+function(armcal_long_part name timeout)
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "GTEST_FILTER=-Long*")
+  add_test(NAME ${name}_long COMMAND ${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  set_tests_properties(${name}_long PROPERTIES LABELS long TIMEOUT ${timeout} ENVIRONMENT "GTEST_FILTER=Long*")
 endfunction()
 
 # armcal_emitted_models(NAME SOURCES ... FOLDERS ...): models that a program of these sources writes while building; it

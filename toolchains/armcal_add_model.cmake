@@ -1,21 +1,20 @@
 # For a project that uses armcal: the C++ model of a robot file as a target, generated when the file, an effect record or the tool changes.
 #
-#   include(<armcal>/toolchains/armcal_add_model.cmake)
+#   find_package(armcal REQUIRED)                           # or include(<armcal>/toolchains/armcal_add_model.cmake)
 #   armcal_add_model(my_arm ROBOT my_arm.toml)
 #   target_link_libraries(firmware PRIVATE my_arm)          # #include <model.hpp>, <dynamics.hpp>, <armcal/...>
 #
 # armcal_add_model(TARGET ROBOT FILE [NAME FOLDER]) makes the interface library TARGET with lib and the generated folder as include
-# folders. NAME: the headers are included as <FOLDER/model.hpp>, for a project with more than one model. A bad robot file ends the build
-# with one line that names file and key.
+# folders. NAME: the headers are included as <FOLDER/model.hpp>, for a project with more than one model. armcal::model_<file>, with the
+# file's name without its suffix, is another name of TARGET. A bad robot file ends the build with one line that names file and key.
 #
 # The generator runs on the PC, in a cross build, too. It is, in this order: the target `armcal-generate` of this very build; the program
-# that ARMCAL_GENERATE names (cache variable or environment); `armcal-generate` in <armcal>/build/host or on the PATH; else it is built
-# from the checkout with the PC's own compiler, under the build folder. That takes ten compile steps at most and these Debian
+# that ARMCAL_GENERATE names (cache variable or environment); the installed package's own; `armcal-generate` in <armcal>/build/host or on
+# the PATH; else it is built from the checkout with the PC's own compiler, under the build folder. That takes ten compile steps at most and these Debian
 # packages: g++ cmake ninja-build libeigen3-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev; and pkg-config liburdfdom-dev
 # for robot files that name a URDF.
 include_guard(GLOBAL)
 include(ExternalProject)
-get_filename_component(ARMCAL_CHECKOUT ${CMAKE_CURRENT_LIST_DIR} DIRECTORY)
 
 # Sets `out` to the generator's program and `wait_for` to the target that builds it, if one does.
 function(armcal_find_generator out wait_for)
@@ -31,9 +30,16 @@ function(armcal_find_generator out wait_for)
   if(ARMCAL_GENERATE AND NOT EXISTS ${ARMCAL_GENERATE})
     message(FATAL_ERROR "ARMCAL_GENERATE: ${ARMCAL_GENERATE}: no such program")
   endif()
+  if(NOT ARMCAL_GENERATE AND TARGET armcal::generate)
+    get_target_property(ARMCAL_GENERATE armcal::generate IMPORTED_LOCATION)
+  endif()
+  get_filename_component(ARMCAL_CHECKOUT ${CMAKE_CURRENT_FUNCTION_LIST_DIR} DIRECTORY)
   if(NOT ARMCAL_GENERATE)
     find_program(ARMCAL_FOUND_GENERATE armcal-generate HINTS ${ARMCAL_CHECKOUT}/build/host NO_CMAKE_FIND_ROOT_PATH)
     set(ARMCAL_GENERATE ${ARMCAL_FOUND_GENERATE})
+  endif()
+  if(NOT ARMCAL_GENERATE AND NOT EXISTS ${ARMCAL_CHECKOUT}/codegen/CMakeLists.txt)
+    message(FATAL_ERROR "armcal-generate: not found in the package ${ARMCAL_CHECKOUT} nor on the PATH; set ARMCAL_GENERATE to the program")
   endif()
   if(NOT ARMCAL_GENERATE)
     set(folder ${CMAKE_BINARY_DIR}/armcal_generate_program)
@@ -59,6 +65,7 @@ function(armcal_add_model target)
   if(NOT EXISTS ${robot})
     message(FATAL_ERROR "armcal_add_model(${target} ...): ${robot}: no such robot file")
   endif()
+  get_filename_component(ARMCAL_CHECKOUT ${CMAKE_CURRENT_FUNCTION_LIST_DIR} DIRECTORY)  # or the installed package
   armcal_find_generator(tool wait_for)
   set(include ${CMAKE_CURRENT_BINARY_DIR}/${target}.model)
   set(folder ${include})
@@ -73,8 +80,17 @@ function(armcal_add_model target)
   add_custom_target(${target}_files DEPENDS ${folder}/model.hpp)
   add_library(${target} INTERFACE)
   add_dependencies(${target} ${target}_files)
-  target_include_directories(${target} INTERFACE ${include} ${ARMCAL_CHECKOUT}/lib)
-  target_compile_features(${target} INTERFACE cxx_std_17)
-  # As armcal's own code is compiled: host and target agree bit for bit, and a square root is one instruction.
-  target_compile_options(${target} INTERFACE -ffp-contract=off -fno-fast-math -fno-math-errno)
+  target_include_directories(${target} INTERFACE ${include})
+  if(TARGET armcal::headers)
+    target_link_libraries(${target} INTERFACE armcal::headers)
+  else()
+    target_include_directories(${target} INTERFACE ${ARMCAL_CHECKOUT}/lib)
+    target_compile_features(${target} INTERFACE cxx_std_17)
+    # As armcal's own code is compiled: host and target agree bit for bit, and a square root is one instruction.
+    target_compile_options(${target} INTERFACE -ffp-contract=off -fno-fast-math -fno-math-errno)
+  endif()
+  get_filename_component(name ${robot} NAME_WE)
+  if(NOT TARGET armcal::model_${name})
+    add_library(armcal::model_${name} ALIAS ${target})
+  endif()
 endfunction()

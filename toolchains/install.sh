@@ -2,7 +2,8 @@
 # toolchains - installs what armcal is built with, from Debian's own packages (Debian 12).
 #   toolchains/install.sh host    compiler, libraries and tests of the PC side
 #   toolchains/install.sh cross   compiler of the Cortex-M images
-#   toolchains/install.sh peers   Python and pip, for tests/run.sh peers
+#   toolchains/install.sh fuzz    clang with libFuzzer, for the long tests
+#   toolchains/install.sh peers   Python, its headers and pip, for tests/run.sh peers
 # Does nothing when all is there. Needs root or sudo only when something is missing.
 set -euo pipefail
 
@@ -11,13 +12,15 @@ host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
   libgtest-dev googletest mbpoll liburdfdom-dev libkdl-parser-dev libtinyxml2-dev libpagmo-dev libboost-dev)
 cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   qemu-system-arm python3)
-peers_packages=(python3 python3-venv python3-pip)
+fuzz_packages=(clang)
+peers_packages=(python3 python3-dev python3-venv python3-pip)
 
 case "${1:-}" in
   host) wanted=("${host_packages[@]}") ;;
   cross) wanted=("${cross_packages[@]}") ;;
+  fuzz) wanted=("${fuzz_packages[@]}") ;;
   peers) wanted=("${peers_packages[@]}") ;;
-  *) sed -n '2,6p' "$0" >&2; exit 2 ;;
+  *) sed -n '2,7p' "$0" >&2; exit 2 ;;
 esac
 
 missing=()

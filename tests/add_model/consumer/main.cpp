@@ -1,5 +1,17 @@
 // consumer - a user's program with a generated model of the user's own robot file: the arm held out level, by hand.
+// It also calls code of the library's sources, and uses a model that armcal brings.
+#ifdef WITH_EIGEN
+#include <armcal/eigen.hpp>
+#endif
+
+#include <armcal/armcal.hpp>
+#include <armcal/core/version.hpp>
+#include <er20_like/model.hpp>
 #include <users_arm/model.hpp>
+
+#if ARMCAL_VERSION < 0x000100
+#error "expected a version of armcal"
+#endif
 
 using Arm = armcal::generated::UsersArm;
 
@@ -18,5 +30,14 @@ int main() {
   bool right = true;
   for (int i = 0; i < Arm::kJoints; ++i)
     right = right && armcal::math::Abs(torque_Nm[i] - expected_Nm[i]) < 1e-4f;  // a few roundings of 20 N m in float
+  // "read holding register 0 of device 1"; 84 0A is the known checksum of this request.
+  const unsigned char request[] = {0x01, 0x03, 0x00, 0x00, 0x00, 0x01, 0x84, 0x0A};
+  armcal::link::RtuFramer framer(1, 2);
+  std::size_t used = 0;
+  right = right && framer.OnBytes(request, sizeof request, 0, used) == armcal::link::RtuFramer::Result::kRequest;
+  right = right && used == sizeof request && armcal::generated::Er20Like::kJoints == 6;
+#ifdef WITH_EIGEN
+  right = right && Eigen::Vector2f(expected_Nm).norm() > 0;
+#endif
   return right ? 0 : 1;
 }

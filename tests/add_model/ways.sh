@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# tests - an outside project meets armcal in each of its ways: installed, fetched, as a subfolder; on the PC, for a Cortex-M4F and a Cortex-M7.
+#   ways.sh CHECKOUT BUILD_FOLDER ARMCAL_GENERATE
+set -euo pipefail
+checkout=$1 build=$2 generate=$3 here=$(dirname "$(realpath "$0")")
+rm -rf "$build"
+mkdir -p "$build"
+trap '[[ $? == 0 ]] || cat "$build/log"' EXIT
+export CMAKE_GENERATOR=Ninja
+
+# Installed without the host's programs. Packages that the tool and the tests need are hidden: nothing may ask for them.
+hidden=()
+for package in orocos_kdl PkgConfig GTest fmt CLI11 nlohmann_json; do hidden+=("-DCMAKE_DISABLE_FIND_PACKAGE_$package=ON"); done
+cmake -S "$checkout" -B "$build/library" -DARMCAL_LIBRARY_ONLY=ON -DCMAKE_INSTALL_PREFIX="$build/prefix" "${hidden[@]}" >"$build/log" 2>&1
+cmake --install "$build/library" >>"$build/log" 2>&1
+mkdir "$build/prefix/bin"
+ln -s "$generate" "$build/prefix/bin/armcal-generate"  # as an installed tool lies
+
+# way NAME OPTIONS...: configures and builds. Where UNITY is ON the library's sources are compiled together, which is quicker.
+way() {
+  local start=$SECONDS
+  cmake -S "$here/consumer" -B "$build/$1" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_UNITY_BUILD="${UNITY:-OFF}" "${@:2}" >"$build/log" 2>&1
+  cmake --build "$build/$1" -j2 >>"$build/log" 2>&1
+  echo "$1: $((SECONDS - start)) s"
+}
+way package -DWAY=package -DCMAKE_PREFIX_PATH="$build/prefix"
+"$build/package/consumer"
+grep -q "$build/prefix/bin/armcal-generate" "$build/package/build.ninja"
+export ARMCAL_GENERATE=$generate UNITY=ON
+way fetch -DWAY=fetch -DARMCAL="$checkout"
+"$build/fetch/consumer"
+way subdirectory -DWAY=subdirectory -DARMCAL="$checkout"
+"$build/subdirectory/consumer"
+unset ARMCAL_GENERATE
+if command -v arm-none-eabi-g++ >/dev/null; then
+  for core in m4 m7; do
+    folder=$([[ $core == m4 ]] && echo cortex-m4f || echo cortex-m7)
+    way "$folder" -DWAY=package -DCMAKE_PREFIX_PATH="$build/prefix" -DCMAKE_TOOLCHAIN_FILE="$checkout/toolchains/$folder.cmake"
+    grep -q "FLAGS = .*-mcpu=cortex-$core" "$build/$folder/build.ninja"
+  done
+else
+  echo "arm-none-eabi-g++ is not there: the Cortex-M is left out"
+fi

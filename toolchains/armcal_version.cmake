@@ -1,0 +1,11 @@
+# Sets ARMCAL_VERSION to "major.minor.patch", as lib/armcal/core/version.hpp has it.
+file(STRINGS ${CMAKE_CURRENT_LIST_DIR}/../lib/armcal/core/version.hpp line REGEX "^#define ARMCAL_VERSION ")
+if(NOT line MATCHES "0x([0-9A-F][0-9A-F])([0-9A-F][0-9A-F])([0-9A-F][0-9A-F])$")
+  message(FATAL_ERROR "lib/armcal/core/version.hpp: found \"${line}\", expected #define ARMCAL_VERSION 0xMMmmpp")
+endif()
+set(ARMCAL_VERSION "")
+foreach(digits ${CMAKE_MATCH_1} ${CMAKE_MATCH_2} ${CMAKE_MATCH_3})
+  math(EXPR number 0x${digits})
+  list(APPEND ARMCAL_VERSION ${number})
+endforeach()
+list(JOIN ARMCAL_VERSION "." ARMCAL_VERSION)

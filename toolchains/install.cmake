@@ -1,0 +1,26 @@
+# What `cmake --install` and CPack put where. <prefix>/share/armcal is laid out like the checkout, so that programs, armcal_add_model and
+# ARMCAL_HOME find the same files at the same places in both.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+set(home ${CMAKE_INSTALL_DATADIR}/armcal)
+
+install(DIRECTORY lib/armcal DESTINATION ${home}/lib PATTERN CMakeLists.txt EXCLUDE)
+install(DIRECTORY codegen/robots codegen/effects codegen/generated DESTINATION ${home}/codegen PATTERN CMakeLists.txt EXCLUDE)
+install(DIRECTORY port/template port/linux DESTINATION ${home}/port PATTERN CMakeLists.txt EXCLUDE)
+install(FILES port/PORTING.md DESTINATION ${home}/port)
+install(FILES toolchains/armcal_add_model.cmake toolchains/armcal_targets.cmake DESTINATION ${home}/toolchains)
+install(FILES toolchains/armcalConfig.cmake DESTINATION ${home}/cmake)
+write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/armcalConfigVersion.cmake COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/armcalConfigVersion.cmake DESTINATION ${home}/cmake)
+install(FILES README.md CHANGELOG.md SPEC.md SECURITY.md DESIGN.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs PATTERN findings* EXCLUDE)
+
+if(TARGET armcal)
+  set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)  # an installation needs its programs and no test
+  install(TARGETS armcal armcal-generate armcal-drive armcal-estimate-er20_like DESTINATION ${CMAKE_INSTALL_BINDIR})
+  add_custom_target(installed_programs DEPENDS armcal armcal-generate armcal-drive armcal-estimate-er20_like)
+  install(DIRECTORY host_sim/scenarios DESTINATION ${home}/host_sim)
+  # The simulated drive of a robot is compiled of these.
+  install(FILES host_sim/client/vendor_registers.hpp DESTINATION ${home}/host_sim/client)
+  install(DIRECTORY host_sim/machine/drive DESTINATION ${home}/host_sim/machine PATTERN CMakeLists.txt EXCLUDE)
+endif()

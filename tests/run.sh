@@ -3,7 +3,7 @@
 #   tests/run.sh fast   host build, unit and property tests
 #   tests/run.sh [all]    + end-to-end tests, planted faults, firmware and wire tests under sanitizers, both Cortex-M images and their
 #                         tests under QEMU
-#   tests/run.sh long     + the long tests, all fast tests under sanitizers
+#   tests/run.sh long     + the long tests, all fast tests under sanitizers, fuzzing
 #   tests/run.sh peers  alone: comparisons with other people's programs, which pip installs into build/peers
 # The last line is "N passed, M failed"; a CTest test, a build and a check count one each.
 set -uo pipefail
@@ -79,6 +79,8 @@ if [[ $scope == peers ]]; then
   step "other people's programs" peers_programs || finish
   step "build armcal" configure_and_build host --target armcal || finish
   step "exports in MuJoCo and Pinocchio" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
+  step "the Python package" build/peers/venv/bin/pip install -q --disable-pip-version-check ./host_sim/python || finish
+  step "its regressor and Pinocchio" build/peers/venv/bin/python tests/peers/python_test.py build/host/armcal build/peers/python
   finish
 fi
 
@@ -93,7 +95,9 @@ else
 fi
 
 say "building build/host"
-step "build host" configure_and_build host || finish
+programs=(all)
+[[ $scope == long ]] && programs+=(long_tests)
+step "build host" configure_and_build host --target "${programs[@]}" || finish
 run_ctest "tests ($scope)" build/host "$labels"
 
 if [[ $scope != fast ]]; then
@@ -104,9 +108,6 @@ if [[ $scope != fast ]]; then
       cat "build/$image/budgets.txt"
     fi
   done
-  step "a user's project for cortex-m7" ctest --build-and-test tests/add_model/consumer build/cortex-m7/consumer \
-    --build-generator Ninja --build-options "-DARMCAL=$PWD" "-DARMCAL_GENERATE=$PWD/build/host/armcal-generate" \
-    "-DCMAKE_TOOLCHAIN_FILE=$PWD/toolchains/cortex-m7.cmake" -DCMAKE_BUILD_TYPE=Release
 
   # Under sanitizers: what bytes from outside reach and what runs on the target. The host's matrix code takes long to compile so; it
   # comes with `long`.
@@ -121,6 +122,9 @@ if [[ $scope != fast ]]; then
   if step "build host-asan" configure_and_build host-asan --target "${targets[@]}"; then
     run_ctest "tests with sanitizers" build/host-asan '^fast$' "$tests"
   fi
+fi
+if [[ $scope == long ]]; then
+  if step "fuzz packages" toolchains/install.sh fuzz; then step "fuzz targets, 60 s each" tests/fuzz/fuzz.sh 60; fi
 fi
 [[ $scope == fast ]] || say "not run: tests/run.sh peers (comparisons with other people's programs)"
 finish

@@ -13,6 +13,7 @@
 #include "host_sim/identify/calibration/table_ceilings.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/identify/methods/closed_loop.hpp"
+#include "host_sim/identify/methods/link_widths.hpp"
 #include "host_sim/identify/methods/method.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -147,6 +148,25 @@ void SaveTable(const std::string& path, const codegen::Model& model, const calib
     fmt::print(stderr, "armcal: {}: a drive would refuse this table: {}\n", path, beyond);
 }
 
+// Bodies read out with the widths that the logs themselves show, and the table that follows. A link's parameter rests
+// on the prior where the logs narrow these widths little.
+struct Table {
+  calibration::LinkWidths widths;
+  calibration::PhysicalReadOut bodies;
+  calibration::TableFile file;
+};
+Table MakeTable(const codegen::Model& model, const calibration::Fit& all, const calibration::Fit& used, double step_s) {
+  Table t;
+  t.widths = calibration::EstimateLinkWidths(model, used);
+  t.bodies = calibration::ReadOutWithWidths(model, used, t.widths);
+  t.file = calibration::IdentifiedTable(model, all, used, t.bodies, step_s);
+  for (int k = 0; k < model.body_parameters(); ++k) {
+    calibration::TableRow& row = t.file.row[static_cast<std::size_t>(k)];
+    row.from_prior = row.sd > 0 && row.posterior_sd > calibration::kFromPrior * t.widths.sd[k];
+  }
+  return t;
+}
+
 // The declared model fitted to the runs without payload in true torque; the gains become the table's torque scales.
 void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vector<calibration::Dataset> without,
                 const std::vector<DriveGain>& gains) {
@@ -164,8 +184,7 @@ void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vecto
   const calibration::Fit all = calibration::WeightedFit(known, calibration::Pointers(without));
   const calibration::Fit held =
       calibration::WeightedFit(known, calibration::Pointers(without), calibration::HardlyDetermined(known, all));
-  calibration::TableFile table = calibration::IdentifiedTable(
-      known, all, held, calibration::ReadOutPhysical(known, held), without[0].s.t[1] - without[0].s.t[0]);
+  calibration::TableFile table = MakeTable(known, all, held, without[0].s.t[1] - without[0].s.t[0]).file;
   for (std::size_t j = 0; j < scale.size(); ++j) table.joint[j].torque_scale *= scale[j];
   SaveTable(o.table, model, table);
 }
@@ -353,10 +372,11 @@ int RunIdentify(const IdentifyOptions& o) {
   if (model.robot().has_prior) {
     used = calibration::WeightedFit(model, calibration::Pointers(train),
                                     o.force ? std::vector<int>{} : calibration::HardlyDetermined(model, all));
-    const calibration::PhysicalReadOut bodies = calibration::ReadOutPhysical(model, used);
+    const auto [widths, bodies, table] = MakeTable(model, all, used, train[0].s.t[1] - train[0].s.t[0]);
     x = bodies.x;
-    const double step = train[0].s.t[1] - train[0].s.t[0];
-    const calibration::TableFile table = calibration::IdentifiedTable(model, all, used, bodies, step);
+    json["link_widths"] = {{"relative", std::vector<double>(widths.relative.begin(), widths.relative.end())},
+                           {"center_m", widths.center_m},
+                           {"inertia_of_trace", widths.inertia_of_trace}};
     int from_prior = 0;
     for (const auto& row : table.row) from_prior += row.from_prior;
     for (const auto& row : table.row)

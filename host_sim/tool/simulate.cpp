@@ -12,8 +12,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct SimulateOptions {
-  std::string scenario = "any", robot = "er20_like", drive, storage = "build/drive.nor", truth_log;
-  int port = 1502;
+  std::string scenario = "any", robot = "er20_like", drive, storage = "build/drive.nor", truth_log, serial;
+  int port = 1502, read_port = -1;
   bool real_time = false;
 };
 
@@ -40,6 +40,8 @@ int RunSimulate(const SimulateOptions& o) {
   words.insert(words.end(), {"--scenario", scenario.string(), "--robot", robot.string(), "--storage", o.storage,
                              "--port", std::to_string(o.port)});
   if (!o.truth_log.empty()) words.insert(words.end(), {"--truth-log", o.truth_log});
+  if (o.read_port >= 0) words.insert(words.end(), {"--read-port", std::to_string(o.read_port)});
+  if (!o.serial.empty()) words.insert(words.end(), {"--serial", o.serial});
   if (o.real_time) words.push_back("--real-time");
   Become(words);
 }
@@ -58,6 +60,9 @@ void AddSimulate(CLI::App& app, Action& action) {
   verb->add_option("--robot", o->robot, "robot file or name")->capture_default_str();
   verb->add_option("--drive", o->drive, "drive program (default: the one of the robot)");
   verb->add_option("--port", o->port, "TCP port, 0: any free one")->capture_default_str()->check(CLI::Range(0, 65535));
+  verb->add_option("--read-port", o->read_port, "a second TCP port that serves reading alone, 0: any free one")
+      ->check(CLI::Range(0, 65535));
+  verb->add_option("--serial", o->serial, "also serve Modbus RTU on this terminal: 115200 baud, even parity, unit 1");
   verb->add_option("--storage", o->storage, "file that plays the drive's flash memory")->capture_default_str();
   verb->add_option("--truth-log", o->truth_log,
                    "what the torque sensors would read without noise, for the report's floor");

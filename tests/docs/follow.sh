@@ -8,7 +8,7 @@ page=$(realpath "$1") folder=$2 armcal=$(realpath "$3") top=$PWD
 
 rm -rf "$folder"
 mkdir -p "$folder/build/host" "$folder/blocks"
-cp -r "$top"/{codegen,lib,host_sim,toolchains} "$folder"
+cp -r "$top"/{codegen,lib,port,host_sim,toolchains,docs,CMakeLists.txt,LICENSE,*.md} "$folder"
 ln -s "$armcal" "$folder/build/host/armcal"
 cd "$folder"
 git init -q . && git add codegen && git -c user.name=test -c user.email=test commit -qm before

@@ -9,6 +9,15 @@ namespace armcal::codegen {
 
 namespace fs = std::filesystem;
 
+namespace {
+fs::path& InstalledHome() {
+  static fs::path folder;
+  return folder;
+}
+}  // namespace
+
+void SetInstalledHome(const fs::path& folder) { InstalledHome() = folder; }
+
 fs::path Home() {
   const auto holds = [](const fs::path& p) {
     return fs::is_directory(p / "codegen" / "robots") && fs::is_directory(p / "codegen" / "effects");
@@ -19,12 +28,16 @@ fs::path Home() {
     return home;
   }
   std::error_code error;
-  for (fs::path start : {fs::current_path(), fs::read_symlink("/proc/self/exe", error).parent_path()})
+  const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path();
+  for (fs::path start : {fs::current_path(), program})
     for (; !start.empty(); start = start.parent_path()) {
       if (holds(start)) return start;
       if (start == start.root_path()) break;
     }
-  throw io::InputError("codegen/robots: not found from here; set ARMCAL_HOME to the armcal checkout");
+  for (const fs::path& installed : {program.parent_path() / "share" / "armcal", InstalledHome()})
+    if (!installed.empty() && holds(installed)) return installed;
+  throw io::InputError(
+      "codegen/robots: not found from here; set ARMCAL_HOME to the armcal checkout or to PREFIX/share/armcal");
 }
 
 fs::path RobotPath(const std::string& name_or_path) {

@@ -25,15 +25,6 @@ bool IsSearched(const Term& t) {
          (how == codegen::SearchWay::kProfile || how == codegen::SearchWay::kSpectral);
 }
 
-bool IsAtEdge(const codegen::EffectUnknown& u, double value) {
-  if (u.logarithmic && u.lower > 0 && value > 0) {
-    const double room = kEdge * std::log(u.upper / u.lower);
-    return std::log(value / u.lower) < room || std::log(u.upper / value) < room;
-  }
-  const double room = kEdge * (u.upper - u.lower);
-  return value < u.lower + room || value > u.upper - room;
-}
-
 // Its coefficients mean nothing one by one: neighbours stand for each other.
 bool IsForm(const Term& t) {
   constexpr std::size_t kMany = 4;
@@ -55,11 +46,21 @@ double Significance(const VectorXd& a, const MatrixXd& C) {
 }
 
 std::string MarkedValue(const std::string& name, double value, double sd, const std::string& unit, Mark mark) {
-  return fmt::format("{} = {:.3g} +- {:.2g} {} {}", name, value, sd, unit,
+  const std::string with_sd = sd > 0 ? fmt::format("{:.3g} +- {:.2g}", value, sd) : fmt::format("{:.3g}", value);
+  return fmt::format("{} = {} {} {}", name, with_sd, unit,
                      mark == Mark::kOnBound ? "is on its bound" : "is not determined");
 }
 
 }  // namespace
+
+bool IsAtEdge(const codegen::EffectUnknown& u, double value) {
+  if (u.logarithmic && u.lower > 0 && value > 0) {
+    const double room = kEdge * std::log(u.upper / u.lower);
+    return std::log(value / u.lower) < room || std::log(u.upper / value) < room;
+  }
+  const double room = kEdge * (u.upper - u.lower);
+  return value < u.lower + room || value > u.upper - room;
+}
 
 Marks MarkParameters(const Term& t) {
   Marks out{std::vector<Mark>(t.eta.size(), Mark::kNone), std::vector<Mark>(t.columns.size(), Mark::kNone), true};

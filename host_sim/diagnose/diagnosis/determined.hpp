@@ -8,6 +8,10 @@
 
 namespace armcal::diagnosis {
 
+// A search that ends at a bound of an unknown stops this close to it. Such an unknown is held there, not estimated: its
+// deviation is zero, and the others' are those without it.
+bool IsAtEdge(const codegen::EffectUnknown& unknown, double value);
+
 enum class Mark {
   kNone,
   kUndetermined,  // smaller than its own standard deviation, or without effect

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 
 namespace armcal::diagnosis {
@@ -58,6 +59,15 @@ double Deviance(const Diagnosis::Work& w) {
   return sum;
 }
 
+// The term's unknowns that are estimated: a curve's are not, and those on a bound are held there.
+std::vector<std::size_t> Free(const Chosen& term) {
+  std::vector<std::size_t> out;
+  const auto& all = term.candidate->unknowns();
+  for (std::size_t k = 0; k < term.eta.size() && !term.candidate->is_curve(); ++k)
+    if (!IsAtEdge(all[k % all.size()], term.delay_s != 0 ? term.delay_s : term.eta[k])) out.push_back(k);
+  return out;
+}
+
 }  // namespace
 
 void Diagnosis::Work::Polish() {
@@ -110,7 +120,7 @@ std::vector<Diagnosis::Work::Deviation> Diagnosis::Work::Deviations(const std::v
   const Metric metric(rows, WhiteNoise());
   std::vector<std::pair<const Chosen*, std::size_t>> unknowns;
   for (const Chosen* t : terms)
-    for (std::size_t k = 0; k < t->eta.size() && !t->candidate->is_curve(); ++k) unknowns.emplace_back(t, k);
+    for (const std::size_t k : Free(*t)) unknowns.emplace_back(t, k);
   const Columns all = Slopes(unknowns, terms, *this);
   std::vector<const VectorXd*> time;
   for (const auto* log : train) time.push_back(&log->s.t);
@@ -126,12 +136,13 @@ std::vector<Diagnosis::Work::Deviation> Diagnosis::Work::Deviations(const std::v
   for (const Chosen* t : terms) {
     const int columns = t->candidate->columns(t->eta), count = static_cast<int>(t->eta.size());
     out.push_back({sd.segment(at, columns), VectorXd::Zero(count), MatrixXd::Zero(count + columns, count + columns)});
-    std::vector<Eigen::Index> from, to;  // a curve's unknowns are not free
-    for (int k = 0; k < count && !t->candidate->is_curve(); ++k)
-      from.push_back(coordinates + slope + k), to.push_back(k);
+    std::vector<Eigen::Index> from, to;
+    for (const std::size_t k : Free(*t)) {
+      out.back().eta[static_cast<Eigen::Index>(k)] = sd[coordinates + slope];
+      from.push_back(coordinates + slope++), to.push_back(static_cast<Eigen::Index>(k));
+    }
     for (int c = 0; c < columns; ++c) from.push_back(at + c), to.push_back(count + c);
     out.back().covariance(to, to) = all_covariance(from, from);
-    if (!t->candidate->is_curve()) out.back().eta = sd.segment(coordinates + slope, count), slope += count;
     at += columns;
   }
   return out;

@@ -1,8 +1,11 @@
 // diagnosis - adds terms one by one on the training logs, prunes them, and judges them on a held-out log.
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/diagnosis/limits.hpp"
@@ -53,6 +56,12 @@ std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chose
   return out;
 }
 
+std::string ChanceText(const Term& term) {
+  const auto power = [](double log_chance) { return -log_chance / std::numbers::ln10; };
+  return fmt::format("noise alone gains as much in one search of 10^{:.0f}, accepted from 10^{:.0f}",
+                     std::floor(power(term.log_chance)), power(kLogRare));
+}
+
 void WriteTerms(Diagnosis::Work& w, Finding& finding) {
   finding.terms.clear();
   const std::vector<Diagnosis::Work::Deviation> deviation = w.Deviations(Confirmed(w.chosen));
@@ -65,7 +74,7 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
     Repeat(c.candidate->unknowns(), c.eta.size(), t.unknowns);
     t.eta = c.eta;
     if (c.delay_s != 0) t.eta[static_cast<std::size_t>(c.candidate->delay())] += c.delay_s;
-    t.score = c.found.score;
+    t.score = c.found.score, t.log_chance = c.found.log_chance;
     t.folds = c.folds, t.also_fits = c.also_fits;
     t.rivals = c.rivals;
     t.training_only = c.candidate->is_event(), t.confirmed = t.in_fit = c.confirmed;

@@ -13,7 +13,8 @@
 
 namespace armcal::diagnosis {
 
-inline constexpr double kAccept = 15;  // score of a term: odds of about e^7 to one after all penalties
+// A term is accepted where noise alone gains as much in one search of 100 000. Above one in 100 it is not looked at.
+inline constexpr double kLogRare = -11.5, kLogLikely = -4.6;
 
 // Another candidate, as it was found beside a term.
 struct Rival {
@@ -42,6 +43,7 @@ struct Term {
   Eigen::VectorXd eta_sd;
   Eigen::MatrixXd covariance;  // of eta, then amplitude
   double score = 0;
+  double log_chance = 0;               // natural logarithm of the chance that noise alone gains as much, at most
   Eigen::VectorXd folds;               // improvement of chi^2 out of fold
   std::vector<std::string> also_fits;  // kinds that this log cannot tell from it
   std::vector<Rival> rivals;           // the runner-up, then those of also_fits that are not it
@@ -51,6 +53,9 @@ struct Term {
   std::string unconfirmed;             // else why it is not confirmed
   bool in_fit = true;                  // it is in the model that was compared; false: refuted, or not determined
 };
+
+// "noise alone gains as much in one search of 10^9, accepted from 10^5".
+std::string ChanceText(const Term& term);
 
 // How large a term would have had to be for the logs to show it.
 struct Limit {

@@ -112,15 +112,26 @@ MatrixXd Thinned::AverageRows(const MatrixXd& m, int j) const {
   return out;
 }
 
-BaseRows Thinned::Average(const BaseRows& from) const {
+BaseRows Thinned::Average(const BaseRows& from, const std::vector<NoiseModel>& noise,
+                          std::vector<NoiseModel>& averaged) const {
   BaseRows out;
   out.columns = from.columns, out.L = from.L, out.mean = from.mean;
   out.precision = from.precision;
   out.index = index;
+  averaged = noise;
   for (int j = 0; j < from.joints(); ++j) {
-    out.design.push_back(AverageRows(from.design[j], j));
-    out.target.push_back(AverageRows(from.target[j], j));
+    NoiseModel& own = averaged[static_cast<std::size_t>(j)];
+    const bool whitens = every > 1 && !IsWhite(own);  // averages do not follow each other
+    const auto average = [&](const MatrixXd& m) {
+      return AverageRows(
+          whitens ? MatrixXd(SlowNoise(own) * WhitenColumns(noise[static_cast<std::size_t>(j)], from.index[j], m)) : m,
+          j);
+    };
+    out.design.push_back(average(from.design[j]));
+    out.target.push_back(average(from.target[j]));
     out.Multiply(j);
+    if (whitens) own = NoiseModel{{}, SlowNoise(own), {}, {}};
+    own.innovation *= this->noise();
   }
   return out;
 }

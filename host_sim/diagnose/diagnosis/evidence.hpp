@@ -29,7 +29,8 @@ struct Thinned {
   // Keeps about `rows` samples a log.
   Thinned(const Evidence& evidence, int rows);
   Columns Gather(const Candidate& candidate, const std::vector<double>& eta) const;
-  BaseRows Average(const BaseRows& all) const;
+  // averaged: the noise of these rows. What is whitened here keeps the size of slow columns, which are not whitened.
+  BaseRows Average(const BaseRows& all, const std::vector<NoiseModel>& noise, std::vector<NoiseModel>& averaged) const;
   Eigen::MatrixXd AverageRows(const Eigen::MatrixXd& m, int j) const;
   // The noise of an averaged row, and the share of a gain that averaging leaves; both for white noise.
   double noise() const { return 1 / std::sqrt(2.0 * reach + 1); }

@@ -17,19 +17,20 @@ namespace {
 constexpr double kTried = 10;     // members of a usual grid
 constexpr double kUnseen = 1e-4;  // of a column's own square: so little beside the declared model is rounding
 
-// The score of a candidate that gains nothing: what a term must gain beyond kAccept.
-double Handicap(Candidate& c, const std::vector<double>& eta, const Evidence& evidence) {
+// What a term must gain to be accepted.
+double Needed(Candidate& c, const std::vector<double>& eta) {
   Found f;
   f.candidate = &c;
   f.tried = c.unknowns().empty() ? 1 : kTried;
-  f.penalty = PenaltyOf(c.columns(eta) + static_cast<int>(c.unknowns().size()), c, evidence);
-  return -Score(f, 0);
+  f.gain.rank = c.columns(eta);
+  f.searched = static_cast<int>(c.unknowns().size());
+  return GainOfChance(f, kLogRare);
 }
 
 }  // namespace
 
 std::vector<Limit> DetectionLimits(Diagnosis::Work& w) {
-  std::vector<const Chosen*> terms = Confirmed(w.chosen);
+  const std::vector<const Chosen*> terms = Confirmed(w.chosen);
   w.Solve(terms);
   w.FollowEstimate(w.all_reads);
   w.Prepare(terms);
@@ -51,7 +52,7 @@ std::vector<Limit> DetectionLimits(Diagnosis::Work& w) {
     const Columns columns = GatherColumns(*c, w.evidence, eta);
     Limit limit{&c->record(), c->joints(), c->rows()[0], std::numeric_limits<double>::infinity()};
     for (int k = 0; k < columns.count(); ++k) {
-      VectorXd a = VectorXd::Unit(columns.count(), k);
+      const VectorXd a = VectorXd::Unit(columns.count(), k);
       // The joint on which the column's torque is largest names the size.
       int largest = -1;
       double size = 0;
@@ -62,12 +63,10 @@ std::vector<Limit> DetectionLimits(Diagnosis::Work& w) {
       }
       if (largest < 0) continue;
       const double seen = metric.Imitates(columns, columns, a).second;
-      double own = 0;
-      const NoiseModel& level = noise[static_cast<std::size_t>(largest)];
-      own =
-          size * size * w.rows.index[static_cast<std::size_t>(largest)].size() / (level.innovation * level.innovation);
+      const auto at = static_cast<std::size_t>(largest);
+      const double own = w.rows.index[at].size() * std::pow(size / noise[at].innovation, 2);
       if (!(seen > kUnseen * own)) continue;
-      const double rms = size * std::sqrt((kAccept + Handicap(*c, eta, w.evidence)) / seen);
+      const double rms = size * std::sqrt(Needed(*c, eta) / seen);
       if (rms < limit.rms_Nm) limit.rms_Nm = rms, limit.joint = largest;
     }
     out.push_back(limit);

@@ -48,13 +48,6 @@ Gain SolveGain(const Eigen::LLT<MatrixXd>& base, const Projection& p) {
   return out;
 }
 
-MatrixXd WhitenAll(const NoiseModel& noise, const RowIndex& rows, const MatrixXd& m) {
-  if (IsWhite(noise)) return m * (1 / noise.innovation);
-  MatrixXd out(m.rows(), m.cols());
-  for (int c = 0; c < m.cols(); ++c) out.col(c) = Whiten(noise, rows, m.col(c));
-  return out;
-}
-
 }  // namespace
 
 void BaseRows::Multiply(int j, Eigen::Index from) {
@@ -80,7 +73,7 @@ void Metric::WhitenJoint(int j) {
     right_[j] = q_map_[j].transpose() * (scale * rows_.right[j]);
     return;
   }
-  coloured_[j] = WhitenAll(noise_[j], rows_.index[j], rows_.design[j]);
+  coloured_[j] = WhitenColumns(noise_[j], rows_.index[j], rows_.design[j]);
   q_map_[j] = map_[j];
   gram_[j] = map_[j].transpose() * SelfProduct(coloured_[j]) * map_[j];
   right_[j] = map_[j].transpose() * (coloured_[j].transpose() * y_[j]);
@@ -140,7 +133,7 @@ VectorXd Metric::ResidualWith(const Columns& c, int j) const {
 }
 
 MatrixXd Metric::WhitenedColumns(const Columns& c, int r) const {
-  return WhitenAll(noise_[c.joints[r]], rows_.index[c.joints[r]], c.block[r]);
+  return WhitenColumns(noise_[c.joints[r]], rows_.index[c.joints[r]], c.block[r]);
 }
 
 Projection Metric::Project(const Columns& c) const {
@@ -272,7 +265,7 @@ double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_n
       VectorXd e = rows_.target[j] - rows_.design[j] * (map_[j] * x.head(d));
       if (k > 0) e -= c.block[r] * x.tail(k);
       noise[r] = FitNoise(rows_.index[j], e);
-      deviance += 2 * WhitenedRows(noise[r], rows_.index[j]) * std::log(noise[r].innovation);
+      deviance += Deviance(noise[r], rows_.index[j]);
     }
     return deviance;
   };
@@ -290,8 +283,8 @@ double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_n
     const std::size_t r = static_cast<std::size_t>(at - c.joints.begin());
     const int own = static_cast<int>(q(j).cols());
     MatrixXd w(rows_.design[j].rows(), own + k);
-    w.leftCols(own) = WhitenAll(noise[r], rows_.index[j], rows_.design[j]);
-    w.rightCols(k) = WhitenAll(noise[r], rows_.index[j], c.block[r]);
+    w.leftCols(own) = WhitenColumns(noise[r], rows_.index[j], rows_.design[j]);
+    w.rightCols(k) = WhitenColumns(noise[r], rows_.index[j], c.block[r]);
     MatrixXd map = MatrixXd::Zero(own + k, d + k);
     map.topLeftCorner(own, d) = map_[j];
     map.bottomRightCorner(k, k).setIdentity();

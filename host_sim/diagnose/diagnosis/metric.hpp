@@ -74,7 +74,8 @@ class Metric {
   double CurveEvidence(const Projection& p, Eigen::MatrixXd* precision = nullptr) const;
   // No bounded parameter of the joints given leaves its range at g (by more than 2 standard deviations).
   bool InBounds(const Gain& g, const std::vector<int>& joints) const;
-  Eigen::VectorXd RawResidual(int j) const;                     // torque units
+  const Eigen::VectorXd& Residual(int j) const { return residual_[static_cast<std::size_t>(j)]; }  // whitened
+  Eigen::VectorXd RawResidual(int j) const;                                                        // torque units
   Eigen::VectorXd ResidualWith(const Columns& c, int j) const;  // torque units, C fitted too
   const std::vector<NoiseModel>& noise() const { return noise_; }
   const Eigen::VectorXd& z() const { return z_; }

@@ -45,7 +45,7 @@ std::string Parameter(const std::string& name, double value, double sd, const st
 std::string Comments(const Term& t, const std::string& provenance) {
   std::string text = fmt::format("\n# Found by armcal diagnose: {}\n# Record: codegen/effects/{}.toml. {}\n",
                                  t.record->title, t.record->name, provenance);
-  text += fmt::format("# Score {:.0f}, accepted above {:g}.\n", t.score, kAccept);
+  text += fmt::format("# Score {:.0f}. {}.\n", t.score, ChanceText(t));
   for (std::size_t k = 0; k < t.eta.size(); ++k)
     text += Parameter(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Eigen::Index>(k)], t.unknowns[k].unit);
   for (std::size_t c = 0; c < t.columns.size(); ++c)

@@ -12,6 +12,9 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr int kPairsOfALag = 20;    // for each coefficient before it
+constexpr double kSurest = 0.9995;  // of a reflection: nothing is foreseen entirely
+
 // position of each row in its segment
 std::vector<int> PlaceInSegment(const RowIndex& rows) {
   std::vector<int> place(rows.size());
@@ -19,20 +22,26 @@ std::vector<int> PlaceInSegment(const RowIndex& rows) {
   return place;
 }
 
-// A stretch without gaps; leaves out[0 .. kArOrder) as it is.
+// A stretch without gaps.
 ARMCAL_VECTOR_UNITS("avx2")
 void WhitenStretch(const NoiseModel& noise, const double* v, int count, double* out) {
   const double* const a = noise.a.data();
-  int k = kArOrder;
+  const int order = noise.order(), first = std::min(order, count);
+  for (int k = 0; k < first; ++k) {
+    const auto p = static_cast<std::size_t>(k);
+    double sum = v[k];
+    for (int i = 0; i < k; ++i) sum -= noise.start[p][i] * v[k - 1 - i];
+    out[k] = sum / (noise.innovation * noise.start_sd[p]);
+  }
+  int k = first;
   for (; k + codegen::kLanes <= count; k += codegen::kLanes) {
     codegen::Lanes sum = codegen::LanesAt(v + k);
-#pragma GCC unroll 8
-    for (int i = 0; i < kArOrder; ++i) sum -= a[i] * codegen::LanesAt(v + k - 1 - i);
+    for (int i = 0; i < order; ++i) sum -= a[i] * codegen::LanesAt(v + k - 1 - i);
     *reinterpret_cast<codegen::Lanes*>(out + k) = sum / noise.innovation;
   }
   for (; k < count; ++k) {
     double sum = v[k];
-    for (int i = 0; i < kArOrder; ++i) sum -= a[i] * v[k - 1 - i];
+    for (int i = 0; i < order; ++i) sum -= a[i] * v[k - 1 - i];
     out[k] = sum / noise.innovation;
   }
 }
@@ -58,42 +67,64 @@ void RowIndex::Take(int log, const Eigen::Ref<const VectorXd>& column, Eigen::Re
   if (weight.size()) rows.segment(first, last - first).array() *= weight.segment(first, last - first).array();
 }
 
-bool IsWhite(const NoiseModel& noise) { return noise.a.squaredNorm() == 0; }
+bool IsWhite(const NoiseModel& noise) { return noise.order() == 0; }
+
+double SlowNoise(const NoiseModel& noise) { return noise.innovation / (1 - noise.a.sum()); }
 
 NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
   NoiseModel noise;
   const std::vector<int> place = PlaceInSegment(rows);
-  VectorXd r = VectorXd::Zero(kArOrder + 1);
-  Eigen::VectorXi count = Eigen::VectorXi::Zero(kArOrder + 1);
+  VectorXd r = VectorXd::Zero(kMostOrder + 1);
+  Eigen::VectorXi count = Eigen::VectorXi::Zero(kMostOrder + 1);
   for (int k = 0; k < rows.size(); ++k)
-    for (int lag = 0; lag <= std::min(kArOrder, place[k]); ++lag) r[lag] += e[k] * e[k - lag], ++count[lag];
+    for (int lag = 0; lag <= std::min(kMostOrder, place[k]); ++lag) r[lag] += e[k] * e[k - lag], ++count[lag];
   if (count[0] == 0) return noise;
-  const double variance = r[0] / count[0];
-  noise.innovation = std::sqrt(std::max(variance, 1e-24));
-  if (count[kArOrder] < 20 * kArOrder) return noise;  // too few pairs to learn a colour from
-  for (int lag = 0; lag <= kArOrder; ++lag) r[lag] = r[lag] / count[lag];
-  VectorXd a = VectorXd::Zero(kArOrder);  // Levinson-Durbin: stays stable where a plain solve may not
-  double power = r[0];
-  for (int m = 0; m < kArOrder; ++m) {
+  noise.innovation = std::sqrt(std::max(r[0] / count[0], 1e-24));
+  int most = 0;  // too few pairs tell nothing of a lag
+  while (most < kMostOrder && count[most + 1] >= kPairsOfALag * (most + 1)) ++most;
+  r.head(most + 1).array() /= count.head(most + 1).cast<double>().array();
+  // Levinson and Durbin: stays stable where a plain solve may not.
+  std::vector<VectorXd> predictor{VectorXd()};
+  std::vector<double> power{r[0]};
+  const double rows_of_all = rows.size();
+  double least = rows_of_all * std::log(std::max(r[0], 1e-48));
+  int order = 0;
+  for (int m = 0; m < most && power[m] > 1e-48; ++m) {
+    const VectorXd& before = predictor[static_cast<std::size_t>(m)];
     double reflection = r[m + 1];
-    for (int i = 0; i < m; ++i) reflection -= a[i] * r[m - i];
-    reflection = std::clamp(reflection / power, -0.98, 0.98);
-    const VectorXd before = a;
-    a[m] = reflection;
-    for (int i = 0; i < m; ++i) a[i] = before[i] - reflection * before[m - 1 - i];
-    power *= 1 - reflection * reflection;
+    for (int i = 0; i < m; ++i) reflection -= before[i] * r[m - i];
+    reflection = std::clamp(reflection / power[m], -kSurest, kSurest);
+    VectorXd next(m + 1);
+    for (int i = 0; i < m; ++i) next[i] = before[i] - reflection * before[m - 1 - i];
+    next[m] = reflection;
+    power.push_back(power[m] * (1 - reflection * reflection));
+    predictor.push_back(std::move(next));
+    const double deviance = rows_of_all * std::log(power[m + 1]) + (m + 1) * std::log(rows_of_all);
+    if (deviance < least) least = deviance, order = m + 1;
   }
-  noise.a = a;
+  if (order == 0) return noise;
+  noise.a = predictor[static_cast<std::size_t>(order)];
+  for (int p = 0; p < order; ++p) noise.start_sd.push_back(std::sqrt(power[p] / power[order]));
+  predictor.resize(static_cast<std::size_t>(order));
+  noise.start = std::move(predictor);
   // What the coefficients really leave. The recursion's own figure is too small where a slow residual is broken into
   // segments: an effect still inside would then look like less noise than there is.
   noise.innovation = 1;
-  noise.innovation = std::sqrt(std::max(Whiten(noise, rows, e).squaredNorm() / WhitenedRows(noise, rows), 1e-24));
+  noise.innovation = std::sqrt(std::max(Whiten(noise, rows, e).squaredNorm() / rows.size(), 1e-24));
   return noise;
+}
+
+double Deviance(const NoiseModel& noise, const RowIndex& rows) {
+  double sum = 2 * rows.size() * std::log(noise.innovation) + noise.order() * std::log(std::max(2, rows.size()));
+  if (IsWhite(noise)) return sum;
+  for (const int place : PlaceInSegment(rows))
+    if (place < noise.order()) sum += 2 * std::log(noise.start_sd[static_cast<std::size_t>(place)]);
+  return sum;
 }
 
 VectorXd Whiten(const NoiseModel& noise, const RowIndex& rows, const Eigen::Ref<const VectorXd>& v) {
   if (IsWhite(noise)) return v / noise.innovation;
-  VectorXd out = VectorXd::Zero(v.size());
+  VectorXd out(v.size());
   for (int begin = 0, end = 0; begin < rows.size(); begin = end) {
     end = begin + 1;
     while (end < rows.size() && !rows.segment_begin[end]) ++end;
@@ -102,11 +133,11 @@ VectorXd Whiten(const NoiseModel& noise, const RowIndex& rows, const Eigen::Ref<
   return out;
 }
 
-int WhitenedRows(const NoiseModel& noise, const RowIndex& rows) {
-  if (IsWhite(noise)) return rows.size();
-  int count = 0;
-  for (const int place : PlaceInSegment(rows)) count += place >= kArOrder;
-  return count;
+Eigen::MatrixXd WhitenColumns(const NoiseModel& noise, const RowIndex& rows, const Eigen::MatrixXd& m) {
+  if (IsWhite(noise)) return m * (1 / noise.innovation);
+  Eigen::MatrixXd out(m.rows(), m.cols());
+  for (int c = 0; c < m.cols(); ++c) out.col(c) = Whiten(noise, rows, m.col(c));
+  return out;
 }
 
 }  // namespace armcal::diagnosis

@@ -24,23 +24,34 @@ struct RowIndex {
   void Take(int log, const Eigen::Ref<const Eigen::VectorXd>& column, Eigen::Ref<Eigen::VectorXd> rows) const;
 };
 
-inline constexpr int kArOrder = 8;  // design study: eight terms cover gear and current-loop colour at 100-1000 Hz
+inline constexpr int kMostOrder = 24;  // at 1 kHz noise that is slow beside a white part needs about twenty
 
+// A row is predicted from the rows before it in its segment. The first rows have fewer of them, and a predictor of
+// their own each: no row is lost.
 struct NoiseModel {
-  Eigen::VectorXd a = Eigen::VectorXd::Zero(kArOrder);  // e_k = sum a_i e_{k-i} + innovation
-  double innovation = 1;                                // its standard deviation
+  Eigen::VectorXd a;                   // e_k = sum a_i e_{k-i} + innovation; empty: white
+  double innovation = 1;               // its standard deviation
+  std::vector<Eigen::VectorXd> start;  // [order] the predictor of row p of a segment, p coefficients
+  std::vector<double> start_sd;        // [order] what it leaves, over `innovation`
+  int order() const { return static_cast<int>(a.size()); }
 };
 
 bool IsWhite(const NoiseModel& noise);
 
-// Yule-Walker over segments; white if the rows are too few or too broken up.
+// The deviation of white noise that would be as large as this one for what is slow.
+double SlowNoise(const NoiseModel& noise);
+
+// Yule-Walker over segments; the order is that of the least deviance with its penalty, zero where the rows are too few
+// or too broken up.
 NoiseModel FitNoise(const RowIndex& rows, const Eigen::VectorXd& residual);
 
-// out_k = (v_k - sum a_i v_{k-i}) / innovation; zero for the first kArOrder rows of a segment unless the model is
-// white.
+// -2 log likelihood of the residual that the model was fitted to, up to a constant, and log(rows) for each coefficient.
+double Deviance(const NoiseModel& noise, const RowIndex& rows);
+
+// What is left of each row by its predictor, over the standard deviation of that.
 Eigen::VectorXd Whiten(const NoiseModel& noise, const RowIndex& rows, const Eigen::Ref<const Eigen::VectorXd>& v);
 
-// How many rows Whiten keeps.
-int WhitenedRows(const NoiseModel& noise, const RowIndex& rows);
+// The same of each column.
+Eigen::MatrixXd WhitenColumns(const NoiseModel& noise, const RowIndex& rows, const Eigen::MatrixXd& m);
 
 }  // namespace armcal::diagnosis

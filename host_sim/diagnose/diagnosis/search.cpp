@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "host_sim/diagnose/diagnosis/diagnose.hpp"
 #include "host_sim/diagnose/diagnosis/searcher.hpp"
 
 namespace armcal::diagnosis {
@@ -53,6 +55,7 @@ Found Searcher::Scored() const {
   if (f.gain.gain > 0 && c_.is_curve() && c_.record().search.how == codegen::SearchWay::kSpline)
     f.penalty = f.gain.gain - metric().CurveEvidence(seen_, &f.precision);
   f.score = Score(f, f.gain.gain);
+  f.log_chance = LogChance(f, f.gain.gain);
   return f;
 }
 
@@ -83,8 +86,9 @@ bool Searcher::AmplitudesInBounds(const Gain& gain) const {
 
 double Searcher::Needed(int rank) const {
   Found f = best_;
+  f.gain.rank = rank;
   f.penalty = PenaltyOf(rank + best_.searched, c_, e_);
-  return -Score(f, 0);
+  return GainOfChance(f, kLogLikely);
 }
 
 void Searcher::HoldAmplitude(Gain& g) const {
@@ -198,6 +202,35 @@ double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evi
 
 double Score(const Found& found, double gain) {
   return gain - found.penalty - 2 * std::log(found.tried) - found.candidate->record().generic_penalty;
+}
+
+double LogUpperTail(int degrees, double x) {
+  const double half = 0.5 * x;
+  if (half <= 0) return 0;
+  const bool odd = degrees % 2 != 0;
+  double sum = 0;  // of the tail, times exp(half); far out erfc has no digits left
+  if (odd) sum = half < 300 ? std::exp(half) * std::erfc(std::sqrt(half)) : 1 / std::sqrt(std::numbers::pi * half);
+  for (int d = odd ? 3 : 2; d <= degrees; d += 2)
+    sum += std::exp((0.5 * d - 1) * std::log(half) - std::lgamma(0.5 * d));
+  return std::min(0.0, std::log(sum) - half);
+}
+
+double LogChance(const Found& found, double gain) {
+  const double own = found.candidate->record().generic_penalty;
+  if (found.candidate->is_curve()) return -0.5 * (Score(found, gain) + own);
+  // What was searched moves with the noise as an amplitude does.
+  const int degrees = std::max(1, found.gain.rank + found.searched);
+  return std::log(found.tried) + LogUpperTail(degrees, gain - own);
+}
+
+double GainOfChance(const Found& found, double log_chance) {
+  double low = 0, high = 1;
+  while (LogChance(found, high) > log_chance) low = high, high *= 2;
+  for (int k = 0; k < 40; ++k) {
+    const double middle = 0.5 * (low + high);
+    (LogChance(found, middle) > log_chance ? low : high) = middle;
+  }
+  return high;
 }
 
 Found SearchCandidate(Candidate& candidate, const Ground& ground, const Found* simpler) {

@@ -27,10 +27,18 @@ struct Found {
   Eigen::MatrixXd precision;  // of a curve's coefficients; empty for others
   double penalty = 0;         // what so many parameters gain by chance, and more
   double score = 0;
+  double log_chance = 0;  // of the gain that the score stands for
 };
 
 // gain - penalty - 2 ln(tried) - the record's own penalty.
 double Score(const Found& found, double gain);
+// Natural logarithm of the chance that noise alone gains so much, at most, wherever a search of this kind looks. Of a
+// curve it is the odds against it: its coefficients are averaged over, not fitted.
+double LogChance(const Found& found, double gain);
+// The gain that has such a chance.
+double GainOfChance(const Found& found, double log_chance);
+// ln P(chi^2 > x) for so many degrees of freedom.
+double LogUpperTail(int degrees, double x);
 // parameters ln(rows), as the Bayesian information criterion has it.
 double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evidence);
 

@@ -48,7 +48,7 @@ void Searcher::Spectral() {
   const auto& k = c_.unknowns()[0];
   const Columns at_zero = GatherColumns(c_, e_, {1e-9});
   const int row = at_zero.joints[0];
-  const VectorXd residual = g_.metric.RawResidual(row), weight = at_zero.block[0].col(0);
+  const VectorXd &residual = g_.metric.Residual(row), weight = at_zero.block[0].col(0);
   int size = 256;
   while (size < 8 * k.upper * range / (2 * std::numbers::pi)) size *= 2;  // four cells a period at the upper end
   constexpr int kPadding = 4;
@@ -72,7 +72,7 @@ void Searcher::Spectral() {
   std::sort(peaks.rbegin(), peaks.rend());
   if (peaks.size() > static_cast<std::size_t>(c_.record().search.grid)) peaks.resize(c_.record().search.grid);
   // What a peak gains if the base takes nothing of it; it never takes much of two periods and more.
-  const double noise = g_.metric.noise()[row].innovation, unit = 0.5 * weight.squaredNorm() * noise * noise;
+  const double unit = 0.5 * weight.squaredNorm();
   double centre = 0, most = 0;
   for (const auto& [power, b] : peaks) {
     if (power < kWorthATry * Needed(2) * unit) break;
@@ -104,7 +104,7 @@ void Searcher::Spline() {
   // What the splines sum up to is what multiplies them.
   const Columns at_all = Gather(over_all);
   const int row = at_all.joints[0];
-  const VectorXd weight = at_all.block[0].rowwise().sum(), residual = metric().RawResidual(row);
+  const VectorXd weight = at_all.block[0].rowwise().sum(), &residual = metric().Residual(row);
   VectorXd product = VectorXd::Zero(kCells), square = product;
   for (int i = 0; i < weight.size(); ++i) {
     const double at = signal[g_.thinned.kept[row][i]];

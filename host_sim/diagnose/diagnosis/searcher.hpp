@@ -31,7 +31,7 @@ class Searcher {
   bool AmplitudesInBounds(const Gain& gain) const;
 
   Found Scored() const;
-  // The gain at which the score is zero.
+  // The gain of so many amplitudes that chance gives no more often than this.
   double Needed(int rank) const;
   // A refinement may still reach that gain.
   bool Promising() const { return best_.gain.gain > (best_.rough ? 0.3 : 0.5) * Needed(best_.gain.rank); }

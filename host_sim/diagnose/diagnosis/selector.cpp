@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 
+#include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/identify/methods/exogeneity.hpp"
 
 namespace armcal::diagnosis {
@@ -29,7 +30,7 @@ constexpr double kNear = 0.05;             // of a score: the logs do not tell w
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr double kAsLarge = 0.5;           // of what it would gain there if it was as large as it seemed
 constexpr int kSharpenings = 3;
-constexpr double kNothing = 10;         // a gain that no score above zero can come from
+constexpr double kNothing = 6;          // a gain that chance often has
 constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms differ a little from any record
 constexpr int kFewTurns = 100;          // rows
 constexpr double kTurnShare = 0.03;     // of a joint's rows
@@ -45,9 +46,12 @@ bool SharesJoint(const Candidate& a, const Candidate& b) {
 // What the candidates of one pass are tried on: the base with the terms so far, whole and thinned.
 class Grounds {
  public:
-  // Fits the base with the given terms and takes its residuals' spread as white noise. only: the one candidate that is
-  // tried on it; null: any.
-  Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms, const Candidate* only = nullptr);
+  // Fits the base with the given terms and takes its residuals' spread as white noise. coloured: takes the noise of a
+  // joint as autoregressive where slow effects show better so. only: the one candidate that is tried on it; null: any.
+  Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms, bool coloured = false,
+          const Candidate* only = nullptr);
+
+  bool coloured() const { return coloured_; }  // the noise of at least one joint is
 
   Ground ground() const { return {work_.evidence, *thinned_, *metric_, *thin_metric_}; }
   const Metric& metric() const { return *metric_; }
@@ -58,27 +62,48 @@ class Grounds {
 
  private:
   void MakeMetrics(const std::vector<NoiseModel>& noise);
+  // The noise of a joint's residual, as this pass takes it.
+  NoiseModel NoiseOf(int j, const VectorXd& e, bool coloured) const;
 
   Diagnosis::Work& work_;
+  bool coloured_ = false;
   std::unique_ptr<Thinned> thinned_;
   BaseRows thin_rows_;
   std::unique_ptr<Metric> metric_, thin_metric_;
   mutable std::map<std::vector<int>, double> without_;
 };
 
-Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms, const Candidate* only) : work_(work) {
+Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms, bool coloured, const Candidate* only)
+    : work_(work) {
   work_.Solve(terms);
   work_.FollowEstimate(only ? work_.Reads(terms, only) : work_.all_reads);
   work_.Prepare(terms);
+  std::vector<NoiseModel> noise = work_.WhiteNoise();
+  if (coloured) {
+    const Metric white(work_.rows, noise);
+    for (int j = 0; j < work_.rows.joints(); ++j) {
+      noise[j] = NoiseOf(j, white.RawResidual(j), true);
+      coloured_ |= !IsWhite(noise[j]);
+    }
+    if (!coloured_) return;
+  }
   thinned_ = std::make_unique<Thinned>(work_.evidence, kThinnedRows);
-  thin_rows_ = thinned_->Average(work_.rows);
-  MakeMetrics(work_.WhiteNoise());
+  MakeMetrics(noise);
+}
+
+NoiseModel Grounds::NoiseOf(int j, const VectorXd& e, bool coloured) const {
+  NoiseModel white;
+  white.innovation =
+      e.size() ? std::max(1e-12, std::sqrt(e.squaredNorm() / static_cast<double>(e.size()))) : work_.estimate.sigma[j];
+  if (!coloured) return white;
+  const NoiseModel own = FitNoise(work_.rows.index[j], e);
+  return SlowNoise(own) < kClearly * white.innovation ? own : white;
 }
 
 void Grounds::MakeMetrics(const std::vector<NoiseModel>& noise) {
   metric_ = std::make_unique<Metric>(work_.rows, noise);
-  std::vector<NoiseModel> averaged = noise;
-  for (NoiseModel& joint : averaged) joint.innovation *= thinned_->noise();
+  std::vector<NoiseModel> averaged;
+  thin_rows_ = thinned_->Average(work_.rows, noise, averaged);
   thin_metric_ = std::make_unique<Metric>(thin_rows_, averaged);
   without_.clear();
 }
@@ -98,9 +123,9 @@ bool Grounds::Sharpen(const Columns& with) {
   for (int j = 0; j < work_.rows.joints(); ++j) {
     const Eigen::VectorXd e = metric_->ResidualWith(with, j);
     if (e.size() == 0) continue;
-    const double spread = std::sqrt(e.squaredNorm() / static_cast<double>(e.size()));
-    if (spread > kClearly * noise[j].innovation) continue;
-    noise[j].innovation = std::max(spread, 1e-12);
+    const NoiseModel left = NoiseOf(j, e, !IsWhite(noise[j]));
+    if (left.innovation > kClearly * noise[j].innovation) continue;
+    noise[j] = left;
     clearly = true;
   }
   if (clearly) MakeMetrics(noise);
@@ -114,7 +139,11 @@ bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
     if (!c->record().search.at_turns && !AlreadyIn(*c, terms) && !IsOutOfReach(*c, terms) && IsExcited(*c, w_.evidence))
       (c->is_event() ? events : causes).push_back(c.get());
   bursts_.clear();
+  for (const Candidate* c : causes) gain_.erase(c);
   if (Best(causes, terms, grounds, out)) return true;
+  // Noise that rings hides what is slow, until it is whitened. At first it is not: what is missing would count as
+  // noise.
+  if (Grounds whitened(w_, terms, true); whitened.coloured() && Best(causes, terms, whitened, out)) return true;
   // Whatever comes and goes with the motion looks like an event, so events are tried last. A cause that showed in one
   // fold only is tried among them.
   events.insert(events.end(), bursts_.begin(), bursts_.end());
@@ -172,18 +201,18 @@ bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chose
   refused_.clear();
   Sort(ranked);
   for (std::size_t k = 0; k < ranked.size(); ++k)
-    if (ranked[k].score > kAccept && Accept(grounds, terms, ranked, k, out)) return true;
+    if (ranked[k].log_chance < kLogRare && Accept(grounds, terms, ranked, k, out)) return true;
   return false;
 }
 
 bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
-  const Grounds grounds(w_, others, term.candidate);
+  const Grounds grounds(w_, others, term.coloured, term.candidate);
   Found f = Finish(SearchCandidate(*term.candidate, grounds.ground()), grounds.ground());
   if (f.gain.gain <= 0) return false;
   Rescore(grounds, f);
   term.eta = f.eta;
   term.found = f;
-  return f.score > kAccept;
+  return f.log_chance < kLogRare;
 }
 
 std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds) {
@@ -194,8 +223,8 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
     const auto before = something.find({simpler, c->joints()});
     if (!simpler.empty() && before == something.end()) continue;
     const Found f = SearchCandidate(*c, grounds.ground(), simpler.empty() ? nullptr : &before->second);
-    gain_[c] = f.gain.gain;
-    if (f.score <= 0) continue;
+    gain_[c] = std::max(gain_[c], f.gain.gain);
+    if (f.log_chance > kLogLikely) continue;
     ranked.push_back(f);
     something.insert({{c->record().name, c->joints()}, f});
   }
@@ -215,7 +244,9 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
 void Selector::Rescore(const Grounds& grounds, Found& f) const {
   const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
   const double with = grounds.metric().RefittedDeviance(c);
-  f.score = Score(f, grounds.DevianceWithout(c.joints) - with);
+  const double gain = grounds.DevianceWithout(c.joints) - with;
+  f.score = Score(f, gain);
+  f.log_chance = LogChance(f, gain);
 }
 
 // The latest term touches none of its joints, and there was nothing on them before.
@@ -235,7 +266,7 @@ void Selector::Sort(std::vector<Found>& ranked) {
   if (ranked.empty() || !ranked[0].candidate->is_curve()) return;
   const Found& curve = ranked[0];
   const auto cause = std::find_if(ranked.begin(), ranked.end(), [&](const Found& f) {
-    return !f.candidate->is_curve() && f.candidate->rows() == curve.candidate->rows() && f.score > kAccept &&
+    return !f.candidate->is_curve() && f.candidate->rows() == curve.candidate->rows() && f.log_chance < kLogRare &&
            f.gain.gain > kCauseExplains * curve.gain.gain;
   });
   if (cause == ranked.end()) return;
@@ -268,7 +299,7 @@ bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Cho
   const Columns c = GatherColumns(*f.candidate, narrow.evidence, f.eta);
   const double left = metric.Try(c).gain;
   if (left > kStays * gain.gain) return true;
-  return Score(f, left) > kAccept && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second &&
+  return LogChance(f, left) < kLogRare && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second &&
          MotionIsClean(f.candidate->rows());
 }
 
@@ -307,11 +338,15 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     refused_[f.candidate] = "it does not keep its gain where speed and acceleration are derived with a lower bandwidth";
     return false;
   }
+  bool on_bound = false;
+  for (std::size_t u = 0; u < f.eta.size() && !f.candidate->is_curve() && !f.candidate->is_event(); ++u)
+    on_bound |= IsAtEdge(f.candidate->unknowns()[u % f.candidate->unknowns().size()], f.eta[u]);
   out = Chosen{};
   out.candidate = f.candidate;
   out.eta = f.eta;
   out.found = f;
   out.folds = folds;
+  out.coloured = grounds.coloured();
   for (std::size_t other = 0; other < ranked.size(); ++other) {
     if (other == k) continue;
     const Candidate& o = *ranked[other].candidate;
@@ -327,6 +362,11 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     const auto [taken, own] = metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].eta), c, gain.amplitude);
     const double left = own - taken;
     const bool same = left < kIndistinguishable && left < kImitated * own;
+    // At its bound a term becomes another one: a limit below all torques is a wrong gain.
+    if (same && on_bound && o.unknowns().empty() && !o.is_curve() && ranked[other].log_chance < kLogRare) {
+      refused_[f.candidate] = fmt::format("ends on a bound, and there {} is the same", kind);
+      return false;
+    }
     const bool near = std::abs(ranked[other].score - f.score) < kNear * f.score;
     if ((!same && !near) || out.also_fits.size() >= kOtherNames) continue;
     out.also_fits.push_back(kind);

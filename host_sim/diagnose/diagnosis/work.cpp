@@ -271,12 +271,10 @@ void Diagnosis::Work::StartRows() {
   bent.assign(n, 1);
   const VectorXd x = estimate.x.head(columns);
   regressor.resize(train.size());
-  for (std::size_t log = 0; log < train.size(); ++log)
+  for (std::size_t log = 0; log < train.size(); ++log) {
     model.Regressor(train[log]->s, {x.data(), static_cast<std::size_t>(columns)}, declared.eta, regressor[log]);
-  for (std::size_t log = 0; log < train.size() && !train[log]->channel.empty(); ++log)
-    for (int j = 0; j < n; ++j)
-      for (auto column : regressor[log][static_cast<std::size_t>(j)].colwise())
-        column = calibration::ThroughChannel(*train[log], j, column);
+    calibration::PassThroughChannel(*train[log], regressor[log]);
+  }
   for (int j = 0; j < n; ++j)
     for (int a = 0; a < active; ++a) {
       const int c = declared.active[a];

@@ -25,7 +25,8 @@ struct Chosen {
   Eigen::VectorXd folds;
   std::vector<std::string> also_fits;
   std::vector<Rival> rivals;
-  bool earns = true;  // its place beside the others, as last seen
+  bool coloured = false;  // it was found in rows whose noise had been whitened
+  bool earns = true;      // its place beside the others, as last seen
   bool confirmed = true;
   std::string unconfirmed;  // why it is not, where no held-out log refuted it
   double delay_s = 0;       // of a term that delays the measurement: as it has been applied to the logs

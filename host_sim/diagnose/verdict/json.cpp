@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
@@ -133,6 +134,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
           {"over", d.signal}, {"torque", d.torque}, {"x", d.term.x}, {"without", d.without.y}, {"term", d.term.y}};
     }
     term["score"] = t.score;
+    term["log10_chance"] = t.log_chance / std::numbers::ln10;
     term["folds"] = ToList(t.folds);
     term["runner_up"] = t.rivals.empty() ? "" : RivalName(t.rivals[0]);
     if (!t.rivals.empty()) term["runner_up_refused"] = t.rivals[0].refused;

@@ -77,9 +77,7 @@ std::string Parameters(const Term& t) {
   return fmt::format("{}", fmt::join(out, ", "));
 }
 
-std::string ScoreText(const Term& t) {
-  return fmt::format("{:.0f} (accepted above {:g})", t.score, diagnosis::kAccept);
-}
+std::string ScoreText(const Term& t) { return fmt::format("{:.0f} ({})", t.score, diagnosis::ChanceText(t)); }
 
 std::string FoldText(const Term& t) {
   if (t.training_only) return "not asked blocks that it was not fitted to: an event of one part is in no other";

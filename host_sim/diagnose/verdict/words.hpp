@@ -33,7 +33,8 @@ std::string Remark(const diagnosis::Term& t);
 // "vs2 = 0.08 +- 0.002 rad/s, ..."; a curve's first coefficients only.
 std::string Parameters(const diagnosis::Term& t);
 
-// "512 (accepted above 15)", "improves 5 of 5 blocks ...", "presliding_dahl, joint 2 (score 480)".
+// "512 (noise alone gains as much in one search of 10^99, accepted from 10^5)", "improves 5 of 5 blocks ...",
+// "presliding_dahl, joint 2 (score 480)".
 std::string ScoreText(const diagnosis::Term& t);
 std::string FoldText(const diagnosis::Term& t);
 std::string RivalName(const diagnosis::Rival& rival);

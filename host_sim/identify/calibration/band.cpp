@@ -72,8 +72,6 @@ VectorXd Power(const VectorXd& y) {
   return segments < kFewSegments ? VectorXd() : out;
 }
 
-double Rate_Hz(const VectorXd& t) { return static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]); }
-
 }  // namespace
 
 double FilteredAbove_Hz(const Dataset& data, int joint, const VectorXd& predicted) {
@@ -89,21 +87,21 @@ double FilteredAbove_Hz(const Dataset& data, int joint, const VectorXd& predicte
     if (highest > kFilteredAway * ratio(k)) continue;
     Index edge = k;
     while (ratio(edge) > kHalfway * ratio(k)) ++edge;
-    return static_cast<double>(edge) * Rate_Hz(data.s.t) / (2 * kBins);
+    return static_cast<double>(edge) * data.rate_Hz() / (2 * kBins);
   }
   return INFINITY;
 }
 
 Eigen::MatrixXd AsSaved(const Dataset& data, Eigen::MatrixXd torque) {
   for (Index j = 0; j < data.saved_Hz.size(); ++j)
-    if (const double rate_Hz = Rate_Hz(data.s.t); data.saved_Hz[j] < 0.5 * rate_Hz)
+    if (const double rate_Hz = data.rate_Hz(); data.saved_Hz[j] < 0.5 * rate_Hz)
       torque.col(j) = logs::ZeroPhaseLowPass(torque.col(j), data.saved_Hz[j], rate_Hz);
   return torque;
 }
 
 std::vector<TransferBand> Transfer(const Dataset& data, int joint, const VectorXd& predicted) {
   const VectorXd& t = data.s.t;
-  const double rate_Hz = Rate_Hz(t);
+  const double rate_Hz = data.rate_Hz();
   const Index size = static_cast<Index>(kSegment_s * rate_Hz) / 2 * 2;
   std::vector<TransferBand> out;
   if (size < 16 || t.size() < size) return out;
@@ -173,7 +171,7 @@ double AgreedBand_Hz(const std::vector<TransferBand>& transfer) {
 Eigen::SparseMatrix<double, Eigen::RowMajor> AverageRows(const Dataset& data, int joint) {
   const VectorXd& t = data.s.t;
   const Index samples = t.size();
-  const double band_Hz = data.band_Hz[joint], step_s = (t[samples - 1] - t[0]) / static_cast<double>(samples - 1);
+  const double band_Hz = data.band_Hz[joint], step_s = 1 / data.rate_Hz();
   const double width_s = std::sqrt(std::log(2.0)) / (2 * std::numbers::pi * band_Hz), apart_s = 0.5 / band_Hz;
   const double whole = width_s * std::sqrt(2 * std::numbers::pi) / step_s;  // weight of a window without gaps
   std::vector<Eigen::Triplet<double>> entries;

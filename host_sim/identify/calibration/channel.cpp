@@ -90,8 +90,7 @@ bool Clearly(double with, double without, Index rows) {
   return with<(1 - kTakesAway) * without&& static_cast<double>(rows) * std::log(without / with)> kSureOfLag;
 }
 
-// A column of a little lag on the prediction takes away a clear share of the error, or of a little lead: a delay that
-// is longer than the lag of a first fit.
+// A column of a little lag on the prediction takes away a clear share of the error.
 bool LooksLate(const Row& row) {
   Index rows = 0;
   VectorXd x;
@@ -180,6 +179,11 @@ MatrixXd ThroughChannel(const Dataset& data, MatrixXd torque) {
   for (Index j = 0; j < torque.cols() && !data.channel.empty(); ++j)
     torque.col(j) = ThroughChannel(data, static_cast<int>(j), torque.col(j));
   return torque;
+}
+
+void PassThroughChannel(const Dataset& data, std::vector<MatrixXd>& regressor) {
+  for (std::size_t j = 0; j < regressor.size() && !data.channel.empty(); ++j)
+    for (auto column : regressor[j].colwise()) column = ThroughChannel(data, static_cast<int>(j), column);
 }
 
 TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Dataset*>& logs) {

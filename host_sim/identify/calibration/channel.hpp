@@ -16,6 +16,8 @@ Eigen::VectorXd ThroughChannel(const Eigen::VectorXd& t, const Eigen::VectorXd& 
 // The same for a joint of a log, with the log's own channel; for all joints [N x n].
 Eigen::VectorXd ThroughChannel(const Dataset& data, int joint, Eigen::VectorXd torque);
 Eigen::MatrixXd ThroughChannel(const Dataset& data, Eigen::MatrixXd torque);
+// The columns [N x columns] of each joint's row of the regressor, in place.
+void PassThroughChannel(const Dataset& data, std::vector<Eigen::MatrixXd>& regressor);
 
 // The channel of all joints that leaves least where each joint's row of the regressor is fitted by itself, with
 // parameters of its own: only motion and torque of that joint decide. Empty unless most of the joints that move show a

@@ -111,7 +111,7 @@ Eigen::VectorXd Agreed_Hz(const Dataset& d, const Eigen::MatrixXd& predicted) {
   if (seen.empty()) return out;
   std::sort(seen.begin(), seen.end());
   out = out.cwiseMin(seen[(seen.size() - 1) / 2]);
-  const double rate_Hz = static_cast<double>(d.samples() - 1) / (d.s.t[d.samples() - 1] - d.s.t[0]);
+  const double rate_Hz = d.rate_Hz();
   for (double& band_Hz : out)
     if (band_Hz > kWholeBand * rate_Hz) band_Hz = INFINITY;
   return out;
@@ -192,7 +192,7 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
 }
 
 Dataset ThinToBand(const Dataset& d) {
-  const double rate_Hz = static_cast<double>(d.samples() - 1) / (d.s.t[d.samples() - 1] - d.s.t[0]);
+  const double rate_Hz = d.rate_Hz();
   const int every =
       std::isfinite(d.band_Hz.maxCoeff()) ? static_cast<int>(rate_Hz / (kOfAPeriod * d.band_Hz.maxCoeff())) : 1;
   if (every < 2) return d;

@@ -37,6 +37,7 @@ struct Dataset {
   std::string source;
 
   int samples() const { return s.samples(); }
+  double rate_Hz() const { return static_cast<double>(s.t.size() - 1) / (s.t[s.t.size() - 1] - s.t[0]); }
   int joints() const { return static_cast<int>(tau.cols()); }
   bool averaged(int j) const { return static_cast<std::size_t>(j) < average.size() && average[j].cols() > 0; }
 };

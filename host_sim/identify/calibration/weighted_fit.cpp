@@ -135,6 +135,17 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
   return fit;
 }
 
+DataTerm LogsAbout(const Fit& fit, const VectorXd& x) {
+  DataTerm term{0, VectorXd::Zero(x.size()), MatrixXd::Zero(x.size(), x.size())};
+  for (std::size_t j = 0; j < fit.information.gram.size(); ++j) {
+    const double weight = 1 / (fit.sigma[j] * fit.sigma[j] * fit.inflation[j]);
+    term.hessian += weight * fit.information.gram[j];
+    term.gradient -= weight * fit.information.right[j];
+  }
+  term.gradient += term.hessian * x;
+  return term;
+}
+
 PhysicalReadOut ReadOutPhysical(const codegen::Model& model, const Fit& fit) {
   RequirePhysicalPrior(model);
   const Prior prior = MakePrior(model);
@@ -148,16 +159,7 @@ PhysicalReadOut ReadOutPhysical(const codegen::Model& model, const Fit& fit) {
   problem.x = prior.mean;
   problem.x_sd = VectorXd::Zero(size);
   for (const int c : fit.active) problem.x_sd[c] = std::sqrt(prior.covariance(c, c));
-  problem.data = [&](const VectorXd& x, bool) {
-    DataTerm term{0, VectorXd::Zero(size), MatrixXd::Zero(size, size)};
-    for (std::size_t j = 0; j < fit.information.gram.size(); ++j) {
-      const double weight = 1 / (fit.sigma[j] * fit.sigma[j] * fit.inflation[j]);
-      term.hessian += weight * fit.information.gram[j];
-      term.gradient -= weight * fit.information.right[j];
-    }
-    term.gradient += term.hessian * x;
-    return term;
-  };
+  problem.data = [&](const VectorXd& x, bool) { return LogsAbout(fit, x); };
   BarrierFit found = FitWithBarrier(problem);
   return {std::move(found.bodies), std::move(found.bodies_sd), std::move(found.x), found.iterations, found.converged};
 }

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
 
@@ -45,6 +46,9 @@ struct PhysicalReadOut {
   int iterations = 0;
   bool converged = false;
 };
+
+// Half the weighted sum of squares of the logs about x. Its cost stays zero.
+DataTerm LogsAbout(const Fit& fit, const Eigen::VectorXd& x);
 
 // Throws io::InputError if a link of the prior is not physical (names it), or if the robot has prior = "none".
 PhysicalReadOut ReadOutPhysical(const codegen::Model& model, const Fit& fit);

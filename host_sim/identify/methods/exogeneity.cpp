@@ -167,8 +167,6 @@ void JudgeByHolm(std::vector<JointExogeneity>& joint) {
     tested[k]->exogenous = tested[k]->bias_Nm < kMatters * tested[k]->left_Nm;
 }
 
-double Rate_Hz(const Dataset& d) { return (d.samples() - 1) / (d.s.t[d.samples() - 1] - d.s.t[0]); }
-
 // Every m-th sample. It is used if all m samples are.
 Dataset Thinned(const Dataset& d, int m) {
   Dataset out = d;
@@ -221,14 +219,13 @@ Exogeneity TestExogeneity(const codegen::Model& model, const std::vector<const D
   std::vector<JointRows> rows(static_cast<std::size_t>(model.joints()));
   for (std::size_t l = 0; l < data.size(); ++l) {
     // An effect with memory has to see every sample.
-    const int every = model.states() > 0 ? 1 : std::max(1, static_cast<int>(Rate_Hz(*data[l]) / kEnough_Hz));
+    const int every = model.states() > 0 ? 1 : std::max(1, static_cast<int>(data[l]->rate_Hz() / kEnough_Hz));
     const Dataset log = Thinned(*data[l], every);
     std::vector<MatrixXd> measured, instrument;
     model.Regressor(log.s, p, eta, measured);
     model.Regressor(Thinned(instruments[l], every).s, p, eta, instrument);
-    for (std::size_t j = 0; j < rows.size() && !log.channel.empty(); ++j)
-      for (MatrixXd* K : {&measured[j], &instrument[j]})
-        for (auto column : K->colwise()) column = ThroughChannel(log, static_cast<int>(j), column);
+    PassThroughChannel(log, measured);
+    PassThroughChannel(log, instrument);
     for (std::size_t j = 0; j < rows.size(); ++j)
       AddRows(log, measured[j], instrument[j], Present(model, static_cast<int>(j)), static_cast<int>(j), rows[j]);
   }
@@ -253,7 +250,7 @@ std::vector<Dataset> ReferenceInstruments(const std::vector<const Dataset*>& dat
 std::vector<Dataset> SmoothedInstruments(const std::vector<const Dataset*>& data) {
   std::vector<Dataset> out;
   for (const Dataset* d : data) {
-    const double rate = Rate_Hz(*d);
+    const double rate = d->rate_Hz();
     MatrixXd q = d->s.q;
     for (int j = 0; j < d->joints(); ++j) {
       const double bandwidth = d->cutoff_Hz.size() > j ? d->cutoff_Hz[j] : 0.4 * rate;

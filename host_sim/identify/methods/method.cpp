@@ -134,16 +134,15 @@ Rows StackRows(const Problem& problem, const VectorXd& z) {
   rows.K.resize(static_cast<Eigen::Index>(rows.joint.size()), columns);
   rows.tau.resize(rows.K.rows());
   std::vector<MatrixXd> row;
-  int of_log = -1;
-  for (std::size_t r = 0; r < rows.joint.size(); ++r) {
-    const Dataset& data = *problem.train[rows.log[r]];
-    if (rows.log[r] != of_log) {
-      of_log = rows.log[r];
-      model.Regressor(data.s, Head(z, columns), Tail(z, model.nonlinear()), row);
-    }
-    const auto i = static_cast<Eigen::Index>(r);
-    rows.K.row(i) = row[rows.joint[r]].row(rows.sample[r]);
-    rows.tau[i] = data.tau(rows.sample[r], rows.joint[r]);
+  for (std::size_t begin = 0, end = 0; begin < rows.joint.size(); begin = end) {
+    const Dataset& data = *problem.train[rows.log[begin]];
+    while (end < rows.joint.size() && rows.log[end] == rows.log[begin]) ++end;
+    model.Regressor(data.s, Head(z, columns), Tail(z, model.nonlinear()), row);
+    for (std::size_t r = begin; r < end; ++r)
+      rows.tau[static_cast<Eigen::Index>(r)] = data.tau(rows.sample[r], rows.joint[r]);
+    for (int c = 0; c < columns; ++c)  // column by column, as both matrices lie in memory
+      for (std::size_t r = begin; r < end; ++r)
+        rows.K(static_cast<Eigen::Index>(r), c) = row[rows.joint[r]](rows.sample[r], c);
   }
   return rows;
 }

@@ -124,7 +124,7 @@ Linearised FilteredRows(const Problem& problem, const VectorXd& z, const Decimat
   Linearised out;
   for (const Dataset* log : problem.train) {
     const int samples = log->samples();
-    const double rate = (samples - 1) / (log->s.t[samples - 1] - log->s.t[0]);
+    const double rate = log->rate_Hz();
     const double cutoff = std::min(decimation.cutoff_Hz, 0.4 * rate);
     const int every = decimation.every > 0 ? decimation.every : std::max(1, static_cast<int>(rate / (2 * cutoff)));
     const int reach = static_cast<int>(std::ceil(rate / (2 * cutoff)));

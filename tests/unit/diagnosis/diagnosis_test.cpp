@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 #include <numbers>
+#include <random>
 
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
@@ -155,6 +156,26 @@ TEST(Diagnosis, FrictionThatGrowsWithTheLoad_IsNamedAtItsJoint) {
   Case c(LoadFriction(1, 0.06), 4);
   EXPECT_TRUE(c.Names("load_friction", 1)) << c.Said();
   EXPECT_LT(c.After(1), 1.10 * c.arm.noise_Nm(0));
+}
+
+// A structure rings at 15 Hz, five times as large as the noise. All of it counted as white would hide the friction.
+TEST(Diagnosis, SmallFrictionUnderRinging_IsNamed_AndRingingAloneIsNot) {
+  const auto ring = [](Dataset& d) {
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> normal;
+    constexpr double kRadius = 0.97;
+    const double turn = std::cos(2 * std::numbers::pi * 15 / 125);
+    double one = 0, two = 0;
+    for (int k = -200; k < d.samples(); ++k) {
+      const double v = 2 * kRadius * turn * one - kRadius * kRadius * two + 0.25 * normal(random);
+      two = one, one = v;
+      if (k >= 0) d.tau(k, 0) += v;
+    }
+  };
+  Case c(LoadFriction(1, 0.008), 4, ring);
+  EXPECT_TRUE(c.Names("load_friction", 1)) << c.Said();
+  Case nothing({}, 4, ring);
+  EXPECT_TRUE(nothing.finding().terms.empty()) << nothing.Said();
 }
 
 TEST(Diagnosis, WhatNoRecordHolds_IsUnknownAtItsJointAndSignal_AndTheErrorFalls) {

@@ -25,6 +25,8 @@ namespace {
 // bend the parameters of sliding.
 constexpr double kTurnWeight = 0.25;
 constexpr int kPasses = 3;
+constexpr double kTakesOver = 0.9;  // share of a named column that a curve can give
+constexpr double kHeld = 1e6;       // weight of a curve's part along a named column, over that of the rows
 constexpr double kSettled = 1e-3;  // relative change of the residuals' spread after which nothing else moves
 }  // namespace
 
@@ -38,6 +40,21 @@ std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Ch
 namespace {
 bool Any(const std::set<codegen::InputId>& reads, codegen::Quantity quantity) {
   return std::any_of(reads.begin(), reads.end(), [&](const auto& input) { return input.quantity == quantity; });
+}
+Eigen::LDLT<MatrixXd> Ridged(MatrixXd gram) {
+  gram.diagonal() *= 1 + 1e-9;
+  gram.diagonal().array() += 1e-300;
+  return Eigen::LDLT<MatrixXd>(gram);
+}
+// Products of `some` of a joint's columns with each other, less what the declared ones explain. coordinate: of each
+// column; the first `active` are declared.
+MatrixXd Left(const MatrixXd& gram, int active, const std::vector<int>& coordinate,
+              const std::vector<Eigen::Index>& some) {
+  std::vector<Eigen::Index> known;
+  for (std::size_t i = 0; i < coordinate.size(); ++i)
+    if (coordinate[i] < active) known.push_back(static_cast<Eigen::Index>(i));
+  const MatrixXd across = gram(known, some);
+  return gram(some, some) - across.transpose() * Ridged(gram(known, known)).solve(across);
 }
 // The sample with the largest weight in one row of averages.
 int MiddleSample(const RowIndex::Average& average, int row) {
@@ -391,9 +408,47 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   rows.precision = curves.empty() ? MatrixXd() : MatrixXd::Zero(size, size);
   for (const auto& [at, precision] : curves)
     rows.precision.block(at, at, precision->rows(), precision->cols()) = *precision;
+  KeepCausesApart(terms);
   rows.mean.conservativeResize(size);
   rows.mean.tail(size - active).setZero();
   MakeCoordinates(size);
+}
+
+// A curve over the signals of a named term could take its place, and the term's parameters would say nothing. So it
+// says only what the term leaves: its coefficients are held where its trace is orthogonal to the term's columns, both
+// less what the declared columns explain. The term's parameters then are the same with and without the curve.
+void Diagnosis::Work::KeepCausesApart(const std::vector<const Chosen*>& terms) {
+  const int active = static_cast<int>(declared.active.size());
+  int at = active;
+  std::vector<int> begin;
+  for (const Chosen* t : terms) begin.push_back(at), at += t->candidate->columns(t->eta);
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    const Candidate& curve = *terms[t]->candidate;
+    if (!curve.is_curve() || terms[t]->found.precision.size() == 0) continue;
+    const int j = curve.rows()[0], count = curve.columns(terms[t]->eta);
+    const auto& own = rows.columns[j];
+    const auto place = [&](int coordinate) {
+      return std::find(own.begin(), own.end(), coordinate) - own.begin();
+    };
+    const Eigen::Index first = place(begin[t]);
+    for (std::size_t u = 0; u < terms.size(); ++u) {
+      const Candidate& cause = *terms[u]->candidate;
+      if (cause.is_curve() || cause.record().signals != curve.record().signals || cause.joints() != curve.joints()) continue;
+      for (int c = 0; c < cause.columns(terms[u]->eta); ++c) {
+        const Eigen::Index named = place(begin[u] + c);
+        if (named == static_cast<Eigen::Index>(own.size())) continue;
+        std::vector<Eigen::Index> both{named};
+        for (int i = 0; i < count; ++i) both.push_back(first + i);
+        const MatrixXd left = Left(rows.gram[j], active, own, both);
+        const VectorXd shared = left.col(0).tail(count);
+        const double self = left(0, 0);
+        if (self <= 0 || shared.dot(Ridged(left.bottomRightCorner(count, count)).solve(shared)) < kTakesOver * self)
+          continue;
+        rows.precision.block(begin[t], begin[t], count, count) +=
+            kHeld / (self * estimate.sigma[j] * estimate.sigma[j]) * shared * shared.transpose();
+      }
+    }
+  }
 }
 
 // A term that reads the model's torque changes with the parameters, too: where it cuts torque off they change nothing.

@@ -84,6 +84,7 @@ struct Diagnosis::Work {
   bool FillGain(int j);
   Eigen::VectorXd Measured(int j) const;
   void Bend(int j, const Eigen::VectorXd& slope);
+  void KeepCausesApart(const std::vector<const Chosen*>& terms);
   void MakeCoordinates(int size);
 
   const codegen::Model& model;

@@ -22,7 +22,7 @@ class Payload : public testing::Test {
     const std::string trajectory = (folder_ / (name + "_path.csv")).string(),
                       log = (folder_ / (name + ".csv.gz")).string();
     const Outcome made =
-        Tool({"excite", "--robot", "er20_like", "--purpose", purpose, "--seconds", "2", "--out", trajectory});
+        Tool({"excite", "--robot", "er20_like", "--purpose", purpose, "--starts", "3", "--seconds", "60", "--out", trajectory});
     EXPECT_EQ(made.code, 0) << made.err;
     fs::create_directories(folder_ / name);
     const RunningDrive drive(folder_ / name, Write(name + ".toml", scenario));

@@ -2,6 +2,7 @@
 #include "host_sim/data/logs/signals.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/QR>
 #include <unsupported/Eigen/FFT>
 
 #include <algorithm>
@@ -36,6 +37,7 @@ constexpr double kShareOfJitter = 0.07;
 constexpr double kShareOfWidth = 0.05;
 constexpr double kEdgePeriods = 3;       // periods of the lowest cut-off at each end that are not settled
 constexpr double kWideGap = 5;           // sample times over which a spline may still bridge
+constexpr double kBridged = 0.25;        // periods of kLowest_Hz that a cubic may bridge
 constexpr double kIrregular = 1e-4;      // time jitter over sample time below which a grid counts as uniform
 constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
 
@@ -90,7 +92,7 @@ struct Piece {
 // The log cut at wide gaps.
 std::vector<Piece> Pieces(const Log& log) {
   std::vector<Piece> pieces;
-  const double widest_s = kWideGap * log.step_s();
+  const double widest_s = std::max(kWideGap * log.step_s(), kBridged / kLowest_Hz);
   Index first = 0;
   for (const int gap : log.gaps) {
     if (log.t[gap + 1] - log.t[gap] <= widest_s) continue;
@@ -114,22 +116,69 @@ Eigen::MatrixXd OnEvenGrid(const VectorXd& t, const Eigen::MatrixXd& q) {
   return QuinticSpline(t, q).Evaluate(EvenGrid(t), 0);
 }
 
-void DerivePiece(const VectorXd& t, const Eigen::MatrixXd& q, const Piece& piece, Derivatives& out) {
-  const Index count = t.size();
-  const double rate_Hz = static_cast<double>(count - 1) / (t[count - 1] - t[0]);
+struct Samples {
+  VectorXd t;
+  Eigen::MatrixXd q;
+};
+
+// A cubic through the samples on either side of a gap, by least squares: at `missing` even times within it. A spline
+// through every one of these samples would carry their noise into the gap many times larger.
+Samples InGap(const VectorXd& t, const Eigen::MatrixXd& q, Index last, Index missing) {
+  const Index first = std::max<Index>(0, last - missing), end = std::min(t.size(), last + 2 + missing);
+  const double middle = 0.5 * (t[last] + t[last + 1]), width = t[end - 1] - t[first];
+  const auto powers = [&](const VectorXd& at) {
+    Eigen::MatrixXd out(at.size(), 4);
+    for (Index p = 0; p < 4; ++p) out.col(p) = ((at.array() - middle) / width).pow(static_cast<double>(p));
+    return out;
+  };
+  Samples out{VectorXd(missing), {}};
+  for (Index i = 0; i < missing; ++i)
+    out.t[i] = t[last] + (t[last + 1] - t[last]) * static_cast<double>(i + 1) / static_cast<double>(missing + 1);
+  out.q = powers(out.t) * powers(t.segment(first, end - first))
+                              .colPivHouseholderQr()
+                              .solve(q.middleRows(first, end - first));
+  return out;
+}
+
+// With samples put into the gaps that are too wide for a spline.
+Samples Bridged(const VectorXd& t, const Eigen::MatrixXd& q, double step_s) {
+  const auto missing = [&](Index k) {
+    const double gap_s = t[k + 1] - t[k];
+    return gap_s > kWideGap * step_s ? static_cast<Index>(std::lround(gap_s / step_s)) - 1 : 0;
+  };
+  Index count = t.size();
+  for (Index k = 0; k + 1 < t.size(); ++k) count += missing(k);
+  if (count == t.size()) return {t, q};
+  Samples out{VectorXd(count), Eigen::MatrixXd(count, q.cols())};
+  Index at = 0;
+  for (Index k = 0; k < t.size(); ++k, ++at) {
+    out.t[at] = t[k], out.q.row(at) = q.row(k);
+    const Index more = k + 1 < t.size() ? missing(k) : 0;
+    if (more == 0) continue;
+    const Samples in = InGap(t, q, k, more);
+    out.t.segment(at + 1, more) = in.t, out.q.middleRows(at + 1, more) = in.q;
+    at += more;
+  }
+  return out;
+}
+
+void DerivePiece(const Samples& seen, double step_s, const Piece& piece, Derivatives& out) {
+  const auto& [t, q] = Bridged(seen.t, seen.q, step_s);
+  const double rate_Hz = static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]);
   Eigen::MatrixXd smooth = OnEvenGrid(t, q);
   // A position that needs no smoothing gets none: every filter rings where friction turns and acceleration jumps.
   for (Index j = 0; j < q.cols(); ++j)
     if (out.cutoff_Hz[j] < kHighestOfRate * rate_Hz)
       smooth.col(j) = ZeroPhaseLowPass(smooth.col(j), out.cutoff_Hz[j], rate_Hz);
   const QuinticSpline spline(EvenGrid(t), smooth);
-  out.q.middleRows(piece.first, count) = spline.Evaluate(t, 0);
-  out.qd.middleRows(piece.first, count) = spline.Evaluate(t, 1);
-  out.qdd.middleRows(piece.first, count) = spline.Evaluate(t, 2);
+  const Index count = seen.t.size();
+  out.q.middleRows(piece.first, count) = spline.Evaluate(seen.t, 0);
+  out.qd.middleRows(piece.first, count) = spline.Evaluate(seen.t, 1);
+  out.qdd.middleRows(piece.first, count) = spline.Evaluate(seen.t, 2);
   const double edge_s =
       kEdgePeriods / out.cutoff_Hz.minCoeff();  // the reflection there bends q: 1 % of qdd after 1.5 periods
   for (Index k = 0; k < count; ++k) {
-    out.settled[piece.first + k] = t[k] - t[0] >= edge_s && t[count - 1] - t[k] >= edge_s;
+    out.settled[piece.first + k] = seen.t[k] - seen.t[0] >= edge_s && seen.t[count - 1] - seen.t[k] >= edge_s;
   }
 }
 
@@ -139,12 +188,13 @@ JointNoise EstimateNoise(const Log& log, int joint) {
   const std::vector<Piece> pieces = Pieces(log);
   const Piece longest =
       *std::max_element(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.count < b.count; });
-  const VectorXd t = log.t.segment(longest.first, longest.count);
-  const VectorXd q = log.q.col(joint).segment(longest.first, longest.count);
+  const auto& [t, q] = Bridged(log.t.segment(longest.first, longest.count),
+                               log.q.col(joint).segment(longest.first, longest.count), log.step_s());
   const VectorXd tau = log.tau.col(joint).segment(longest.first, longest.count);
   // Orders: q moves smoothly over six samples, torque over two; beyond that the difference shows the noise alone.
   const VectorXd even = OnEvenGrid(t, q);
-  const double noise = std::max(EncoderStep(q) / std::sqrt(12.0), NoiseUnderSmooth(even, 6));
+  const double step = EncoderStep(log.q.col(joint).segment(longest.first, longest.count));
+  const double noise = std::max(step / std::sqrt(12.0), NoiseUnderSmooth(even, 6));
   const double rate_Hz = static_cast<double>(t.size() - 1) / (t[t.size() - 1] - t[0]);
   return {noise, NoiseUnderSmooth(tau, 2), MotionBand_Hz(even, noise, rate_Hz)};
 }
@@ -217,7 +267,8 @@ Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const 
   else out.cutoff_Hz = ChooseCutoffs_Hz(log, sensitivity) * bandwidth.scale;
   for (const Piece& piece : Pieces(log)) {
     if (piece.count < QuinticSpline::kMinSamples) continue;
-    DerivePiece(log.t.segment(piece.first, piece.count), log.q.middleRows(piece.first, piece.count), piece, out);
+    DerivePiece({log.t.segment(piece.first, piece.count), log.q.middleRows(piece.first, piece.count)}, log.step_s(),
+                piece, out);
   }
   return out;
 }

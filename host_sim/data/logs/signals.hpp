@@ -48,8 +48,9 @@ struct Bandwidth {
 };
 
 // q through a zero-phase Butterworth of order 4 (run forward and backward), then derivatives of a quintic spline.
-// An irregular grid is resampled by a quintic spline first. Positions are never carried across a gap of more than five
-// sample times; a piece too short for the spline keeps its q and has zero derivatives (settled = 0).
+// An irregular grid is resampled by a quintic spline first. A gap of more than five sample times is filled by a cubic
+// through the samples beside it. Positions are never carried across a gap of more than five sample times and more than
+// 12.5 ms; a piece too short for the spline keeps its q and has zero derivatives (settled = 0).
 // InputError: wrong number of
 // inertias, fewer than 8 samples, a cut-off from half the sample rate on or so low that no sample is settled.
 Derivatives DeriveSignals(const Log& log, const Sensitivity& sensitivity, const Bandwidth& bandwidth = {});

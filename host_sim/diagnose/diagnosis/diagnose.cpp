@@ -136,6 +136,8 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   finding_.most_terms = most;
   for (int j = 0; j < model.joints(); ++j)
     if (w.turns[static_cast<std::size_t>(j)]) finding_.at_turns.push_back(j);
+  for (int j = 0; j < model.joints(); ++j)
+    if (!HasEnough(w.evidence.index[static_cast<std::size_t>(j)])) finding_.too_short.push_back(j);
   finding_.limits = DetectionLimits(w);
   finding_.smallest = TypicalLimits(finding_.limits, model.joints());
 }

@@ -73,6 +73,7 @@ struct Finding {
   std::vector<Limit> limits;          // by joint, then size
   Eigen::VectorXd smallest;           // [n] the median of a joint's limits; infinity: it has none
   std::vector<int> at_turns;          // joints whose rows near turns and at rest were fitted, too
+  std::vector<int> too_short;         // joints with too few rows to search an effect on them
   int most_terms = 0;                 // the search ended at so many, and did not ask for another; 0: it did
 };
 

@@ -169,11 +169,12 @@ VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::st
   return size ? out.cwiseAbs() : out;
 }
 
+bool HasEnough(const RowIndex& rows) { return rows.size() >= (rows.averaged() ? kFewAverages : kFewRows); }
+
 bool IsExcited(const Candidate& candidate, const Evidence& evidence) {
   const int j = candidate.joints().empty() ? candidate.rows().back() : candidate.joints()[0];
   const auto& joint = evidence.model->robot().joint[j];
-  const int rows = evidence.index[j].size();
-  if (rows < (evidence.index[j].averaged() ? kFewAverages : kFewRows)) return false;
+  if (!HasEnough(evidence.index[j])) return false;
   for (const std::string& need : candidate.record().needs) {
     if (need == "low_speed" || need == "high_speed") {
       const VectorXd v = OwnSignal(candidate, evidence, "qd").cwiseAbs();

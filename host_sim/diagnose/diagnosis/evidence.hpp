@@ -47,6 +47,9 @@ struct Thinned {
 // A signal of the candidate's joint j ("q", "abs(qd)") or of its other one ("q[k]") in the rows of joint j.
 Eigen::VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::string name);
 
+// A joint with fewer rows shows no term beside the base.
+bool HasEnough(const RowIndex& rows);
+
 // The excitation the record asks for is in the logs.
 bool IsExcited(const Candidate& candidate, const Evidence& evidence);
 

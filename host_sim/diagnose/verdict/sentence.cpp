@@ -167,6 +167,9 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   if (!standing.empty())
     out.push_back(
         fmt::format("joint{} {}: at rest in the training logs", standing.size() > 1 ? "s" : "", JointGroup(standing)));
+  if (const auto& few = v.finding->too_short; !few.empty())
+    out.push_back(fmt::format("effects on joint{} {}: too few rows of the training logs are left; longer logs show more",
+                              few.size() > 1 ? "s" : "", JointGroup(few)));
   if (v.finding->most_terms > 0)
     out.push_back(fmt::format("further terms: the search ended at {}; another diagnosis of the new model would go on",
                               v.finding->most_terms));

@@ -125,7 +125,8 @@ void AddDiagnosis(report::Page& page, const DiagnosisView& v) {
   std::string list;
   for (const Term& t : f.terms)
     list += (list.empty() ? "" : "; ") + fmt::format("{} on joint {}{}", t.record->kind, JointName(t), Remark(t));
-  if (f.terms.empty())
+  if (f.terms.empty() && !f.too_short.empty()) page.Box(report::Tone::kNeutral, Headline(f), "");
+  else if (f.terms.empty())
     page.Box(report::Tone::kGood, "Nothing is missing",
              "No effect of the catalogue improves the declared model by more than chance would. What these logs would "
              "have shown is in the table: smallest effect seen.");

@@ -30,6 +30,8 @@ bool AnyConfirmed(const diagnosis::Finding& f) {
 }
 
 std::string Headline(const diagnosis::Finding& f) {
+  if (f.terms.empty() && static_cast<Eigen::Index>(f.too_short.size()) == f.sigma.size())
+    return "none. Nothing was searched: too few rows of the training logs are left; longer logs show more";
   if (f.terms.empty())
     return "none. Nothing is missing that these logs could show; what they would have shown is in the table: smallest "
            "effect seen";

@@ -133,6 +133,33 @@ TEST(Signals, WideGap_IsNotBridged) {
   }
 }
 
+// A log at 1 kHz that lacks eight samples every second: an arm hardly moves in that time.
+TEST(Signals, GapsOfEightMilliseconds_AreBridged_AtAnyRate) {
+  const MultiSine motion{{0.5, 1.5}};
+  const VectorXd whole = Uniform(20, 1000);
+  VectorXd t = whole;
+  std::vector<int> gaps;
+  for (Index k = 1000; k < t.size(); k += 1000) {
+    t.tail(t.size() - k).array() += 0.008;
+    gaps.push_back(static_cast<int>(k - 1));
+  }
+  const auto error = [&](const VectorXd& at, const std::vector<int>& holes) {
+    Log log = MakeLog(motion, at, 1e-5, 1.0);
+    log.gaps = holes;
+    const Derivatives d = DeriveSignals(log, {1.0 * Eigen::MatrixXd::Identity(1, 1)});
+    double square = 0;
+    int count = 0;
+    for (Index k = 0; k < at.size(); ++k) {
+      if (at[k] < 2 || at[k] > at[at.size() - 1] - 2) continue;
+      EXPECT_EQ(d.settled[k], 1) << at[k];
+      square += std::pow(d.qdd(k, 0) - motion.Value(at[k], 2), 2);
+      ++count;
+    }
+    return std::sqrt(square / count);
+  };
+  EXPECT_LT(error(t, gaps), 1.1 * error(whole, {}));  // what the encoder's steps leave, at one cut-off
+}
+
 double ChosenCutoff_Hz(const JointNoise& noise, double inertia, double rate_Hz, double width_radps = INFINITY) {
   return std::max(QuietCutoff_Hz(noise, inertia, rate_Hz, width_radps), MotionCutoff_Hz(noise, rate_Hz));
 }

@@ -83,5 +83,15 @@ TEST(NotLookedAt, NamesJointsThatStoodAndRowsLeftOut) {
   EXPECT_EQ(all.find("further terms"), std::string::npos) << all;
 }
 
+// A log of 0.4 s leaves fewer rows than a search needs.
+TEST(NotLookedAt, SaysThatALogIsTooShort) {
+  tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 8);
+  const auto nothing = [](const tests::State&) { return 0.0; };
+  const std::vector<Dataset> train = {arm.Run(0.4, 80, nothing)};
+  const diagnosis::Diagnosis d(arm.model(), tests::Records(), calibration::Pointers(train));
+  EXPECT_EQ(d.finding().too_short, (std::vector<int>{0, 1}));
+  EXPECT_TRUE(Headline(d.finding()).find("too few rows") != std::string::npos) << Headline(d.finding());
+}
+
 }  // namespace
 }  // namespace armcal::verdict

@@ -10,6 +10,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
 #include "host_sim/python/arrays.hpp"
+#include "host_sim/python/bindings.hpp"
 
 namespace armcal::python {
 namespace {
@@ -63,6 +64,8 @@ NB_MODULE(_core, m) {
       .def_prop_ro("joints", &codegen::Model::joints)
       .def_prop_ro("columns", &python::ColumnNames, "names of the regressor's columns")
       .def_prop_ro("units", &python::ColumnUnits, "units of the parameters of these columns");
+  python::BindLogs(m);
+  python::BindAnalyses(m);
   m.def("regressor", &python::Regressor, nanobind::arg("robot"), nanobind::arg("q"), nanobind::arg("qd"),
         nanobind::arg("qdd"), nanobind::kw_only(), nanobind::arg("step_s") = 0.008,
         nanobind::arg("temp") = nanobind::none(),

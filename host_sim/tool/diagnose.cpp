@@ -1,18 +1,12 @@
 // tool - armcal diagnose: finds in the training logs what the model lacks, and judges it on the test log.
 #include <fmt/core.h>
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
-#include "host_sim/diagnose/diagnosis/diagnose.hpp"
-#include "host_sim/diagnose/verdict/figures.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
-#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -21,7 +15,7 @@ namespace armcal::tool {
 
 namespace {
 
-void Print(const DiagnosisRun& run, const DiagnoseOptions& o) {
+void Print(const analysis::Diagnosed& run, const DiagnoseOptions& o) {
   const nlohmann::ordered_json& json = run.json;
   fmt::print("{}", verdict::DiagnosisText(run.view));
   report::Table table{
@@ -45,52 +39,20 @@ void Print(const DiagnosisRun& run, const DiagnoseOptions& o) {
   }
 }
 
-// What the terms leave at the samples of the training logs: [n] RMS where the joint moves.
-Eigen::VectorXd LeftAtSamples(const codegen::Model& model, const diagnosis::Diagnosis& diagnosis,
-                              const std::vector<calibration::Dataset>& train) {
-  const diagnosis::Finding& finding = diagnosis.finding();
-  Eigen::VectorXd square = Eigen::VectorXd::Zero(model.joints());
-  double samples = 0;
-  for (const calibration::Dataset& log : train) {
-    Eigen::MatrixXd left = log.tau - calibration::Predict(model, log, finding.x, finding.declared.eta);
-    for (const Eigen::MatrixXd& torque : diagnosis.TermTorque(log)) left -= torque;
-    square += log.samples() * calibration::Rms(log, left, true).cwiseAbs2();
-    samples += log.samples();
-  }
-  return (square / samples).cwiseSqrt();
-}
-
 }  // namespace
 
-std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
-  auto run = std::make_unique<DiagnosisRun>();
-  run->catalogue = LoadCatalogue();
-  run->model = std::make_unique<codegen::Model>(codegen::ReadRobot(RobotPath(o.robot)), run->catalogue);
-  const codegen::Model& model = *run->model;
+std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
+  codegen::Catalogue catalogue = LoadCatalogue();
+  auto declared = std::make_unique<codegen::Model>(codegen::ReadRobot(RobotPath(o.robot)), catalogue);
+  const codegen::Model& model = *declared;
   for (const std::string& p : o.train)
     if (std::error_code none; std::filesystem::equivalent(p, o.test, none))
       throw io::InputError("--test " + o.test + ": expected another log than those of --train");
-  const LogReader read(model, o.channels, o.cutoff_Hz);
-  std::vector<calibration::Dataset> train = read.All(o.train);
-  read.PrintUntold(train);
-  const auto start = std::chrono::steady_clock::now();
-  const calibration::TorqueChannel channel = calibration::SeeChannel(model, calibration::Pointers(train));
-  for (calibration::Dataset& log : train) log.channel = channel;
-  for (const calibration::Dataset& log : train) run->train.push_back(calibration::ThinToBand(log));
-  std::vector<calibration::Dataset> narrow;
-  for (const calibration::Dataset& log : read.Narrow(o.train)) {
-    narrow.push_back(calibration::ThinToBand(log));
-    narrow.back().channel = channel;
-  }
-  run->diagnosis = std::make_unique<diagnosis::Diagnosis>(model, run->catalogue, calibration::Pointers(run->train),
-                                                          calibration::Pointers(narrow), o.at_turns);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const LogReader read(model, o.channels);
+  auto run = std::make_unique<analysis::Diagnosed>(std::move(declared), std::move(catalogue), read.Raw(o.train), o.how,
+                                                   SayAside);
+  read.PrintUntold(run->train);
   const diagnosis::Finding& finding = run->diagnosis->finding();
-
-  Eigen::VectorXd z(model.columns() + model.nonlinear());
-  z << finding.x.head(model.columns()), Eigen::VectorXd::Map(finding.declared.eta.data(), model.nonlinear());
-  const calibration::Exogeneity exogeneity =
-      calibration::CheckExogeneity(model, run->diagnosis->WithoutTerms(), z, calibration::Instruments::kCommanded);
 
   // The model is written, and its hash taken, before the held-out log is opened.
   std::string provenance = "Train:", model_hash;
@@ -102,47 +64,12 @@ std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& o) {
     files::WriteWholeFile(o.model_out, before_test);
     model_hash = files::FileHash(o.model_out);
   }
-  run->test = read.One(o.test);
-  run->test.channel = channel;
-  run->held_out = run->diagnosis->Judge(run->test, o.gain_tolerance);
-  const calibration::HeldOutMotion motion =
-      calibration::CompareMotion(model, finding.declared, calibration::Pointers(run->train), run->test);
-  if (motion.repeats()) run->diagnosis->ConfirmNothing(verdict::MotionText(motion)[0]);
+  run->Judge(read.Raw(o.test), o.robot, o.json, SayAside);
   const std::string after_test = diagnosis::ModelFile(model, finding, provenance);
   if (!o.model_out.empty() && after_test != before_test)
     files::WriteWholeFile(o.model_out, after_test);  // what was not confirmed is taken out
-
-  run->view = {&model,  &finding,   &run->test, &run->held_out, run->diagnosis->TermTorque(run->test),
-               seconds, exogeneity, {},         &run->train,    motion};
-  for (const diagnosis::Term& t : finding.terms)
-    run->view.separation.push_back(verdict::Separations(t, finding, model, run->catalogue, o.robot, o.json));
   nlohmann::ordered_json& json = run->json;
-  json = verdict::DiagnosisJson(run->view);
   json["provenance"] = provenance;
-  json["fitted_at_turns"] = nlohmann::ordered_json::array();
-  for (const int j : run->diagnosis->finding().at_turns) json["fitted_at_turns"].push_back(j + 1);
-  json["torque_channel"] = nlohmann::ordered_json::array();
-  for (int j = 0; j < model.joints() && !channel.empty(); ++j)
-    if (channel.lag_s[j] != 0 || channel.late_s[j] != 0)
-      json["torque_channel"].push_back({{"joint", j + 1}, {"lag_s", channel.lag_s[j]}, {"late_s", channel.late_s[j]}});
-  // Averages of a limited band have less noise than the samples that `before` and `after` are about.
-  const auto limited = [&train](int j) {
-    return std::any_of(train.begin(), train.end(), [j](const auto& log) { return log.averaged(j); });
-  };
-  Eigen::VectorXd left;
-  for (int j = 0; j < model.joints(); ++j) {
-    if (!limited(j)) continue;
-    if (left.size() == 0) left = LeftAtSamples(model, *run->diagnosis, train);
-    json["noise_floor"][static_cast<std::size_t>(j)] = left[j];
-  }
-  for (const calibration::Dataset& log : run->train) {
-    json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
-    for (const auto& [key, limits_Hz] : {std::pair{"band_Hz", &log.band_Hz}, std::pair{"saved_Hz", &log.saved_Hz}}) {
-      nlohmann::ordered_json& each = json[key].emplace_back(nlohmann::ordered_json::array());
-      for (const double limit_Hz : *limits_Hz)
-        each.push_back(std::isfinite(limit_Hz) ? nlohmann::ordered_json(limit_Hz) : nlohmann::ordered_json());
-    }
-  }
   if (!o.model_out.empty()) {
     // The same schema: a table can switch the terms on. Another one: the model must be generated and the drive built.
     const codegen::Model next(codegen::ReadRobot(o.model_out), run->catalogue);
@@ -192,11 +119,11 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--train", o->train, "log(s) on which everything is decided");
   verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
-  AddCutoff(*verb, o->cutoff_Hz);
+  AddCutoff(*verb, o->how.cutoff_Hz);
   verb->add_flag(
-      "--turns", o->at_turns,
+      "--turns", o->how.at_turns,
       "look at the rows near turns and at rest, too: friction that builds up over a displacement, or sticks");
-  verb->add_option("--gain-tolerance", o->gain_tolerance,
+  verb->add_option("--gain-tolerance", o->how.gain_tolerance,
                    "share by which each joint's torque may be off: for the mass of a payload that the held-out log "
                    "carries; default: the robot file's, or 0.1")
       ->check(CLI::Range(1e-6, 0.9));

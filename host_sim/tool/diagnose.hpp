@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/diagnose/verdict/verdict.hpp"
+#include "host_sim/diagnose/analysis/diagnosed.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -13,25 +13,11 @@ namespace armcal::tool {
 struct DiagnoseOptions {
   std::string robot, channels, test, json, report, model_out;
   std::vector<std::string> train;
-  bool at_turns = false;
-  double cutoff_Hz = 0;
-  double gain_tolerance = 0;  // of each joint's torque; 0: the robot file's
-};
-
-// One diagnosis from files to files, with everything its view refers to.
-struct DiagnosisRun {
-  codegen::Catalogue catalogue;
-  std::unique_ptr<codegen::Model> model;
-  std::vector<calibration::Dataset> train;
-  calibration::Dataset test;
-  std::unique_ptr<diagnosis::Diagnosis> diagnosis;
-  diagnosis::HeldOut held_out;
-  verdict::DiagnosisView view;
-  nlohmann::ordered_json json;
+  analysis::DiagnoseOptions how = {};
 };
 
 // Train, decide, write the model file and take its hash; only then open the held-out log. Prints the verdict.
-std::unique_ptr<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options);
+std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& options);
 
 // --batch: the logs of many arms. --splits: every run of one arm held out once. (diagnose_batch.cpp)
 struct BatchOptions {

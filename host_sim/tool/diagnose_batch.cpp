@@ -55,9 +55,9 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& o
     add("--train", c.train), add("--test", c.test);
     add("--json", {file(".json")}), add("--report", {file(".html")}), add("--model-out", {file(".toml")});
     if (!one.channels.empty()) add("--channels", {one.channels});
-    if (one.at_turns) add("--turns", {});
-    if (one.cutoff_Hz > 0) add("--cutoff", {fmt::format("{}", one.cutoff_Hz)});
-    if (one.gain_tolerance > 0) add("--gain-tolerance", {fmt::format("{}", one.gain_tolerance)});
+    if (one.how.at_turns) add("--turns", {});
+    if (one.how.cutoff_Hz > 0) add("--cutoff", {fmt::format("{}", one.how.cutoff_Hz)});
+    if (one.how.gain_tolerance > 0) add("--gain-tolerance", {fmt::format("{}", one.how.gain_tolerance)});
     const int code = RunProgram(words, file(".log"));
     if (code == kOk) return verdict::ReadVerdict(file(".json"));
     why = Reason(file(".log"), code);
@@ -206,7 +206,7 @@ verdict::Comparison CompareSplits(const DiagnoseOptions& one, const std::vector<
     return out;
   const codegen::Catalogue catalogue = LoadCatalogue();
   const codegen::Model model(codegen::ReadRobot(RobotPath(one.robot)), catalogue);
-  const LogReader read(model, one.channels, one.cutoff_Hz);
+  const LogReader read(model, one.channels, one.how.cutoff_Hz);
   std::vector<calibration::Dataset> runs;
   std::map<std::vector<std::string>, int> group;  // by training runs
   for (const DiagnosisCase& c : cases) {

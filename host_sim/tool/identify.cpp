@@ -6,14 +6,13 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
+#include "host_sim/diagnose/analysis/identified.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
-#include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 #include "host_sim/identify/calibration/payload.hpp"
 #include "host_sim/identify/calibration/table_ceilings.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/identify/methods/closed_loop.hpp"
-#include "host_sim/identify/methods/link_widths.hpp"
 #include "host_sim/identify/methods/method.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -148,25 +147,6 @@ void SaveTable(const std::string& path, const codegen::Model& model, const calib
     fmt::print(stderr, "armcal: {}: a drive would refuse this table: {}\n", path, beyond);
 }
 
-// Bodies read out with the widths that the logs themselves show, and the table that follows. A link's parameter rests
-// on the prior where the logs narrow these widths little.
-struct Table {
-  calibration::LinkWidths widths;
-  calibration::PhysicalReadOut bodies;
-  calibration::TableFile file;
-};
-Table MakeTable(const codegen::Model& model, const calibration::Fit& all, const calibration::Fit& used, double step_s) {
-  Table t;
-  t.widths = calibration::EstimateLinkWidths(model, used);
-  t.bodies = calibration::ReadOutWithWidths(model, used, t.widths);
-  t.file = calibration::IdentifiedTable(model, all, used, t.bodies, step_s);
-  for (int k = 0; k < model.body_parameters(); ++k) {
-    calibration::TableRow& row = t.file.row[static_cast<std::size_t>(k)];
-    row.from_prior = row.sd > 0 && row.posterior_sd > calibration::kFromPrior * t.widths.sd[k];
-  }
-  return t;
-}
-
 // The declared model fitted to the runs without payload in true torque; the gains become the table's torque scales.
 void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vector<calibration::Dataset> without,
                 const std::vector<DriveGain>& gains) {
@@ -184,7 +164,7 @@ void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vecto
   const calibration::Fit all = calibration::WeightedFit(known, calibration::Pointers(without));
   const calibration::Fit held =
       calibration::WeightedFit(known, calibration::Pointers(without), calibration::HardlyDetermined(known, all));
-  calibration::TableFile table = MakeTable(known, all, held, without[0].s.t[1] - without[0].s.t[0]).file;
+  calibration::TableFile table = analysis::ReadBodies(known, all, held, without[0].s.t[1] - without[0].s.t[0]).table;
   for (std::size_t j = 0; j < scale.size(); ++j) table.joint[j].torque_scale *= scale[j];
   SaveTable(o.table, model, table);
 }
@@ -294,32 +274,6 @@ struct IdentifyOptions {
 
 std::string Significant(double v) { return fmt::format("{:.5g}", v); }
 
-nlohmann::ordered_json Columns(const codegen::Model& model, const calibration::Fit& fit) {
-  nlohmann::ordered_json out = nlohmann::ordered_json::array();
-  for (int c = 0; c < model.columns(); ++c) {
-    nlohmann::ordered_json row{
-        {"name", model.column_name(c)}, {"unit", model.column_unit(c)}, {"value", fit.x[c]}, {"sd", fit.sd[c]}};
-    if (model.robot().has_prior) row["posterior_over_prior"] = fit.ratio(c);
-    out.push_back(row);
-  }
-  return out;
-}
-
-nlohmann::ordered_json Nonlinear(const codegen::Model& model, const std::vector<double>& eta) {
-  nlohmann::ordered_json out = nlohmann::ordered_json::array();
-  for (int k = 0; k < model.nonlinear(); ++k)
-    out.push_back({{"name", model.unknowns()[k].name},
-                   {"unit", model.unknowns()[k].unit},
-                   {"value", eta[static_cast<std::size_t>(k)]}});
-  return out;
-}
-
-Eigen::VectorXd Unknowns(const codegen::Model& model, const calibration::Fit& fit) {
-  Eigen::VectorXd z(model.columns() + model.nonlinear());
-  z << fit.x.head(model.columns()), Eigen::VectorXd::Map(fit.eta.data(), model.nonlinear());
-  return z;
-}
-
 void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
   report::Table t{{"parameter", "unit", "value", "sd", "posterior / prior", ""}, {}};
   for (const int c : fit.active) {
@@ -347,62 +301,37 @@ int RunIdentify(const IdentifyOptions& o) {
   MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, o.cutoff_Hz, {}};
   if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
-  if (model.robot().has_prior) calibration::RequirePhysicalPrior(model);  // before the fit, not after it
   const LogReader read(model, o.channels, o.cutoff_Hz);
-  std::vector<calibration::Dataset> train = read.All(o.train);
+  const std::vector<calibration::Dataset> train = read.All(o.train);
   read.PrintUntold(train);
-  const calibration::Fit all = calibration::WeightedFit(model, calibration::Pointers(train));
-  PrintColumns(model, all);
-  nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}, {"columns", Columns(model, all)}};
-  for (int j = 0; j < model.joints(); ++j) {
-    json["sigma_Nm"].push_back(all.sigma[j]);
-    json["torque_gain"].push_back(1 + all.x[model.columns() + j]);
-  }
-  if (model.nonlinear() > 0) json["nonlinear"] = Nonlinear(model, all.eta);
-  const calibration::Exogeneity exogeneity =
-      calibration::CheckExogeneity(model, train, Unknowns(model, all), calibration::Instruments::kSimulated);
+  analysis::Identified found(model, train);
+  PrintColumns(model, found.all);
+  const calibration::Exogeneity& exogeneity = found.exogeneity;
   fmt::print("{}", verdict::ExogeneityText(exogeneity, "the model lacks a term: armcal diagnose"));
-  json["exogeneity"] = verdict::ToJson(exogeneity);
   if (o.method == "auto" && !exogeneity.passed() && exogeneity.instruments == calibration::kSimulatedLoop) {
-    method.method = "instrumental_variable", method.exogeneity = json["exogeneity"];
+    method.method = "instrumental_variable", method.exogeneity = verdict::ToJson(exogeneity);
     return RunMethod(method);
   }
-  calibration::Fit used = all;
-  Eigen::VectorXd x = all.x;
   if (model.robot().has_prior) {
-    used = calibration::WeightedFit(model, calibration::Pointers(train),
-                                    o.force ? std::vector<int>{} : calibration::HardlyDetermined(model, all));
-    const auto [widths, bodies, table] = MakeTable(model, all, used, train[0].s.t[1] - train[0].s.t[0]);
-    x = bodies.x;
-    json["link_widths"] = {{"relative", std::vector<double>(widths.relative.begin(), widths.relative.end())},
-                           {"center_m", widths.center_m},
-                           {"inertia_of_trace", widths.inertia_of_trace}};
-    int from_prior = 0;
-    for (const auto& row : table.row) from_prior += row.from_prior;
-    for (const auto& row : table.row)
-      json["table"].push_back({{"name", row.name},
-                               {"mean", row.mean},
-                               {"sd", row.sd},
-                               {"posterior_sd", row.posterior_sd},
-                               {"from_prior", row.from_prior}});
-    for (int j = 0; j < model.joints(); ++j) json["table_gain"].push_back(1 + x[model.columns() + j]);
+    found.ReadOut(train, o.force);
     fmt::print(
         "standard parameters: {} of {} rest mostly on the prior (posterior / prior sd above {}); bodies physical: {}\n",
-        from_prior, table.row.size(), calibration::kFromPrior, calibration::IsPhysical(bodies.bodies) ? "yes" : "no");
-    json["physical"] = calibration::IsPhysical(bodies.bodies);
-    json["from_prior"] = from_prior;
-    if (!o.table.empty()) SaveTable(o.table, model, table);
+        found.read.FromPrior(), found.read.table.row.size(), calibration::kFromPrior,
+        calibration::IsPhysical(found.read.bodies.bodies) ? "yes" : "no");
+    if (!o.table.empty()) SaveTable(o.table, model, found.read.table);
   } else if (!o.table.empty()) {
     throw io::InputError(o.robot + ": prior = \"none\": a table needs standard parameters, and those need a prior");
   }
+  nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}};
+  json.update(found.ToJson());
   if (!o.test.empty()) {
     const calibration::Dataset test = read.One(o.test);
     const verdict::HeldOutError e =
-        verdict::CompareHeldOut(test, calibration::Predict(model, test, x, used.eta), o.band_Hz);
+        verdict::CompareHeldOut(test, calibration::Predict(model, test, found.x(), found.eta()), o.band_Hz);
     verdict::PrintHeldOut(e, o.test);
     json["test"] = o.test;
     json["held_out"] = verdict::ToJson(e);
-    AddMotion(calibration::CompareMotion(model, all, calibration::Pointers(train), test), json);
+    AddMotion(calibration::CompareMotion(model, found.all, calibration::Pointers(train), test), json);
   }
   WriteJson(o.json, json);
   return kOk;

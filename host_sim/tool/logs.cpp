@@ -1,4 +1,4 @@
-// tool - reads logs, with a channel map if one is given, and checks them against the model.
+// tool - reads logs, with a channel map if one is given.
 #include "host_sim/tool/logs.hpp"
 
 #include <fmt/core.h>
@@ -8,11 +8,6 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/channels.hpp"
-#include "host_sim/data/logs/log.hpp"
-#include "host_sim/identify/calibration/body_check.hpp"
-#include "host_sim/identify/calibration/column_check.hpp"
-#include "host_sim/identify/calibration/log_check.hpp"
-#include "host_sim/identify/calibration/untold.hpp"
 
 namespace armcal::tool {
 
@@ -20,63 +15,21 @@ logs::Log LogReader::Raw(const std::string& path) const {
   return channels_.empty() ? logs::ReadLog(path) : logs::ReadLog(path, logs::ReadChannelMap(channels_));
 }
 
-calibration::Dataset LogReader::One(const std::string& path) const {
-  const logs::Log log = Raw(path);
-  const calibration::SignalCheck check = Check(log);
-  if (!check.lack.empty()) throw io::InputError(log.source + ": " + check.lack);
-  calibration::Dataset data = calibration::Prepare(model_, log, {cutoff_Hz_});
-  CheckTogether({&data});
-  return data;
-}
-
-void LogReader::CheckTogether(const std::vector<const calibration::Dataset*>& data) const {
-  for (const std::string& note : calibration::CheckRows(model_.robot(), data)) fmt::print(stderr, "{}\n", note);
-  for (const std::string& note : calibration::CheckColumns(model_, data)) fmt::print(stderr, "{}\n", note);
-  for (const calibration::Dataset* log : data) calibration::CheckAgainstModel(model_, *log);
-}
-
-void LogReader::PrintUntold(const std::vector<calibration::Dataset>& data) const {
-  if (model_.robot().has_prior) return;
-  std::string text;
-  for (const std::string& fault : calibration::UntoldFaults(model_)) text += (text.empty() ? "" : "; ") + fault;
-  if (!text.empty()) fmt::print("cannot be told without link data: {}\n", text);
-  text.clear();
-  for (const std::string& fault : calibration::EquallyGood(model_, calibration::Pointers(data)))
-    text += (text.empty() ? "" : "; ") + fault;
-  if (!text.empty()) fmt::print("cannot be told from these logs: {}\n", text);
-}
-
-calibration::SignalCheck LogReader::Check(const logs::Log& log) const {
-  if (log.joints != model_.joints()) return {};  // Prepare names what is wrong
-  const calibration::SignalCheck check = calibration::CheckSignals(model_.robot(), log);
-  for (const std::string& note : check.notes) fmt::print(stderr, "{}: {}\n", log.source, note);
-  return check;
-}
-
-std::vector<calibration::Dataset> LogReader::Narrow(const std::vector<std::string>& paths) const {
-  constexpr double kNarrow = 0.62;  // of the cut-off: half the noise of an acceleration
-  std::vector<calibration::Dataset> out;
-  for (const std::string& p : paths) {
-    const logs::Log log = Raw(p);
-    if (paths.size() == 1 || calibration::CheckSignals(model_.robot(), log).lack.empty())
-      out.push_back(calibration::Prepare(model_, log, {cutoff_Hz_, kNarrow}));
-  }
+std::vector<logs::Log> LogReader::Raw(const std::vector<std::string>& paths) const {
+  std::vector<logs::Log> out;
+  for (const std::string& path : paths) out.push_back(Raw(path));
   return out;
 }
 
 std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>& paths) const {
-  std::vector<calibration::Dataset> out;
-  if (paths.size() == 1) return {One(paths[0])};
-  for (const std::string& p : paths) {
-    const logs::Log log = Raw(p);
-    const calibration::SignalCheck check = Check(log);
-    if (check.lack.empty()) out.push_back(calibration::Prepare(model_, log, {cutoff_Hz_}));
-    else fmt::print(stderr, "{}: left out: {}\n", p, check.lack);
-  }
-  if (out.empty()) throw io::InputError(paths[0] + " and others: none is long enough to be fitted");
-  CheckTogether(calibration::Pointers(out));
-  return out;
+  return analysis::CheckedLogs(model_, Raw(paths), cutoff_Hz_, SayAside);
 }
+
+void LogReader::PrintUntold(const std::vector<calibration::Dataset>& data) const {
+  for (const std::string& line : analysis::Untold(model_, data)) fmt::print("{}\n", line);
+}
+
+void SayAside(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
 void AddCutoff(CLI::App& verb, double& cutoff_Hz) {
   const auto read = [&cutoff_Hz](const std::string& text) {

@@ -66,6 +66,8 @@ const Edges kEdges = {
     {"host_sim/diagnose/verdict", {kCode, kHost + "data/files", kHost + "data/logs", kHost + "data/report",
                                    kHost + "identify/excitation", kHost + "identify/calibration", kHost + "identify/methods",
                                    kHost + "diagnose/diagnosis"}},
+    {"host_sim/diagnose/analysis", {kCode, kHost + "data/logs", kHost + "identify/calibration", kHost + "identify/methods",
+                                    kHost + "diagnose/diagnosis", kHost + "diagnose/verdict"}},  // from logs to JSON
     {"host_sim/diagnose/health", {kHost + "client"}},  // a drive's statistics -> a verdict
 
     // Client: what talks to a drive.
@@ -86,7 +88,8 @@ const Edges kEdges = {
     // A program of its own flags: headers that stand alone only.
     {"host_sim/study/bench",   {kHost + "identify/calibration", "codegen/generated/", kLib + "math", kLib + "model"}},
     {"host_sim/tool",          {kHost, kCode, kLib}},
-    {"host_sim/python",        {kCode + "io", kCode + "generator", kHost + "identify/calibration"}},
+    {"host_sim/python",        {kCode + "io", kCode + "generator", kHost + "data/logs", kHost + "identify/calibration",
+                                kHost + "diagnose/verdict", kHost + "diagnose/analysis"}},
 
     // Tests may look everywhere; nothing may look into tests.
     {"tests/",                 {kLib, kLib + "eigen.hpp", "port/", "codegen/", "host_sim/"}},

@@ -105,23 +105,6 @@ double MedianStep(const Eigen::VectorXd& t) {
   return step[step.size() / 2];
 }
 
-// The columns that decide which rows are samples.
-RawRows Raw(const std::string& file, const files::NumericTable& table, const ChannelMap& map) {
-  const Columns columns(file, table);
-  RawRows rows;
-  rows.source = file;
-  rows.time_column = map.time.column;
-  rows.t = columns.Take(map.time);
-  for (const char* name : {"q", "tau"})
-    for (const Quantity& quantity : map.quantities) {
-      if (quantity.name != name) continue;
-      (quantity.name == "q" ? rows.q : rows.tau) = columns.Take(quantity);
-      for (const Channel& channel : quantity.joint) rows.columns.push_back(channel.column);
-    }
-  rows.missing = table.values.array().isNaN().rowwise().any().cast<int>();
-  return rows;
-}
-
 void ListGaps(Log& log) {
   if (log.samples() < 2) return;
   const double median = MedianStep(log.t);
@@ -130,32 +113,25 @@ void ListGaps(Log& log) {
   }
 }
 
-Log FromTable(const std::string& file, files::NumericTable table, const ChannelMap& map, int min_samples) {
-  const Eigen::Index rows = table.values.rows();
-  Samples samples = ChooseSamples(Raw(file, table, map));
-  table.values = table.values(samples.row, Eigen::all).eval();
+// The file's rows as they stand.
+RawLog Raw(const std::string& file, files::NumericTable& table, const ChannelMap& map) {
   const Columns columns(file, table);
-  Log log;
-  log.joints = map.joints;
-  log.source = file;
+  RawLog raw;
+  raw.log.joints = map.joints;
+  raw.log.source = file;
+  raw.log.t = columns.Take(map.time);
+  raw.time_column = map.time.column;
   for (const Quantity& quantity : map.quantities) {
-    if (quantity.name == "flag") log.flags = columns.Take(quantity).cast<int>();
-    else Block(log, quantity.name) = columns.Take(quantity);
+    if (quantity.name == "flag") raw.flags = columns.Take(quantity);
+    else Block(raw.log, quantity.name) = columns.Take(quantity);
   }
-  log.t = samples.t;
-  log.notes = std::move(samples.notes);
-  log.line.resize(log.samples());
-  constexpr int kFirstLine = 2;  // behind the header
-  for (Eigen::Index k = 0; k < log.samples(); ++k)
-    log.line[k] = static_cast<int>(samples.row[static_cast<std::size_t>(k)]) + kFirstLine;
-  log.ignored = std::move(table.ignored);
-  if (log.samples() < min_samples) {
-    throw io::InputError(log.source + ": has " + std::to_string(log.samples()) + " samples" +
-                         (rows > log.samples() ? " in " + std::to_string(rows) + " rows" : "") +
-                         ", expected at least " + std::to_string(min_samples));
-  }
-  ListGaps(log);
-  return log;
+  for (const char* name : {"q", "tau"})
+    for (const Quantity& quantity : map.quantities)
+      for (const Channel& channel : quantity.joint)
+        if (quantity.name == name) raw.columns.push_back(channel.column);
+  raw.missing = table.values.array().isNaN().rowwise().any().cast<int>();
+  raw.log.ignored = std::move(table.ignored);
+  return raw;
 }
 
 }  // namespace
@@ -163,6 +139,28 @@ Log FromTable(const std::string& file, files::NumericTable table, const ChannelM
 double Log::step_s() const {
   if (samples() < 2) throw io::InputError(source + ": has no sample time, expected at least 2 samples");
   return MedianStep(t);
+}
+
+Log MakeLog(RawLog raw, int min_samples) {
+  Log& log = raw.log;
+  const Eigen::Index rows = log.t.size();
+  Samples samples =
+      ChooseSamples({log.t, log.q, log.tau, raw.missing, log.source, raw.time_column, raw.columns, raw.first_line});
+  for (Eigen::MatrixXd* block : {&log.q, &log.tau, &log.qd, &log.qdd, &log.qref, &log.tauff, &log.ext, &log.temp})
+    if (block->size() > 0) *block = (*block)(samples.row, Eigen::all).eval();
+  if (raw.flags.size() > 0) log.flags = raw.flags(samples.row, Eigen::all).cast<int>();
+  log.t = samples.t;
+  log.notes = std::move(samples.notes);
+  log.line.resize(log.samples());
+  for (Eigen::Index k = 0; k < log.samples(); ++k)
+    log.line[k] = static_cast<int>(samples.row[static_cast<std::size_t>(k)]) + raw.first_line;
+  if (log.samples() < min_samples) {
+    throw io::InputError(log.source + ": has " + std::to_string(log.samples()) + " samples" +
+                         (rows > log.samples() ? " in " + std::to_string(rows) + " rows" : "") +
+                         ", expected at least " + std::to_string(min_samples));
+  }
+  ListGaps(log);
+  return std::move(raw.log);
 }
 
 Log ReadLog(const std::filesystem::path& path, int min_samples) {
@@ -174,7 +172,7 @@ Log ReadLog(const std::filesystem::path& path, int min_samples) {
       },
       files::Missing::kNan);
   const ChannelMap map = OurNames(path.string(), table.names);
-  return FromTable(path.string(), std::move(table), map, min_samples);
+  return MakeLog(Raw(path.string(), table, map), min_samples);
 }
 
 Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_samples) {
@@ -190,7 +188,7 @@ Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_sa
         return false;
       },
       files::Missing::kNan);
-  return FromTable(path.string(), std::move(table), map, min_samples);
+  return MakeLog(Raw(path.string(), table, map), min_samples);
 }
 
 void WriteLog(const std::filesystem::path& path, const Log& log) {

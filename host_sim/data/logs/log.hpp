@@ -33,6 +33,19 @@ struct Log {
 
 inline constexpr int kMinSamples = 200;  // below this no statistic of the project means anything
 
+// Rows as they stand in a file or in arrays: the blocks of `log` with N rows each. A number that is missing is NaN.
+struct RawLog {
+  Log log;                           // joints, source, t and the blocks
+  Eigen::MatrixXd flags;             // as numbers; empty if there are none
+  Eigen::VectorXi missing;           // [N] 1: some column has no number there
+  std::string time_column;           // for messages
+  std::vector<std::string> columns;  // the joints' columns of q, then of tau, for messages
+  int first_line = 2;                // the number that messages give the first row: in a file, behind the header
+};
+
+// The rows that are samples. InputError as ReadLog has it.
+Log MakeLog(RawLog raw, int min_samples = kMinSamples);
+
 // Reads CSV or gzip CSV with our names: t, q1..qn, tau1..taun and optionally qd*, qdd*, qref*, tauff*, ext*, temp*,
 // flag*, each for all n joints. Other columns are listed in `ignored`. Rows that are no samples are left out, and
 // `notes` says which (rows.hpp).

@@ -27,7 +27,6 @@ constexpr double kRegular = 0.8;  // share of repeats of one length that makes t
 constexpr double kOneStep = 0.5;  // share of changes by one step of the encoder that makes repeats its resolution
 constexpr double kEvener = 0.5;   // an even grid must halve the error of positions that are read off their neighbours
 constexpr double kJitter = 0.02;  // of a step: below this stamps are even enough
-constexpr int kLine = 2;          // of the first row: the header is line 1
 
 [[noreturn]] void Fail(const RawRows& rows, const std::string& what) {
   throw io::InputError(rows.source + ": " + what);
@@ -65,7 +64,7 @@ class Chooser {
  private:
   Index size() const { return static_cast<Index>(out_.row.size()); }
   Index row(Index i) const { return out_.row[static_cast<std::size_t>(i)]; }
-  Index line(Index i) const { return row(i) + kLine; }
+  Index line(Index i) const { return row(i) + rows_.first_line; }
   double time(Index i) const { return rows_.t[row(i)]; }
   bool SameQ(Index a, Index b) const { return rows_.q.row(row(a)) == rows_.q.row(row(b)); }
   bool SameTau(Index a, Index b) const { return rows_.tau.row(row(a)) == rows_.tau.row(row(b)); }

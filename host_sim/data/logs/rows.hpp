@@ -14,6 +14,7 @@ struct RawRows {
   Eigen::VectorXi missing;           // [N] 1: some column has no number there
   std::string source, time_column;   // for messages
   std::vector<std::string> columns;  // the joints' columns of q, then of tau, for messages
+  int first_line = 2;                // the number that messages give the first row: in a file, behind the header
 };
 
 struct Samples {

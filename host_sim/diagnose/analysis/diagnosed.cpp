@@ -1,0 +1,95 @@
+// analysis - runs a diagnosis from logs to its JSON.
+#include "host_sim/diagnose/analysis/diagnosed.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/diagnose/verdict/words.hpp"
+
+namespace armcal::analysis {
+
+Diagnosed::Diagnosed(std::unique_ptr<codegen::Model> declared, codegen::Catalogue records,
+                     const std::vector<logs::Log>& train_logs, const DiagnoseOptions& given, const Say& say)
+    : options(given), catalogue(std::move(records)), model(std::move(declared)) {
+  whole_ = CheckedLogs(*model, train_logs, options.cutoff_Hz, say);
+  const auto start = std::chrono::steady_clock::now();
+  channel_ = calibration::SeeChannel(*model, calibration::Pointers(whole_));
+  for (calibration::Dataset& log : whole_) log.channel = channel_;
+  for (const calibration::Dataset& log : whole_) train.push_back(calibration::ThinToBand(log));
+  std::vector<calibration::Dataset> narrow;
+  for (const calibration::Dataset& log : NarrowLogs(*model, train_logs, options.cutoff_Hz)) {
+    narrow.push_back(calibration::ThinToBand(log));
+    narrow.back().channel = channel_;
+  }
+  diagnosis = std::make_unique<diagnosis::Diagnosis>(*model, catalogue, calibration::Pointers(train),
+                                                     calibration::Pointers(narrow), options.at_turns);
+  view.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  const diagnosis::Finding& finding = diagnosis->finding();
+  Eigen::VectorXd z(model->columns() + model->nonlinear());
+  z << finding.x.head(model->columns()), Eigen::VectorXd::Map(finding.declared.eta.data(), model->nonlinear());
+  view.exogeneity =
+      calibration::CheckExogeneity(*model, diagnosis->WithoutTerms(), z, calibration::Instruments::kCommanded);
+}
+
+void Diagnosed::Judge(const logs::Log& log, const std::string& robot, const std::string& file, const Say& say) {
+  const diagnosis::Finding& finding = diagnosis->finding();
+  test = std::move(CheckedLogs(*model, {log}, options.cutoff_Hz, say)[0]);
+  test.channel = channel_;
+  held_out = diagnosis->Judge(test, options.gain_tolerance);
+  view.motion = calibration::CompareMotion(*model, finding.declared, calibration::Pointers(train), test);
+  if (view.motion.repeats()) diagnosis->ConfirmNothing(verdict::MotionText(view.motion)[0]);
+  view.model = model.get(), view.finding = &finding, view.test = &test, view.held_out = &held_out, view.train = &train;
+  view.term_torque = diagnosis->TermTorque(test);
+  for (const diagnosis::Term& t : finding.terms)
+    view.separation.push_back(verdict::Separations(t, finding, *model, catalogue, robot, file));
+  WriteJson();
+}
+
+// What the terms leave at the samples of the training logs: [n] RMS where the joint moves.
+Eigen::VectorXd Diagnosed::LeftAtSamples() const {
+  const diagnosis::Finding& finding = diagnosis->finding();
+  Eigen::VectorXd square = Eigen::VectorXd::Zero(model->joints());
+  double samples = 0;
+  for (const calibration::Dataset& log : whole_) {
+    Eigen::MatrixXd left = log.tau - calibration::Predict(*model, log, finding.x, finding.declared.eta);
+    for (const Eigen::MatrixXd& torque : diagnosis->TermTorque(log)) left -= torque;
+    square += log.samples() * calibration::Rms(log, left, true).cwiseAbs2();
+    samples += log.samples();
+  }
+  return (square / samples).cwiseSqrt();
+}
+
+void Diagnosed::WriteJson() {
+  json = verdict::DiagnosisJson(view);
+  json["fitted_at_turns"] = nlohmann::ordered_json::array();
+  for (const int j : diagnosis->finding().at_turns) json["fitted_at_turns"].push_back(j + 1);
+  json["torque_channel"] = nlohmann::ordered_json::array();
+  for (int j = 0; j < model->joints() && !channel_.empty(); ++j)
+    if (channel_.lag_s[j] != 0 || channel_.late_s[j] != 0)
+      json["torque_channel"].push_back(
+          {{"joint", j + 1}, {"lag_s", channel_.lag_s[j]}, {"late_s", channel_.late_s[j]}});
+  // Averages of a limited band have less noise than the samples that `before` and `after` are about.
+  const auto limited = [this](int j) {
+    return std::any_of(whole_.begin(), whole_.end(), [j](const auto& log) { return log.averaged(j); });
+  };
+  Eigen::VectorXd left;
+  for (int j = 0; j < model->joints(); ++j) {
+    if (!limited(j)) continue;
+    if (left.size() == 0) left = LeftAtSamples();
+    json["noise_floor"][static_cast<std::size_t>(j)] = left[j];
+  }
+  for (const calibration::Dataset& log : train) {
+    json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
+    for (const auto& [key, limits_Hz] : {std::pair{"band_Hz", &log.band_Hz}, std::pair{"saved_Hz", &log.saved_Hz}}) {
+      nlohmann::ordered_json& each = json[key].emplace_back(nlohmann::ordered_json::array());
+      for (const double limit_Hz : *limits_Hz)
+        each.push_back(std::isfinite(limit_Hz) ? nlohmann::ordered_json(limit_Hz) : nlohmann::ordered_json());
+    }
+  }
+}
+
+}  // namespace armcal::analysis

@@ -1,0 +1,103 @@
+// analysis - identifies the declared model.
+#include "host_sim/diagnose/analysis/identified.hpp"
+
+#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/identify/calibration/information.hpp"
+
+namespace armcal::analysis {
+
+using nlohmann::ordered_json;
+
+namespace {
+
+ordered_json Columns(const codegen::Model& model, const calibration::Fit& fit) {
+  ordered_json out = ordered_json::array();
+  for (int c = 0; c < model.columns(); ++c) {
+    ordered_json row{
+        {"name", model.column_name(c)}, {"unit", model.column_unit(c)}, {"value", fit.x[c]}, {"sd", fit.sd[c]}};
+    if (model.robot().has_prior) row["posterior_over_prior"] = fit.ratio(c);
+    out.push_back(row);
+  }
+  return out;
+}
+
+ordered_json Nonlinear(const codegen::Model& model, const std::vector<double>& eta) {
+  ordered_json out = ordered_json::array();
+  for (int k = 0; k < model.nonlinear(); ++k)
+    out.push_back({{"name", model.unknowns()[k].name},
+                   {"unit", model.unknowns()[k].unit},
+                   {"value", eta[static_cast<std::size_t>(k)]}});
+  return out;
+}
+
+Eigen::VectorXd Unknowns(const codegen::Model& model, const calibration::Fit& fit) {
+  Eigen::VectorXd z(model.columns() + model.nonlinear());
+  z << fit.x.head(model.columns()), Eigen::VectorXd::Map(fit.eta.data(), model.nonlinear());
+  return z;
+}
+
+const codegen::Model& Physical(const codegen::Model& model) {
+  if (model.robot().has_prior) calibration::RequirePhysicalPrior(model);
+  return model;
+}
+
+}  // namespace
+
+int IdentifiedBodies::FromPrior() const {
+  int count = 0;
+  for (const calibration::TableRow& row : table.row) count += row.from_prior;
+  return count;
+}
+
+IdentifiedBodies ReadBodies(const codegen::Model& model, const calibration::Fit& all, const calibration::Fit& used,
+                            double step_s) {
+  IdentifiedBodies out;
+  out.widths = calibration::EstimateLinkWidths(model, used);
+  out.bodies = calibration::ReadOutWithWidths(model, used, out.widths);
+  out.table = calibration::IdentifiedTable(model, all, used, out.bodies, step_s);
+  for (int k = 0; k < model.body_parameters(); ++k) {
+    calibration::TableRow& row = out.table.row[static_cast<std::size_t>(k)];
+    row.from_prior = row.sd > 0 && row.posterior_sd > calibration::kFromPrior * out.widths.sd[k];
+  }
+  return out;
+}
+
+Identified::Identified(const codegen::Model& identified, const std::vector<calibration::Dataset>& train)
+    : model(Physical(identified)),
+      all(calibration::WeightedFit(model, calibration::Pointers(train))),
+      used(all),
+      exogeneity(
+          calibration::CheckExogeneity(model, train, Unknowns(model, all), calibration::Instruments::kSimulated)) {}
+
+void Identified::ReadOut(const std::vector<calibration::Dataset>& train, bool force) {
+  used = calibration::WeightedFit(model, calibration::Pointers(train),
+                                  force ? std::vector<int>{} : calibration::HardlyDetermined(model, all));
+  read = ReadBodies(model, all, used, train[0].s.t[1] - train[0].s.t[0]);
+  has_bodies = true;
+}
+
+ordered_json Identified::ToJson() const {
+  ordered_json json{{"columns", Columns(model, all)}};
+  for (int j = 0; j < model.joints(); ++j) {
+    json["sigma_Nm"].push_back(all.sigma[j]);
+    json["torque_gain"].push_back(1 + all.x[model.columns() + j]);
+  }
+  if (model.nonlinear() > 0) json["nonlinear"] = Nonlinear(model, all.eta);
+  json["exogeneity"] = verdict::ToJson(exogeneity);
+  if (!has_bodies) return json;
+  json["link_widths"] = {{"relative", std::vector<double>(read.widths.relative.begin(), read.widths.relative.end())},
+                         {"center_m", read.widths.center_m},
+                         {"inertia_of_trace", read.widths.inertia_of_trace}};
+  for (const calibration::TableRow& row : read.table.row)
+    json["table"].push_back({{"name", row.name},
+                             {"mean", row.mean},
+                             {"sd", row.sd},
+                             {"posterior_sd", row.posterior_sd},
+                             {"from_prior", row.from_prior}});
+  for (int j = 0; j < model.joints(); ++j) json["table_gain"].push_back(1 + x()[model.columns() + j]);
+  json["physical"] = calibration::IsPhysical(read.bodies.bodies);
+  json["from_prior"] = read.FromPrior();
+  return json;
+}
+
+}  // namespace armcal::analysis

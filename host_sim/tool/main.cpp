@@ -6,6 +6,7 @@
 
 #include "armcal/core/version.hpp"
 #include "host_sim/client/errors.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -37,10 +38,13 @@ int Main(int argc, char** argv) {
   AddDemo(app, action);
   AddBench(app, action);
   AddSurvey(app, action);
+  AddPages(app, action);
   try {
     app.parse(argc, argv);
     return action();
   } catch (const CLI::ParseError& e) {
+    const std::string misspelt = e.get_exit_code() == 0 ? "" : Misspelt(app, argc, argv);
+    if (!misspelt.empty()) return std::fprintf(stderr, "%s\n", misspelt.c_str()), kBadInput;
     return app.exit(e) == 0 ? kOk : kBadInput;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "armcal: %s\n", e.what());

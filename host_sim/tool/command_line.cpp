@@ -1,0 +1,176 @@
+// tool - finds misspelt words of a command line, and writes manual pages and completion from its definition.
+#include "host_sim/tool/command_line.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <vector>
+
+#include "armcal/core/version.hpp"
+#include "codegen/src/io/faults.hpp"
+#include "host_sim/data/files/files.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+
+namespace {
+
+// As the definition has them: by place.
+std::vector<const CLI::App*> Verbs(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App* verb) { return !verb->get_name().empty(); });
+}
+
+std::vector<const CLI::Option*> Options(const CLI::App& verb) {
+  std::vector<const CLI::Option*> out;
+  for (const CLI::Option* option : verb.get_options())
+    if (!option->get_group().empty()) out.push_back(option);
+  return out;
+}
+
+std::vector<std::string> LongNames(const CLI::App& verb) {
+  std::vector<std::string> out;
+  for (const CLI::Option* option : Options(verb))
+    for (const std::string& name : option->get_lnames()) out.push_back("--" + name);
+  return out;
+}
+
+std::string Unknown(const std::string& what, const std::string& word, const std::vector<std::string>& known) {
+  if (std::find(known.begin(), known.end(), word) != known.end()) return {};
+  const std::string nearest = io::Nearest(word, known);
+  return fmt::format("no {} {}{}", what, word, nearest.empty() ? "" : "; the nearest is " + nearest);
+}
+
+// Troff reads a dot or a quote at the start of a line as a request, and a backslash anywhere.
+std::string Troff(const std::string& text) {
+  std::string out;
+  bool at_start = true;
+  for (const char c : text) {
+    if (at_start && (c == '.' || c == '\'')) out += "\\&";
+    if (c == '\\') out += "\\e";
+    else if (c == '-') out += "\\-";
+    else out += c;
+    at_start = c == '\n';
+  }
+  return out;
+}
+
+// A description's lines; those of an example keep their shape.
+std::string Paragraphs(const std::string& description) {
+  std::string out;
+  bool example = false;
+  for (std::size_t from = 0; from < description.size();) {
+    const std::size_t to = std::min(description.find('\n', from), description.size());
+    const std::string line = description.substr(from, to - from);
+    if (line.starts_with("example")) example = true;
+    out += (example ? ".PP\n.nf\n" + Troff(line) + "\n.fi\n" : Troff(line) + "\n");
+    from = to + 1;
+  }
+  return out;
+}
+
+std::string Head(const std::string& name) {
+  return fmt::format(".TH \"{}\" 1 \"\" \"armcal {}.{}.{}\"\n", Troff(name), ARMCAL_VERSION >> 16,
+                     ARMCAL_VERSION >> 8 & 0xff, ARMCAL_VERSION & 0xff);
+}
+
+std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+std::string VerbPage(const CLI::App& verb) {
+  const std::string name = "armcal-" + verb.get_name();
+  std::string page = Head(name);
+  page += ".SH NAME\n" + Troff(name + " - " + FirstLine(verb.get_description())) + "\n";
+  page += ".SH SYNOPSIS\n.B armcal " + Troff(verb.get_name()) + "\n[OPTIONS]";
+  for (const CLI::Option* option : Options(verb))
+    if (option->get_positional()) page += Troff(" " + option->get_name(true));
+  page += "\n.SH DESCRIPTION\n" + Paragraphs(verb.get_description()) + ".SH OPTIONS\n";
+  for (const CLI::Option* option : Options(verb)) {
+    page += ".TP\n\\fB" + Troff(option->get_name(false, true)) + "\\fR";
+    if (const std::string type = option->get_type_name(); !type.empty()) page += " " + Troff(type);
+    if (const std::string usual = option->get_default_str(); !usual.empty()) page += " (default " + Troff(usual) + ")";
+    if (option->get_required()) page += " (required)";
+    page += "\n" + Troff(option->get_description()) + "\n";
+  }
+  page +=
+      ".SH EXIT STATUS\n0: done. 2: wrong use or bad input. 3: no link to the drive. 4: the drive refused. 5: what was "
+      "read back differs. 6: partly done.\n";
+  return page + ".SH SEE ALSO\n.BR armcal (1)\n";
+}
+
+std::string TopPage(const CLI::App& app) {
+  std::string page = Head("armcal") + ".SH NAME\n" + Troff("armcal - " + app.get_description().substr(8)) +
+                     "\n.SH SYNOPSIS\n.B armcal\nVERB [OPTIONS]\n.SH VERBS\n";
+  for (const CLI::App* verb : Verbs(app))
+    page +=
+        ".TP\n.BR " + Troff("armcal-" + verb->get_name()) + " (1)\n" + Troff(FirstLine(verb->get_description())) + "\n";
+  return page +
+         ".SH ENVIRONMENT\n.TP\nARMCAL_HOME\nthe checkout or installation that robots and effects are read from\n";
+}
+
+std::string Completion(const CLI::App& app) {
+  std::string verbs, cases;
+  for (const CLI::App* verb : Verbs(app)) {
+    verbs += (verbs.empty() ? "" : " ") + verb->get_name();
+    std::string words;
+    for (const std::string& name : LongNames(*verb)) words += (words.empty() ? "" : " ") + name;
+    cases += fmt::format("    {}) words='{}' ;;\n", verb->get_name(), words);
+  }
+  return "# bash completion of armcal; files where no verb or option begins so\n_armcal() {\n"
+         "  local word=${COMP_WORDS[COMP_CWORD]} words=\n"
+         "  if ((COMP_CWORD == 1)); then\n"
+         "    mapfile -t COMPREPLY < <(compgen -W '" +
+         verbs +
+         " --help --version' -- \"$word\")\n    return\n  fi\n"
+         "  case ${COMP_WORDS[1]} in\n" +
+         cases +
+         "  esac\n"
+         "  if [[ $word == -* ]]; then mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$word\"); fi\n"
+         "}\ncomplete -o default -F _armcal armcal\n";
+}
+
+}  // namespace
+
+std::string Misspelt(const CLI::App& app, int argc, const char* const* argv) {
+  if (argc < 2) return {};
+  std::vector<std::string> names;
+  const CLI::App* verb = nullptr;
+  for (const CLI::App* known : Verbs(app)) {
+    names.push_back(known->get_name());
+    if (names.back() == argv[1]) verb = known;
+  }
+  const std::string first = argv[1];
+  if (verb == nullptr) {
+    if (!first.starts_with("-")) return "armcal: " + Unknown("verb", first, names);
+    const std::string text = Unknown("option", first.substr(0, first.find('=')), LongNames(app));
+    return text.empty() ? text : "armcal: " + text;
+  }
+  for (int k = 2; k < argc; ++k) {
+    const std::string word = argv[k];
+    if (word == "--") break;
+    if (!word.starts_with("--")) continue;
+    if (const std::string text = Unknown("option", word.substr(0, word.find('=')), LongNames(*verb)); !text.empty())
+      return "armcal " + verb->get_name() + ": " + text;
+  }
+  return {};
+}
+
+void AddPages(CLI::App& app, std::function<int()>& action) {
+  auto* verb = app.add_subcommand("pages",
+                                  "write manual pages and bash completion from the program's own definition\nexample: "
+                                  "armcal pages --out build/pages && man build/pages/man1/armcal-excite.1");
+  auto folder = std::make_shared<std::string>();
+  verb->add_option("--out", *folder, "folder to write: man1/armcal*.1, armcal (bash completion)")->required();
+  verb->callback([&app, &action, folder] {
+    action = [&app, folder] {
+      const std::filesystem::path out = *folder;
+      std::filesystem::create_directories(out / "man1");
+      files::WriteWholeFile(out / "man1" / "armcal.1", TopPage(app));
+      for (const CLI::App* one : Verbs(app))
+        files::WriteWholeFile(out / "man1" / ("armcal-" + one->get_name() + ".1"), VerbPage(*one));
+      files::WriteWholeFile(out / "armcal", Completion(app));
+      return static_cast<int>(kOk);
+    };
+  });
+}
+
+}  // namespace armcal::tool

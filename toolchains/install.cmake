@@ -29,4 +29,17 @@ if(TARGET armcal)
   # The simulated drive of a robot is compiled of these.
   install(FILES host_sim/client/vendor_registers.hpp DESTINATION ${home}/host_sim/client)
   install(DIRECTORY host_sim/machine/drive DESTINATION ${home}/host_sim/machine PATTERN CMakeLists.txt EXCLUDE)
+
+  # `cpack -G DEB` in the build folder makes the Debian package: what `cmake --install` puts in place.
+  set(CPACK_GENERATOR DEB)
+  set(CPACK_PACKAGE_NAME armcal)
+  set(CPACK_PACKAGE_CONTACT "armcal contributors <armcal@localhost>")
+  set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "estimate the dynamic parameters of robot arms, on the PC and in drive firmware")
+  set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+  set(CPACK_STRIP_FILES ON)
+  set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+  set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)  # of the programs; the library is source code
+  set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "g++, cmake, libeigen3-dev")  # a drive or a project of one's own is compiled
+  set(CPACK_DEBIAN_PACKAGE_SECTION science)
+  include(CPack)
 endif()

@@ -3,6 +3,8 @@
 
 #include <fmt/core.h>
 #include <modbus.h>
+#include <netdb.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -34,6 +36,17 @@ void CloseAndFree(_modbus* connection) {
   modbus_free(connection);
 }
 
+// libmodbus calls a host that nobody knows "Connection refused", too.
+_modbus* ToHost(const std::string& host, const std::string& port) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (const int error = getaddrinfo(host.c_str(), port.c_str(), &hints, &found); error != 0)
+    throw LinkError(fmt::format("{}: cannot find this host: {}", host, gai_strerror(error)));
+  freeaddrinfo(found);
+  return modbus_new_tcp_pi(host.c_str(), port.c_str());
+}
+
 // 1 to 11 if `error` is a Modbus exception, else 0.
 int ExceptionCode(int error) {
   const int code = error - MODBUS_ENOBASE;
@@ -46,8 +59,7 @@ DriveClient::DriveClient(std::string name, int unit, std::function<_modbus*()> o
     : name_(std::move(name)), unit_(unit), open_(std::move(open)), connection_(nullptr, CloseAndFree) {}
 
 DriveClient::DriveClient(const std::string& host, int port, int unit)
-    : DriveClient(fmt::format("{}:{}", host, port), unit,
-                  [=] { return modbus_new_tcp_pi(host.c_str(), std::to_string(port).c_str()); }) {
+    : DriveClient(fmt::format("{}:{}", host, port), unit, [=] { return ToHost(host, std::to_string(port)); }) {
   Connect();
 }
 

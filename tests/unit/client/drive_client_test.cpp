@@ -108,6 +108,15 @@ TEST(DriveClient, WithoutAServer_SaysSo) {
   EXPECT_THROW(client::DriveClient("127.0.0.1", port), client::LinkError);
 }
 
+TEST(DriveClient, AHostThatNobodyKnows_IsNotCalledARefusal) {
+  try {
+    client::DriveClient("no-such-host.invalid", 502);
+    FAIL();
+  } catch (const client::LinkError& error) {
+    EXPECT_EQ(std::string(error.what()).rfind("no-such-host.invalid: cannot find this host: ", 0), 0u) << error.what();
+  }
+}
+
 TEST(DriveClient, AfterTheServerClosedTheConnection_ConnectsAnew) {
   test::TestServer server;
   auto drive = server.Connect();

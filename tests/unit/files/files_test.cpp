@@ -54,11 +54,14 @@ TEST(Files, AtomicWrite_WhereItCannot_LeavesNoPartAndKeepsTheOld) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "target/inside");  // a folder that is not empty cannot be replaced
   EXPECT_EQ(ErrorOf([&] { WriteWholeFile(folder / "target", "text"); }),
-            (folder / "target").string() + ": cannot be written");
+            (folder / "target").string() + ": cannot be written: Is a directory");
   EXPECT_TRUE(std::filesystem::is_directory(folder / "target/inside"));
   int entries = 0;
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder / ".")) ++entries;
   EXPECT_EQ(entries, 1);
+  WriteWholeFile(folder / "file", "text");
+  EXPECT_EQ(ErrorOf([&] { WriteWholeFile(folder / "file/below.csv", "text"); }),
+            (folder / "file/below.csv").string() + ": cannot be written: Not a directory");
 }
 
 TEST(Files, ReadWholeFile_GzipCutShort_IsRefused) {

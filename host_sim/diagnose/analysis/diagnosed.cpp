@@ -19,13 +19,12 @@ Diagnosed::Diagnosed(std::unique_ptr<codegen::Model> declared, codegen::Catalogu
   channel_ = calibration::SeeChannel(*model, calibration::Pointers(whole_));
   for (calibration::Dataset& log : whole_) log.channel = channel_;
   for (const calibration::Dataset& log : whole_) train.push_back(calibration::ThinToBand(log));
-  std::vector<calibration::Dataset> narrow;
   for (const calibration::Dataset& log : NarrowLogs(*model, train_logs, options.cutoff_Hz)) {
-    narrow.push_back(calibration::ThinToBand(log));
-    narrow.back().channel = channel_;
+    narrow_.push_back(calibration::ThinToBand(log));
+    narrow_.back().channel = channel_;
   }
   diagnosis = std::make_unique<diagnosis::Diagnosis>(*model, catalogue, calibration::Pointers(train),
-                                                     calibration::Pointers(narrow), options.at_turns);
+                                                     calibration::Pointers(narrow_), options.at_turns);
   view.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   const diagnosis::Finding& finding = diagnosis->finding();

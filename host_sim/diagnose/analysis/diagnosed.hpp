@@ -42,7 +42,8 @@ struct Diagnosed {
   Eigen::VectorXd LeftAtSamples() const;
   void WriteJson();
 
-  std::vector<calibration::Dataset> whole_;  // the training logs, not thinned
+  // The training logs, not thinned, and at a lower bandwidth. The diagnosis refers to these and to `train`.
+  std::vector<calibration::Dataset> whole_, narrow_;
   calibration::TorqueChannel channel_;
 };
 

@@ -90,8 +90,9 @@ struct HeldOut {
 class Diagnosis {
  public:
   struct Work;  // work.hpp; the room's own
-  // narrow: the training logs once more, derived with a lower bandwidth; a term that depends on the bandwidth is then
-  // refused. Empty: this is not checked. at_turns: rows near turns and at rest are looked at, too.
+  // The logs outlive the diagnosis. narrow: the training logs once more, derived with a lower bandwidth; a term that
+  // depends on the bandwidth is then refused. Empty: this is not checked. at_turns: rows near turns and at rest are
+  // looked at, too.
   Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
             std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow = {},
             bool at_turns = false);

@@ -111,6 +111,56 @@ std::string Truth(const nlohmann::ordered_json& r) {
   return out.empty() ? "nothing" : out;
 }
 
+// A joint's error on the drive is at the floor of the plant up to this factor.
+constexpr double kAtTheFloor = 1.1;
+
+// What became of an effect that the simulation has: its terms in the verdict decide.
+std::string Became(const ordered_json& effect, const ordered_json& terms) {
+  std::string found = "missed";
+  for (const auto& t : terms) {
+    const bool whole_arm = effect["joint"].is_string();
+    if (!whole_arm && t["joint"] != effect["joint"]) continue;
+    bool named = t["kind"] == effect["kind"];
+    for (const auto& other : t["also_fits"]) named = named || other == effect["kind"];
+    if (!named && (whole_arm || !t["confirmed"].get<bool>())) continue;
+    if (!t["confirmed"].get<bool>()) found = "seen, not confirmed";
+    else if (!t["in_model"].get<bool>()) return "found; no model can hold it";
+    else if (named) return "found";
+    else found = fmt::format("found under another name: {}", t["kind"].get<std::string>());
+  }
+  return found;
+}
+
+// Says for each effect and each joint whether the loop closed there.
+void AddOutcome(ordered_json& r) {
+  bool closed = true;
+  r["effects"] = ordered_json::array();
+  for (const auto& u : r["undeclared"]) {
+    const std::string became = Became(u, r["terms"]);
+    closed = closed && became.starts_with("found") && became.find(';') == std::string::npos;
+    r["effects"].push_back({{"kind", u["kind"]}, {"joint", u["joint"]}, {"became", became}});
+  }
+  r["joints"] = ordered_json::array();
+  for (std::size_t j = 0; j < r["drive_after"].size(); ++j) {
+    const double ratio = r["drive_after"][j].get<double>() / r["plant_floor_after_run"][j].get<double>();
+    closed = closed && ratio <= kAtTheFloor;
+    r["joints"].push_back({{"joint", j + 1}, {"error_over_floor", ratio}, {"closed", ratio <= kAtTheFloor}});
+  }
+  r["closed"] = closed;
+}
+
+std::string Outcome(const ordered_json& r) {
+  std::string out = r["closed"].get<bool>() ? "the loop is closed" : "the loop is NOT closed";
+  for (const auto& e : r["effects"])
+    out += fmt::format("; {} on joint {}: {}", e["kind"].get<std::string>(), Joint(e["joint"]),
+                       e["became"].get<std::string>());
+  for (const auto& j : r["joints"])
+    if (!j["closed"].get<bool>())
+      out += fmt::format("; joint {}: error {:.2f} times the floor", j["joint"].get<int>(),
+                         j["error_over_floor"].get<double>());
+  return out;
+}
+
 std::string Verdict(const nlohmann::ordered_json& r) {
   std::string out;
   for (const auto& t : r["terms"]) {
@@ -125,6 +175,7 @@ std::string Verdict(const nlohmann::ordered_json& r) {
 std::string DemoText(const nlohmann::ordered_json& r) {
   std::string out = fmt::format(
       "\nfound by armcal:    {}\nin the simulation:  {}  (read after the verdict was written)\n", Verdict(r), Truth(r));
+  out += fmt::format("outcome:             {}\n", Outcome(r));
   out += fmt::format("brought to the drive: {}; table CRC {}, read back {}\n\n", r["path"].get<std::string>(),
                      r["table_crc"].get<std::string>(), r["readback_ok"].get<bool>() ? "equal" : "DIFFERENT");
   out += report::Text(ErrorTable(r)) + "\n" + report::Text(TrackingTable(r));
@@ -132,11 +183,12 @@ std::string DemoText(const nlohmann::ordered_json& r) {
 }
 
 void WriteDemoPage(const std::string& path, const nlohmann::ordered_json& r, const verdict::DiagnosisView& view) {
-  report::Page page("The loop, closed: " + r["title"].get<std::string>(),
+  const bool closed = r["closed"].get<bool>();
+  report::Page page((closed ? "The loop, closed: " : "The loop did not close: ") + r["title"].get<std::string>(),
                     "A simulated six-axis drive whose arm has an effect that its model does not declare: measured, "
                     "found, added, flashed, measured again.");
-  page.Box(report::Tone::kGood, "armcal found: " + Verdict(r),
-           "In the simulation there was: " + Truth(r) +
+  page.Box(closed ? report::Tone::kGood : report::Tone::kWarning, "armcal found: " + Verdict(r),
+           Outcome(r) + ". In the simulation there was: " + Truth(r) +
                ". No program but the drive read that before the verdict was written.");
   page.Section("Error before and after");
   page.Add(ErrorTable(r));
@@ -266,10 +318,11 @@ class Demo {
     result["path"] = path;
     result["stages"] = stages_;
     result["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    AddOutcome(result);
     WriteJson(File("result.json"), result);
     WriteDemoPage(File("report.html"), result, run->view);
     fmt::print("{}\nresult: {}\nreport: {}\n", DemoText(result), File("result.json"), File("report.html"));
-    return kOk;
+    return result["closed"].get<bool>() ? kOk : kPartial;
   }
 
  private:
@@ -340,9 +393,10 @@ class Demo {
 }  // namespace
 
 void AddDemo(CLI::App& app, Action& action) {
-  auto* verb = app.add_subcommand("demo",
-                                  "close the loop on the simulated drive: measure, find what is missing, add it, flash "
-                                  "it, measure again\nexample: armcal demo --scenario ripple");
+  auto* verb = app.add_subcommand(
+      "demo",
+      "close the loop on the simulated drive: measure, find what is missing, add it, flash "
+      "it, measure again; ends with 6 where the loop did not close\nexample: armcal demo --scenario ripple");
   auto o = std::make_shared<DemoOptions>();
   verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->capture_default_str();
   verb->add_option("--out", o->out, "folder for everything that is made")->capture_default_str();

@@ -29,6 +29,7 @@ inline double SquareSum(const std::vector<double>& v) {
 // The link kept its word, the page needs no network, identification beat the CAD values, and the held-out error is at
 // the floor that the plant itself sets.
 inline void ExpectSoundLoop(const nlohmann::json& result, const fs::path& folder) {
+  EXPECT_TRUE(result.at("closed").get<bool>());
   EXPECT_TRUE(result.at("readback_ok").get<bool>());
   EXPECT_TRUE(result.at("estimate_same_bits").get<bool>());
   const std::string page = ReadText(folder / "report.html");

@@ -4,7 +4,7 @@
 set -euo pipefail
 build=$(realpath "$1") work=$2 here=$(dirname "$(realpath "$0")")
 rm -rf "$work"
-mkdir -p "$work/root"
+mkdir -p "$work/unpacked"
 work=$(realpath "$work")
 trap '[[ $? == 0 ]] || cat "$work/log"' EXIT
 cd "$build"
@@ -13,11 +13,11 @@ packages=("$work"/package/*.deb)
 [[ ${#packages[@]} == 1 ]]
 depends=$(dpkg-deb -f "${packages[0]}" Depends)
 for library in libc6 libmodbus5 libpagmo8 libfmt9; do [[ $depends == *"$library "* ]] || { echo "no $library: $depends"; exit 1; }; done
-dpkg-deb -x "${packages[0]}" "$work/root"
+dpkg-deb -x "${packages[0]}" "$work/unpacked"
 rm -rf "$work/package/_CPack_Packages"
 
 # Away from the checkout, with nothing that names it.
-usr=$work/root/usr
+usr=$work/unpacked/usr
 cd "$work"
 unset ARMCAL_HOME
 armcal() { "$usr/bin/armcal" "$@" >>"$work/log" 2>&1; }

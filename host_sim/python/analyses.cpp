@@ -12,9 +12,9 @@
 #include "codegen/src/generator/load.hpp"
 #include "host_sim/diagnose/analysis/checked_logs.hpp"
 #include "host_sim/diagnose/analysis/diagnosed.hpp"
+#include "host_sim/diagnose/analysis/evaluated.hpp"
 #include "host_sim/diagnose/analysis/identified.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
-#include "host_sim/identify/calibration/given.hpp"
 #include "host_sim/python/arrays.hpp"
 #include "host_sim/python/bindings.hpp"
 
@@ -41,20 +41,23 @@ std::vector<logs::Log> ReadLogs(nb::handle given, const char* name) {
   return out;
 }
 
-double Frequency(double value_Hz, const char* name) {
+logs::Log ReadTest(nb::handle test) {
+  if (!nb::isinstance<logs::Log>(test)) throw nb::value_error("test: expected a Log");
+  return nb::cast<const logs::Log&>(test);
+}
+
+void CheckFrequency(double value_Hz, const char* name) {
   if (!(value_Hz >= 0 && std::isfinite(value_Hz)))
     throw nb::value_error((std::string(name) + ": expected a frequency, or 0 for none").c_str());
-  return value_Hz;
 }
 
 analysis::Say Into(Notes& notes) {
   return [&notes](const std::string& line) { notes.push_back(line); };
 }
 
-nb::object Warn(const Notes& notes) {
+void Warn(const Notes& notes) {
   for (const std::string& note : notes)
     if (PyErr_WarnEx(PyExc_UserWarning, note.c_str(), 1) != 0) throw nb::python_error();
-  return nb::none();
 }
 
 nb::object ToDict(const ordered_json& json) { return nb::module_::import_("json").attr("loads")(json.dump()); }
@@ -68,8 +71,8 @@ nb::object Identify(const codegen::Model& model, nb::handle train, nb::handle te
                     bool force) {
   const std::vector<logs::Log> logs = ReadLogs(train, "train");
   std::vector<logs::Log> held_out;
-  if (!test.is_none()) held_out = {ReadLogs(test, "test")[0]};
-  Frequency(cutoff_Hz, "cutoff_Hz"), Frequency(band_Hz, "band_Hz");
+  if (!test.is_none()) held_out = {ReadTest(test)};
+  CheckFrequency(cutoff_Hz, "cutoff_Hz"), CheckFrequency(band_Hz, "band_Hz");
   ordered_json json{{"robot", model.robot().name}};
   Notes notes;
   {
@@ -93,7 +96,7 @@ nb::object Identify(const codegen::Model& model, nb::handle train, nb::handle te
 nb::object Evaluate(const codegen::Model& model, nb::handle given_logs, const std::optional<std::string>& table,
                     double cutoff_Hz, double band_Hz) {
   const std::vector<logs::Log> logs = ReadLogs(given_logs, "logs");
-  Frequency(cutoff_Hz, "cutoff_Hz"), Frequency(band_Hz, "band_Hz");
+  CheckFrequency(cutoff_Hz, "cutoff_Hz"), CheckFrequency(band_Hz, "band_Hz");
   ordered_json json{{"robot", model.robot().name}};
   Notes notes;
   {
@@ -102,14 +105,7 @@ nb::object Evaluate(const codegen::Model& model, nb::handle given_logs, const st
     for (const std::string& name : given.missing)
       notes.push_back("no value for " + name + ": the robot file's is taken");
     const std::vector<calibration::Dataset> data = analysis::CheckedLogs(model, logs, cutoff_Hz, Into(notes));
-    std::vector<verdict::Predicted> all;
-    for (const calibration::Dataset& log : data) {
-      all.push_back({&log, calibration::Predict(model, log, given.x, given.eta)});
-      ordered_json row{{"log", log.source}};
-      row.update(verdict::ToJson(verdict::CompareHeldOut({all.back()}, band_Hz)));
-      json["logs"].push_back(row);
-    }
-    if (all.size() > 1) json["together"] = verdict::ToJson(verdict::CompareHeldOut(all, band_Hz));
+    json.update(analysis::Evaluate(model, given, data, band_Hz).json);
   }
   Warn(notes);
   return ToDict(json);
@@ -118,9 +114,8 @@ nb::object Evaluate(const codegen::Model& model, nb::handle given_logs, const st
 nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle test, bool turns, double cutoff_Hz,
                     double gain_tolerance) {
   const std::vector<logs::Log> logs = ReadLogs(train, "train");
-  if (!nb::isinstance<logs::Log>(test)) throw nb::value_error("test: expected a Log");
-  const logs::Log held_out = nb::cast<const logs::Log&>(test);
-  Frequency(cutoff_Hz, "cutoff_Hz");
+  const logs::Log held_out = ReadTest(test);
+  CheckFrequency(cutoff_Hz, "cutoff_Hz");
   if (!(gain_tolerance >= 0 && gain_tolerance <= 0.9))
     throw nb::value_error("gain_tolerance: expected a share from 0 to 0.9");
   ordered_json json;

@@ -69,10 +69,7 @@ std::string Paragraphs(const std::string& description) {
   return out;
 }
 
-std::string Head(const std::string& name) {
-  return fmt::format(".TH \"{}\" 1 \"\" \"armcal {}.{}.{}\"\n", Troff(name), ARMCAL_VERSION >> 16,
-                     ARMCAL_VERSION >> 8 & 0xff, ARMCAL_VERSION & 0xff);
-}
+std::string Head(const std::string& name) { return fmt::format(".TH \"{}\" 1 \"\" \"{}\"\n", Troff(name), Version()); }
 
 std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
 
@@ -98,7 +95,8 @@ std::string VerbPage(const CLI::App& verb) {
 }
 
 std::string TopPage(const CLI::App& app) {
-  std::string page = Head("armcal") + ".SH NAME\n" + Troff("armcal - " + app.get_description().substr(8)) +
+  std::string page = Head("armcal") + ".SH NAME\n" +
+                     Troff("armcal - " + app.get_description().substr(std::string("armcal: ").size())) +
                      "\n.SH SYNOPSIS\n.B armcal\nVERB [OPTIONS]\n.SH VERBS\n";
   for (const CLI::App* verb : Verbs(app))
     page +=
@@ -129,6 +127,10 @@ std::string Completion(const CLI::App& app) {
 }
 
 }  // namespace
+
+std::string Version() {
+  return fmt::format("armcal {}.{}.{}", ARMCAL_VERSION >> 16, ARMCAL_VERSION >> 8 & 0xff, ARMCAL_VERSION & 0xff);
+}
 
 std::string Misspelt(const CLI::App& app, int argc, const char* const* argv) {
   if (argc < 2) return {};

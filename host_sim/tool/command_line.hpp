@@ -7,6 +7,9 @@
 
 namespace armcal::tool {
 
+// "armcal 0.1.0"
+std::string Version();
+
 // One line for the first word that is no verb or no option, with the nearest one; empty: every word is known.
 std::string Misspelt(const CLI::App& app, int argc, const char* const* argv);
 

@@ -115,20 +115,24 @@ std::string Truth(const nlohmann::ordered_json& r) {
 constexpr double kAtTheFloor = 1.1;
 
 // What became of an effect that the simulation has: its terms in the verdict decide.
-std::string Became(const ordered_json& effect, const ordered_json& terms) {
-  std::string found = "missed";
+struct Fate {
+  std::string text;
+  bool in_model = false;
+};
+Fate Became(const ordered_json& effect, const ordered_json& terms) {
+  Fate fate{"missed", false};
   for (const auto& t : terms) {
     const bool whole_arm = effect["joint"].is_string();
     if (!whole_arm && t["joint"] != effect["joint"]) continue;
     bool named = t["kind"] == effect["kind"];
     for (const auto& other : t["also_fits"]) named = named || other == effect["kind"];
     if (!named && (whole_arm || !t["confirmed"].get<bool>())) continue;
-    if (!t["confirmed"].get<bool>()) found = "seen, not confirmed";
-    else if (!t["in_model"].get<bool>()) return "found; no model can hold it";
-    else if (named) return "found";
-    else found = fmt::format("found under another name: {}", t["kind"].get<std::string>());
+    if (!t["confirmed"].get<bool>()) fate = {"seen, not confirmed", false};
+    else if (!t["in_model"].get<bool>()) return {"found; no model can hold it", false};
+    else if (named) return {"found", true};
+    else fate = {fmt::format("found under another name: {}", t["kind"].get<std::string>()), true};
   }
-  return found;
+  return fate;
 }
 
 // Says for each effect and each joint whether the loop closed there.
@@ -136,9 +140,9 @@ void AddOutcome(ordered_json& r) {
   bool closed = true;
   r["effects"] = ordered_json::array();
   for (const auto& u : r["undeclared"]) {
-    const std::string became = Became(u, r["terms"]);
-    closed = closed && became.starts_with("found") && became.find(';') == std::string::npos;
-    r["effects"].push_back({{"kind", u["kind"]}, {"joint", u["joint"]}, {"became", became}});
+    const Fate fate = Became(u, r["terms"]);
+    closed = closed && fate.in_model;
+    r["effects"].push_back({{"kind", u["kind"]}, {"joint", u["joint"]}, {"became", fate.text}});
   }
   r["joints"] = ordered_json::array();
   for (std::size_t j = 0; j < r["drive_after"].size(); ++j) {

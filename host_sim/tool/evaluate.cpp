@@ -2,7 +2,7 @@
 #include <fmt/core.h>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/diagnose/analysis/evaluated.hpp"
 #include "host_sim/tool/given.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -22,21 +22,11 @@ int RunEvaluate(const EvaluateOptions& o) {
   const calibration::Given given = ReadGiven(o.given, model);
   const LogReader read(model, o.channels, o.cutoff_Hz);
   const std::vector<calibration::Dataset> logs = read.All(o.logs);
+  const analysis::Evaluated result = analysis::Evaluate(model, given, logs, o.band_Hz);
+  for (std::size_t k = 0; k < logs.size(); ++k) verdict::PrintHeldOut(result.each[k], logs[k].source);
+  if (result.together) verdict::PrintHeldOut(*result.together, fmt::format("all {} logs as one record", logs.size()));
   nlohmann::ordered_json json = ToJson(o.given, model);
-  std::vector<verdict::Predicted> all;
-  for (const calibration::Dataset& log : logs) {
-    all.push_back({&log, calibration::Predict(model, log, given.x, given.eta)});
-    const verdict::HeldOutError e = verdict::CompareHeldOut({all.back()}, o.band_Hz);
-    verdict::PrintHeldOut(e, log.source);
-    nlohmann::ordered_json row{{"log", log.source}};
-    row.update(verdict::ToJson(e));
-    json["logs"].push_back(row);
-  }
-  if (logs.size() > 1) {
-    const verdict::HeldOutError e = verdict::CompareHeldOut(all, o.band_Hz);
-    verdict::PrintHeldOut(e, fmt::format("all {} logs as one record", logs.size()));
-    json["together"] = verdict::ToJson(e);
-  }
+  json.update(result.json);
   WriteJson(o.json, json);
   return kOk;
 }

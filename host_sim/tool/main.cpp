@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <exception>
 
-#include "armcal/core/version.hpp"
 #include "host_sim/client/errors.hpp"
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -16,8 +15,7 @@ int Main(int argc, char** argv) {
   CLI::App app{
       "armcal: estimate the dynamic parameters of an arm, find what its model lacks, flash the table that mends it"};
   app.require_subcommand(1);
-  app.set_version_flag("--version", fmt::format("armcal {}.{}.{}", ARMCAL_VERSION >> 16, ARMCAL_VERSION >> 8 & 0xff,
-                                                ARMCAL_VERSION & 0xff));
+  app.set_version_flag("--version", Version());
   Action action;
   AddSimulate(app, action);
   AddExcite(app, action);

@@ -38,8 +38,7 @@ std::vector<calibration::Dataset> CheckedLogs(const codegen::Model& model, const
     else if (logs.size() == 1) throw io::InputError(log.source + ": " + lack);
     else say(log.source + ": left out: " + lack);
   }
-  if (out.empty())
-    throw io::InputError((logs.empty() ? "" : logs[0].source + " and others: ") + "none is long enough to be fitted");
+  if (out.empty()) throw io::InputError(logs[0].source + " and others: none is long enough to be fitted");
   const std::vector<const calibration::Dataset*> data = calibration::Pointers(out);
   for (const std::string& note : calibration::CheckRows(model.robot(), data)) say(note);
   for (const std::string& note : calibration::CheckColumns(model, data)) say(note);

@@ -13,8 +13,8 @@ namespace armcal::analysis {
 // Takes what a user should read about a log, a line at a time.
 using Say = std::function<void(const std::string&)>;
 
-// cutoff_Hz: of the derived speeds and accelerations; 0: chosen for each log. A log that is too short is left out where
-// there are others. InputError: a log cannot be one of this arm, or none is long enough.
+// logs: at least one. cutoff_Hz: of the derived speeds and accelerations; 0: chosen for each log. A log that is too
+// short is left out where there are others. InputError: a log cannot be one of this arm, or none is long enough.
 std::vector<calibration::Dataset> CheckedLogs(const codegen::Model& model, const std::vector<logs::Log>& logs,
                                               double cutoff_Hz, const Say& say);
 

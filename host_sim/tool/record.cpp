@@ -6,6 +6,7 @@
 #include "host_sim/client/recording.hpp"
 #include "host_sim/data/logs/log.hpp"
 #include "host_sim/data/report/table.hpp"
+#include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/interrupt.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -31,8 +32,6 @@ VectorXd RmsOf(const logs::Log& log, Value value, Use use) {
   }
   return out;
 }
-
-std::vector<double> List(const VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
 // "work.csv.gz" gives "work.partial.csv.gz", so that nobody takes it for a whole recording.
 std::string PartialPath(const std::string& path) {
@@ -72,9 +71,8 @@ int RunRecord(const client::RecordOptions& o) {
   VectorXd tracking;
   if (log.qref.size() > 0) {
     const auto always = [](Eigen::Index, int) { return true; };
-    tracking = RmsOf(
-        log, [&](Eigen::Index k, int j) { return log.q(k, j) - log.qref(k, j); }, always);
-    json["tracking_rms_rad"] = List(tracking);
+    tracking = RmsOf(log, [&](Eigen::Index k, int j) { return log.q(k, j) - log.qref(k, j); }, always);
+    json["tracking_rms_rad"] = verdict::ToList(tracking);
     table.header.push_back("tracking error rms / mrad");
   }
   const auto v_min = [&](int j) { return robot.joint[j].v_min_radps; };
@@ -85,7 +83,7 @@ int RunRecord(const client::RecordOptions& o) {
     residual = RmsOf(
         played, [&](Eigen::Index k, int j) { return played.tau(k, j) - played.tauff(k, j); },
         [&](Eigen::Index k, int j) { return std::abs(played.qd(k, j)) > v_min(j); });
-    json["drive_residual_rms_Nm"] = List(residual);
+    json["drive_residual_rms_Nm"] = verdict::ToList(residual);
     json["generation"] = samples.generations.empty() ? 0 : samples.generations.back();
     table.header.push_back("measured - committed model / N m");
   }

@@ -6,6 +6,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/report/table.hpp"
+#include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/identify/calibration/log_check.hpp"
 #include "host_sim/identify/replay/position_error.hpp"
 #include "host_sim/identify/replay/refine.hpp"
@@ -32,12 +33,11 @@ const char* UnitOf(const codegen::Joint& joint) {
   return joint.kinematics.type == codegen::JointType::kPrismatic ? "mm" : "mrad";
 }
 
-std::vector<double> List(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
-
 nlohmann::ordered_json ToJson(const replay::PositionError& e, const std::string& log) {
   nlohmann::ordered_json json{{"log", log}, {"start_s", e.start_s}, {"length_s", e.length_s}};
-  for (const auto& after : e.after) json["after"].push_back({{"seconds", after.seconds}, {"error", List(after.error)}});
-  json["rms"] = List(e.rms), json["most"] = List(e.most);
+  for (const auto& after : e.after)
+    json["after"].push_back({{"seconds", after.seconds}, {"error", verdict::ToList(after.error)}});
+  json["rms"] = verdict::ToList(e.rms), json["most"] = verdict::ToList(e.most);
   if (e.ran_away_s > 0) json["ran_away_s"] = e.ran_away_s;
   if (e.left_limits_s > 0) json["left_limits_s"] = e.left_limits_s;
   return json;
@@ -165,9 +165,10 @@ int RunReplay(const ReplayOptions& o) {
       training.push_back(replay::MakeTraining(read.Raw(o.refine[l]), data[l]));
     const replay::Refined refined = replay::Refine(model, training, fit, o.refinement);
     PrintRefined(model, refined, fit);
-    json["refine"] = {{"train", o.refine},        {"segment_s", refined.segment_s}, {"segments", refined.segments},
-                      {"tries", refined.tries},   {"agree", refined.agree},         {"rms", List(refined.rms)},
-                      {"seed", o.refinement.seed}};
+    json["refine"] = {
+        {"train", o.refine},        {"segment_s", refined.segment_s}, {"segments", refined.segments},
+        {"tries", refined.tries},   {"agree", refined.agree},         {"rms", verdict::ToList(refined.rms)},
+        {"seed", o.refinement.seed}};
     for (const auto& l : refined.lengths)
       json["refine"]["lengths"].push_back({{"segment_s", l.segment_s}, {"left_out_error", l.error}});
     PutParameters(model, refined, json);

@@ -1,4 +1,6 @@
 // end-to-end tests - diagnose many logs at once, some of them bad, and the runs of one arm with each held out once.
+#include <fstream>
+
 #include "host_sim/data/logs/log.hpp"
 #include "tests/e2e/tool.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"

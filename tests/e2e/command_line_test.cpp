@@ -1,5 +1,6 @@
 // end-to-end tests - misspell the command line, complete it in bash, and read the manual pages.
 #include <set>
+#include <sstream>
 
 #include "tests/e2e/tool.hpp"
 

@@ -1,6 +1,7 @@
 // end-to-end tests - run the closed loop once, and check what every such run must give.
 #pragma once
 
+#include <algorithm>
 #include <regex>
 
 #include "tests/e2e/tool.hpp"

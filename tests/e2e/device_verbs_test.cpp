@@ -1,5 +1,6 @@
 // end-to-end tests - the verbs for a technician at a drive, and a port that may only be read.
 #include <fmt/core.h>
+#include <fstream>
 
 #include "armcal/core/crc.hpp"
 #include "codegen/src/generator/load.hpp"

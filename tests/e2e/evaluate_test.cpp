@@ -1,5 +1,6 @@
 // end-to-end tests - evaluate and replay judge a given model: figures worked out by hand, and faults that must show.
 #include <cmath>
+#include <fstream>
 #include <numbers>
 
 #include "tests/e2e/tool.hpp"

@@ -1,4 +1,5 @@
 // end-to-end tests - change an arm while it works: armcal health names the joint, armcal learning holds and resets.
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <numbers>

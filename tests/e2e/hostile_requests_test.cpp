@@ -1,5 +1,6 @@
 // end-to-end tests - sends a running drive requests that no honest client sends. It refuses them and goes on.
 #include <gtest/gtest.h>
+#include <algorithm>
 
 #include <thread>
 #include <vector>

@@ -1,4 +1,6 @@
 // end-to-end tests - a URDF as it comes: import, generate, excite, identify, diagnose, with no editing between.
+#include <algorithm>
+#include <fstream>
 #include <sstream>
 
 #include "tests/e2e/own_arms.hpp"

@@ -1,5 +1,6 @@
 // end-to-end tests - compare the verbs on public measured logs with published parameters and a bar of our own.
 #include <cstdlib>
+#include <fstream>
 #include <iterator>
 #include <map>
 #include <numeric>

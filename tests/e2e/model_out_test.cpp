@@ -1,8 +1,10 @@
 // end-to-end tests - write a finding that no model can hold: --model-out says so and writes no effect.
+#include <algorithm>
 #include <iomanip>
 #include <numbers>
 #include <random>
 #include <regex>
+#include <sstream>
 
 #include "host_sim/data/logs/log.hpp"
 #include "tests/e2e/tool.hpp"

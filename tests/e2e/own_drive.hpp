@@ -1,6 +1,8 @@
 // end-to-end tests - a user's own arm on its simulated drive, from the URDF to a verdict with no editing between.
 #pragma once
 
+#include <fstream>
+
 #include "tests/e2e/own_arms.hpp"
 
 namespace armcal::tests {

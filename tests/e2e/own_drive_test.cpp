@@ -1,5 +1,11 @@
 // end-to-end tests - the drive of a robot that armcal was not built with: compiled once, whatever goes wrong meanwhile.
+#include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <algorithm>
+#include <csignal>
+#include <fstream>
 
 #include "tests/e2e/own_drive.hpp"
 

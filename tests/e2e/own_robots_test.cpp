@@ -1,4 +1,6 @@
 // end-to-end tests - three arms that armcal was not built with: import, excite, simulate, record, identify, diagnose.
+#include <algorithm>
+
 #include "tests/e2e/own_drive.hpp"
 
 namespace armcal::tests {

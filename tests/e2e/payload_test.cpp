@@ -1,4 +1,6 @@
 // end-to-end tests - find the gains of drives and a payload in two runs of a simulated drive with a known truth.
+#include <fstream>
+
 #include "host_sim/machine/plant/truth.hpp"
 #include "tests/e2e/tool.hpp"
 
@@ -21,8 +23,8 @@ class Payload : public testing::Test {
   std::string Record(const std::string& name, const std::string& scenario, const std::string& purpose) {
     const std::string trajectory = (folder_ / (name + "_path.csv")).string(),
                       log = (folder_ / (name + ".csv.gz")).string();
-    const Outcome made =
-        Tool({"excite", "--robot", "er20_like", "--purpose", purpose, "--starts", "3", "--seconds", "60", "--out", trajectory});
+    const Outcome made = Tool({"excite", "--robot", "er20_like", "--purpose", purpose, "--starts", "3", "--seconds",
+                               "60", "--out", trajectory});
     EXPECT_EQ(made.code, 0) << made.err;
     fs::create_directories(folder_ / name);
     const RunningDrive drive(folder_ / name, Write(name + ".toml", scenario));

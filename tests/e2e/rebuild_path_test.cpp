@@ -1,4 +1,6 @@
 // end-to-end tests - close the loop with a model that is generated anew, and with a scenario of a stranger.
+#include <fstream>
+
 #include "tests/e2e/demo_run.hpp"
 
 namespace armcal::tests {

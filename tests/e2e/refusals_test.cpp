@@ -1,5 +1,6 @@
 // end-to-end tests - give bad files, tables and links: each ends in its exit code and one line, nothing half written.
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <thread>
 

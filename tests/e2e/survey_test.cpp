@@ -1,4 +1,6 @@
 // end-to-end tests - compare armcal survey on fresh draws with the survey, and try every curve of armcal excite.
+#include <algorithm>
+
 #include "tests/e2e/tool.hpp"
 
 namespace armcal::tests {

@@ -1,4 +1,6 @@
 // end-to-end tests - close the loop by a table alone, with a control run, and check the drive's estimate in double.
+#include <algorithm>
+
 #include "armcal/controller/trace_records.hpp"
 #include "armcal/filter/forgetting_filter.hpp"
 #include "codegen/generated/er20_like/model.hpp"

@@ -1,4 +1,7 @@
 // end-to-end tests - an arm whose URDF holds placeholders for friction and no word of rotors: all of it is found.
+#include <unistd.h>
+#include <fstream>
+
 #include "tests/e2e/urdf_arm.hpp"
 
 namespace armcal::tests {

@@ -8,8 +8,9 @@
 #include <cmath>
 
 #include "host_sim/identify/calibration/band.hpp"
-#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/calibration/barrier_fit.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
+#include "host_sim/identify/calibration/payload.hpp"
 
 namespace armcal::calibration {
 
@@ -19,18 +20,15 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kLoad = 10;
-constexpr double kFriction = 0.3;  // by which a joint's friction may differ between two runs: warm or cold gears
-constexpr double kGain = 0.03;     // the same of a torque constant: warm or cold magnets
-constexpr double kWide = 10;       // a prior that says nothing: one column alone may make so many times the residual
-constexpr double kReach_m = 0.5;   // true of any load: its mass lies about this far from the flange
-constexpr double kFarthest_m = 2;  // of a load's centre from the flange
-constexpr double kNamed = 15;      // score of each half; odds of e^7 to one
-constexpr double kSeen = 4;        // standard deviations by which a mass must differ from zero
+constexpr double kFriction = 0.3;     // by which a joint's friction may differ between two runs: warm or cold gears
+constexpr double kGain = 0.03;        // the same of a torque constant: warm or cold magnets
+constexpr double kWideResidual = 10;  // a prior that says nothing: one column alone may make so many times the residual
+constexpr double kFarthest_m = 2;     // of a load's centre from the flange
+constexpr double kNamed = 15;         // score of each half; odds of e^7 to one
 // Of the errors on the other half: geometric mean over the joints, and of one joint that gains. Wrong friction and
 // magnets that warm up gained 8 % at most in 20 draws.
 constexpr double kWorthIt = 0.9, kJointGains = 0.95;
-constexpr int kRounds = 6;       // of noise, prior and load; three settle
+constexpr int kNoiseRounds = 6;  // of noise, prior and load; three settle
 constexpr int kFewestRows = 20;  // of a joint in one half
 
 // One joint's rows of one half: residual, and the columns [what may differ between runs, load].
@@ -79,7 +77,10 @@ class LoadOfRun {
  public:
   LoadOfRun(const codegen::Model& model, const Fit& fit, const VectorXd& sigma, const Dataset& run,
             const MatrixXd& residual)
-      : n_(model.joints()), differ_(static_cast<int>(fit.active.size()) + n_), size_(differ_ + kLoad), sigma_(sigma) {
+      : n_(model.joints()),
+        differ_(static_cast<int>(fit.active.size()) + n_),
+        size_(differ_ + kLoadParameters),
+        sigma_(sigma) {
     Eigen::Matrix4d flange = Eigen::Matrix4d::Identity();
     flange.topLeftCorner<3, 3>() =
         Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(model.robot().tool_rotation.data());
@@ -102,7 +103,7 @@ class LoadOfRun {
         else if (c == model.columns() + j) A.col(a) = model_torque;
       }
       A.col(active + j) = run.tau.col(j);
-      A.rightCols(kLoad) = (1 + fit.x[model.columns() + j]) * (body[at] * to_link);
+      A.rightCols(kLoadParameters) = (1 + fit.x[model.columns() + j]) * (body[at] * to_link);
       for (Index c = 0; c < size_; ++c)
         if (c < active || c >= differ_) A.col(c) = ThroughChannel(run, j, AsSaved(run, j, A.col(c)));
       for (int half = 0; half < 2; ++half) {
@@ -135,7 +136,7 @@ class LoadOfRun {
     MatrixXd prior = prior_.topLeftCorner(size, size);
     if (same_gains) prior.diagonal().segment(differ_ - n_, n_).setZero();
     if (with) Widen(gram, halves, prior);
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kNoiseRounds; ++round) {
       const MatrixXd L = CovarianceRoot(prior);
       MatrixXd H = MatrixXd::Zero(size, size);
       for (int j = 0; j < n_; ++j) H += gram[static_cast<std::size_t>(j)] / out.variance[j];
@@ -154,10 +155,9 @@ class LoadOfRun {
         }
         out.variance[j] = std::max(sum / count[j], sigma_[j] * sigma_[j]) * inflation;
       }
-      // The load's mass is known after the first round. The prior of m c and I is that of a load with reach kReach_m.
+      // The load's mass is known after the first round. It says where the load may be.
       if (with)
-        for (int i = 1; i < kLoad; ++i)
-          prior(differ_ + i, differ_ + i) = std::pow(out.x[differ_] * (i < 4 ? kReach_m : kReach_m * kReach_m), 2);
+        for (int i = 1; i < kLoadParameters; ++i) prior(differ_ + i, differ_ + i) = LoadVariance(i, out.x[differ_]);
     }
     return out;
   }
@@ -177,7 +177,7 @@ class LoadOfRun {
     const VectorXd left = own.r - own.A.leftCols(e.x.size()) * e.x;
     return static_cast<double>(left.size()) / VarianceInflation(left, Eigen::VectorXi::Ones(left.size()));
   }
-  VectorXd Load(const Estimate& e) const { return e.x.tail(kLoad); }
+  VectorXd Load(const Estimate& e) const { return e.x.tail(kLoadParameters); }
   double MassSd(const Estimate& e) const { return std::sqrt(std::max(0.0, e.covariance(differ_, differ_))); }
   // What each joint's torque gives of the mass.
   VectorXd MassShares(const Estimate& e) const { return e.share.row(differ_); }
@@ -206,7 +206,7 @@ class LoadOfRun {
         prior_(a, a) += kFriction * kFriction * size / column;
   }
   void Widen(const std::vector<MatrixXd>& gram, const std::vector<int>& halves, MatrixXd& prior) const {
-    for (int i = 0; i < kLoad; ++i) {
+    for (int i = 0; i < kLoadParameters; ++i) {
       double size = 0;
       for (int j = 0; j < n_; ++j) {
         double square = 0;
@@ -214,7 +214,7 @@ class LoadOfRun {
         if (const double own = gram[static_cast<std::size_t>(j)](differ_ + i, differ_ + i); own > 0)
           size = std::max(size, square / own);
       }
-      prior(differ_ + i, differ_ + i) = kWide * kWide * size;
+      prior(differ_ + i, differ_ + i) = kWideResidual * kWideResidual * size;
     }
   }
 
@@ -254,7 +254,7 @@ VectorXd Carried::Coordinates(const codegen::Model& model, int which) const {
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(model.robot().tool_rotation.data());
   flange.topRightCorner<3, 1>() = Eigen::Map<const Eigen::Vector3d>(model.robot().tool_xyz_m.data());
   VectorXd out = VectorXd::Zero(model.columns() + model.joints());
-  out.segment(model.front(), model.rigid()) = model.base_map().middleCols(11 * (model.joints() - 1), kLoad) *
+  out.segment(model.front(), model.rigid()) = model.base_map().middleCols(11 * (model.joints() - 1), kLoadParameters) *
                                               (BodyMap(flange) * half[static_cast<std::size_t>(which)]);
   return out;
 }
@@ -294,7 +294,7 @@ Carried FindCarried(const codegen::Model& model, const Fit& fit, const VectorXd&
   out.interval_kg = {out.mass_kg - spread, out.mass_kg + spread};
   const Eigen::Vector3d centre_m = out.load.segment<3>(1) / out.mass_kg;
   out.named = std::min(out.score[0], out.score[1]) > kNamed && std::max(out.factor[0], out.factor[1]) < kWorthIt &&
-              out.joints > 1 && std::abs(out.mass_kg) > kSeen * out.sd_kg && centre_m.norm() < kFarthest_m;
+              out.joints > 1 && std::abs(out.mass_kg) > kMassSeen * out.sd_kg && centre_m.norm() < kFarthest_m;
   for (const double mass_kg : {out.half[0][0], out.half[1][0], beside_gains_kg[0], beside_gains_kg[1]})
     out.named = out.named && mass_kg * out.mass_kg > 0;
   return out;

@@ -16,14 +16,12 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kLoad = 10;
-constexpr double kWide =
+constexpr double kWideTorque =
     100;  // a prior so wide that it says nothing: a column alone may make this many times the torque
 constexpr double kWideGain = 10;    // the same for a gain
-constexpr double kReach_m = 0.5;    // true of any load: its mass lies about this far from the flange
 constexpr double kTolerance = 0.1;  // of a torque constant whose tolerance the robot file does not state
-constexpr double kSeen = 4;         // standard deviations by which a mass must differ from zero
 constexpr int kMostRounds = 40;
+constexpr double kReach_m = 0.5;  // true of any load: its mass lies about this far from the flange
 
 // Coordinates [columns, kappa (one a joint), load]; measured torque_j = (1 + kappa_j) (Y_j p + P_j load).
 class LoadFit {
@@ -36,7 +34,7 @@ class LoadFit {
     flange.topRightCorner<3, 1>() = Eigen::Map<const Eigen::Vector3d>(model.robot().tool_xyz_m.data());
     to_link_ = BodyMap(flange);
     eta_ = MeanUnknowns(model);
-    sum_.assign(n_, MatrixXd::Zero(columns_ + kLoad + 1, columns_ + kLoad + 1));
+    sum_.assign(n_, MatrixXd::Zero(columns_ + kLoadParameters + 1, columns_ + kLoadParameters + 1));
     rows_.setZero(n_), sigma_.resize(n_), inflation_.setOnes(n_);
     for (int j = 0; j < n_; ++j) sigma_[j] = model.robot().joint[j].torque_noise_Nm;
     ForEachLog([&](const Dataset& log, const std::vector<MatrixXd>& raw) {
@@ -46,10 +44,10 @@ class LoadFit {
         rows_[j] += log.used.col(j).sum();
       }
     });
-    const int size = columns_ + n_ + kLoad;
+    const int size = columns_ + n_ + kLoadParameters;
     prior_.mean.conservativeResizeLike(VectorXd::Zero(size));
     prior_.covariance.conservativeResizeLike(MatrixXd::Zero(size, size));
-    for (int i = 0; i < kLoad; ++i) Widen(load(i), columns_ + i), prior_.active.push_back(load(i));
+    for (int i = 0; i < kLoadParameters; ++i) Widen(load(i), columns_ + i), prior_.active.push_back(load(i));
   }
 
   int gain(int joint) const { return columns_ + joint; }
@@ -57,8 +55,8 @@ class LoadFit {
   double value(int c) const { return x_[c]; }
   double sd(int c) const { return std::sqrt(std::max(0.0, covariance_(c, c))); }
   double prior_sd(int c) const { return std::sqrt(prior_.covariance(c, c)); }
-  VectorXd LoadValue() const { return x_.tail(kLoad); }
-  MatrixXd LoadCovariance() const { return covariance_.bottomRightCorner(kLoad, kLoad); }
+  VectorXd LoadValue() const { return x_.tail(kLoadParameters); }
+  MatrixXd LoadCovariance() const { return covariance_.bottomRightCorner(kLoadParameters, kLoadParameters); }
   bool converged() const { return converged_; }
 
   // Makes the prior of the arm so wide that it says nothing. `gains`: the same for the gains; only their sign is known.
@@ -71,11 +69,11 @@ class LoadFit {
       prior_.covariance(gain(j), gain(j)) = kWideGain * kWideGain, prior_.active.push_back(gain(j));
   }
   void KnowLoad(const codegen::Payload& known) {
-    VectorXd body = VectorXd::Zero(kLoad);
+    VectorXd body = VectorXd::Zero(kLoadParameters);
     body[0] = known.mass_kg;
     if (known.center_m) std::copy(known.center_m->begin(), known.center_m->end(), body.data() + 1);
     if (known.inertia_kgm2) std::copy(known.inertia_kgm2->begin(), known.inertia_kgm2->end(), body.data() + 4);
-    const int count = known.inertia_kgm2 ? kLoad : known.center_m ? 4 : 1;
+    const int count = known.inertia_kgm2 ? kLoadParameters : known.center_m ? 4 : 1;
     const VectorXd origin = ToOrigin(body);
     for (int i = 0; i < count; ++i) prior_.mean[load(i)] = origin[i], std::erase(prior_.active, load(i));
   }
@@ -92,9 +90,8 @@ class LoadFit {
       x_ = next;
       for (int j = 0; j < n_; ++j)
         if (rows_[j] > 0) sigma_[j] = std::max(1e-12, std::sqrt(Square(j, Residual(j)) / rows_[j]));
-      // The load's mass is known after the first round. The prior of m c and I is that of a load with reach kReach_m.
-      for (int i = 1; i < kLoad; ++i)
-        prior_.covariance(load(i), load(i)) = std::pow(x_[load(0)] * (i < 4 ? kReach_m : kReach_m * kReach_m), 2);
+      // The load's mass is known after the first round. It says where the load may be.
+      for (int i = 1; i < kLoadParameters; ++i) prior_.covariance(load(i), load(i)) = LoadVariance(i, x_[load(0)]);
     }
     Inflate();
     Step(prior_.active);  // again, for a covariance that counts residuals which are not white
@@ -110,9 +107,9 @@ class LoadFit {
         model_.Regressor(log->s, {prior_.mean.data(), static_cast<std::size_t>(columns_)}, eta_, raw);
         if (carrying) model_.BodyColumns(log->s, n_ - 1, body);
         for (int j = 0; j < n_; ++j) {
-          raw[j].conservativeResize(Eigen::NoChange, columns_ + kLoad + 1);
-          if (carrying) raw[j].middleCols(columns_, kLoad) = body[j] * to_link_;
-          else raw[j].middleCols(columns_, kLoad).setZero();
+          raw[j].conservativeResize(Eigen::NoChange, columns_ + kLoadParameters + 1);
+          if (carrying) raw[j].middleCols(columns_, kLoadParameters) = body[j] * to_link_;
+          else raw[j].middleCols(columns_, kLoadParameters).setZero();
           raw[j].rightCols(1) = log->tau.col(j);
         }
         visit(*log, raw);
@@ -121,17 +118,18 @@ class LoadFit {
   void Widen(int coordinate, int column) {
     double size = 0;
     for (const MatrixXd& s : sum_)
-      if (s(column, column) > 0) size = std::max(size, s(columns_ + kLoad, columns_ + kLoad) / s(column, column));
-    prior_.covariance(coordinate, coordinate) = kWide * kWide * size;
+      if (s(column, column) > 0)
+        size = std::max(size, s(columns_ + kLoadParameters, columns_ + kLoadParameters) / s(column, column));
+    prior_.covariance(coordinate, coordinate) = kWideTorque * kWideTorque * size;
   }
   // (1 + kappa_j) (p, load) as weights of joint j's columns.
   VectorXd Weights(int j) const {
-    VectorXd w(columns_ + kLoad);
-    w << x_.head(columns_), x_.tail(kLoad);
+    VectorXd w(columns_ + kLoadParameters);
+    w << x_.head(columns_), x_.tail(kLoadParameters);
     return (1 + x_[gain(j)]) * w;
   }
   VectorXd Residual(int j) const {
-    VectorXd r(columns_ + kLoad + 1);
+    VectorXd r(columns_ + kLoadParameters + 1);
     r << -Weights(j), 1;
     return r;
   }
@@ -139,13 +137,13 @@ class LoadFit {
 
   // One step of Gauss and Newton's: every sum it needs is one of raw columns.
   VectorXd Step(const std::vector<int>& active) {
-    const int size = static_cast<int>(x_.size()), raw = columns_ + kLoad + 1;
+    const int size = static_cast<int>(x_.size()), raw = columns_ + kLoadParameters + 1;
     Information info(n_, size);
     for (int j = 0; j < n_; ++j) {
       const double scale = 1 + x_[gain(j)];
       MatrixXd D = MatrixXd::Zero(raw, size);  // derivatives as sums of raw columns
       D.topLeftCorner(columns_, columns_).diagonal().setConstant(scale);
-      D.block(columns_, load(0), kLoad, kLoad).diagonal().setConstant(scale);
+      D.block(columns_, load(0), kLoadParameters, kLoadParameters).diagonal().setConstant(scale);
       D.col(gain(j)).head(raw - 1) = Weights(j) / scale;
       VectorXd target = VectorXd::Zero(raw);  // measured - predicted + D x
       target << x_[gain(j)] / scale * Weights(j), 1;
@@ -186,12 +184,12 @@ void RequireLoad(const LoadFit& fit, const LoadLogs& logs) {
   const double mass = fit.value(fit.load(0)), sd = fit.sd(fit.load(0));
   const std::string& name = logs.with.front()->source;
   if (!std::isfinite(mass)) throw io::InputError(name + ": no load fits these logs");
-  if (mass < -kSeen * sd)
+  if (mass < -kMassSeen * sd)
     throw io::InputError(
         fmt::format("{}: the load's mass comes out as {:.3g} +- {:.2g} kg: are the logs with and "
                     "without it exchanged?",
                     name, mass, sd));
-  if (mass < kSeen * sd)
+  if (mass < kMassSeen * sd)
     throw io::InputError(
         fmt::format("{}: no load is seen (mass {:.3g} +- {:.2g} kg), expected a run with a payload at "
                     "the flange",
@@ -207,6 +205,8 @@ LoadFit Unknown(const codegen::Model& model, const LoadLogs& logs) {
 }
 
 }  // namespace
+
+double LoadVariance(int i, double mass_kg) { return std::pow(mass_kg * (i < 4 ? kReach_m : kReach_m * kReach_m), 2); }
 
 std::vector<DriveGain> FindDriveGains(const codegen::Model& model, const LoadLogs& logs,
                                       const codegen::Payload& known) {
@@ -240,7 +240,7 @@ Load FindLoad(const codegen::Model& model, const LoadLogs& logs) {
   load.body = ToCentre(body);
   const MatrixXd to_centre = OriginJacobian(load.body).inverse();
   load.sd = (to_centre * covariance * to_centre.transpose()).diagonal().cwiseSqrt();
-  for (int i = 0; i < kLoad; ++i)
+  for (int i = 0; i < kLoadParameters; ++i)
     load.determined.push_back(fit.sd(fit.load(i)) < kFromPrior * fit.prior_sd(fit.load(i)));
   return load;
 }

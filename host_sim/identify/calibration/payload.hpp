@@ -20,6 +20,12 @@
 
 namespace armcal::calibration {
 
+constexpr int kLoadParameters = 10;  // m, m c and I about the flange's origin
+constexpr double kMassSeen = 4;      // standard deviations by which a mass must differ from zero
+
+// Variance of a load's parameter i > 0 where nothing but its mass is known: it lies about half a metre from the flange.
+double LoadVariance(int i, double mass_kg);
+
 struct LoadLogs {
   std::vector<const Dataset*> without, with;
 };

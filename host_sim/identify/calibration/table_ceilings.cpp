@@ -34,7 +34,7 @@ struct Compiled {
   std::vector<model::ParameterCeiling> parameter;
 };
 
-std::string Named(const TableFile& t, const core::Refusal& r) {
+std::string InWords(const TableFile& t, const core::Refusal& r) {
   const std::string name = WordName(t, r.word);
   switch (r.status) {
     case core::Status::kNotFinite:
@@ -123,12 +123,12 @@ std::string BeyondCeiling(const codegen::Model& m, const TableFile& t) {
   const std::vector<std::uint16_t> words = EncodeTable(t);
   // Only the board knows whether it allows a bumpless table, so the drive is left to say it.
   const core::Refusal refusal = model::CheckWords(compiled.View(), true, words.data());
-  if (!core::IsOk(refusal.status)) return Named(t, refusal);
+  if (!core::IsOk(refusal.status)) return InWords(t, refusal);
   const core::Refusal friction = JudgeGrid(m, ceilings, compiled.View(), t);
   if (friction.status == core::Status::kBeyondCeiling)
     return fmt::format("{}: the joint's friction would reach {:.6g} N m (N), expected at most {:.6g}",
                        WordName(t, friction.word), friction.value, friction.bound);
-  return core::IsOk(friction.status) ? "" : Named(t, friction);
+  return core::IsOk(friction.status) ? "" : InWords(t, friction);
 }
 
 }  // namespace armcal::calibration

@@ -32,7 +32,7 @@ struct JointRows {
 };
 
 constexpr int kOrder = 10;            // of the residual's autoregressive model
-constexpr int kRounds = 2;            // in which it is fitted again
+constexpr int kWeightRounds = 2;      // in which it is fitted again
 constexpr double kSameColumn = 1e-5;  // share of a column's norm: a shorter direction repeats others
 constexpr double kNegligible = 1e-3;  // the same for what instruments leave: so small a noise biases by its square
 constexpr double kTold = 0.1;         // share of such a direction that must lie outside the columns; below, instruments
@@ -124,7 +124,7 @@ JointExogeneity AugmentedRegression(const JointRows& rows) {
   // Least squares takes slow noise for slow columns, so its residual looks faster than the noise is. The solution of
   // the whitened rows does not (Cochrane and Orcutt).
   VectorXd a = Autoregression(residual, rows.pieces);
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kWeightRounds; ++round) {
     const MatrixXd white = Whiten(plain_part, a, rows.pieces);
     if (white.rows() <= k) return out;
     const LeastSquares fit(SelfProduct(white), k);

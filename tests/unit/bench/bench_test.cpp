@@ -1,5 +1,6 @@
 // bench tests - what armcal bench writes, and that it compares like with like. No test judges a time.
 #include <gtest/gtest.h>
+#include <fstream>
 
 #include <cmath>
 #include <set>

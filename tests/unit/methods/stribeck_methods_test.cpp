@@ -46,12 +46,12 @@ double FrictionError(const SyntheticArm& arm, const Law& law, const VectorXd& z)
   return sum / 8;
 }
 
-struct Draw {
+struct DrawnArm {
   SyntheticArm arm;
   Law law;
   Dataset data;
   Problem problem;
-  explicit Draw(std::uint64_t seed)
+  explicit DrawnArm(std::uint64_t seed)
       : arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), seed), law(seed) {
     data = arm.Run(
         20, 100 + seed,
@@ -72,7 +72,7 @@ void Judge(Solve solve, const char* name, int first = 1) {
   double sum = 0, worst = 0, prior = 0, seconds = 0;
   constexpr int kDraws = 10;
   for (int seed = first; seed < first + kDraws; ++seed) {
-    const Draw draw(seed);
+    const DrawnArm draw(seed);
     const Solution s = solve(draw.problem);
     ASSERT_TRUE(s.z.allFinite()) << name << seed;
     const double e = FrictionError(draw.arm, draw.law, s.z);
@@ -106,13 +106,13 @@ Solution InformedLogEkf(const Problem& problem) {
 
 TEST(LogEkf, FindsStribeckTruths) { Judge(InformedLogEkf, "log_ekf", 11); }
 TEST(LogEkf, WithoutAnIdeaOfTheAmplitude_SaysThatItMayBeWrong) {
-  EXPECT_NE(LogEkf(Draw(1).problem).remark.find("no prior mean"), std::string::npos);
+  EXPECT_NE(LogEkf(DrawnArm(1).problem).remark.find("no prior mean"), std::string::npos);
 }
 TEST(VariableProjection, FindsStribeckTruths) { Judge(VariableProjection, "variable_projection"); }
 TEST(StribeckBasis, FindsStribeckTruths) { Judge(StribeckBasis, "stribeck_basis"); }
 
 TEST(VariableProjection, FromAFarStart_ReachesTheSameMinimum) {
-  const Draw draw(3);
+  const DrawnArm draw(3);
   Problem far = draw.problem;
   const Solution near = VariableProjection(draw.problem);
   far.covariance.bottomRightCorner(4, 4) *= 1e6;  // no opinion on eta: the start must not matter

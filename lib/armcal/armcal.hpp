@@ -6,7 +6,9 @@
 // that a client stores over Modbus. An estimate never becomes torque by itself: somebody reads it, checks it and stores
 // it as a new table. The library uses C++17, float32 and no heap, and throws no exception.
 //
-// Three contexts call it. Each public function says which one it belongs to ("Context: ...").
+// A firmware has three contexts. The comment of a file, a class or a function names the context that may call it
+// ("Context: ..."). If a function names none, that of its class holds. Functions that only compute may be called from
+// any context.
 //   tick              an interrupt, usually every millisecond: FeedForward, then Push. Bounded time, whatever is
 //                     measured. It never waits.
 //   serial interrupt  your driver moves bytes between the line and its rings. It calls nothing of the library.
@@ -28,7 +30,7 @@
 //   for (;;) { modbus.Poll(); if (!controller.Step()) Sleep(); }
 //
 // Where to go on:
-//   model/sample.hpp                what the tick hands over, and what becomes of it
+//   model/sample.hpp               what the tick hands over, and what becomes of it
 //   controller/controller.hpp      all calls of the lines above
 //   estimator/estimator.hpp        one filter without the rest: samples in, estimates out
 //   filter/*_filter.hpp            the filters, and what each is good for

@@ -10,7 +10,7 @@
 
 namespace armcal::eigen {
 
-// Where a failed assertion of Eigen ends: at the core's undefined instruction, which is a fault.
+// Eigen calls this when one of its assertions fails. It executes an undefined instruction, so the core raises a fault.
 [[noreturn]] inline void Trap() { __builtin_trap(); }
 
 }  // namespace armcal::eigen
@@ -37,16 +37,16 @@ Eigen::Map<const Eigen::Matrix<float, n, 1>> View(const float (&values)[n]) {
   return Eigen::Map<const Eigen::Matrix<float, n, 1>>(values);
 }
 
-// Writes the covariance of m chosen columns of a filter of the Kalman forms into a matrix of the caller's. The filter
-// holds packed factors only, so the block is a sum over all columns: Begin, then Step until it answers true. No row may
-// come in between. Context: background.
+// Writes the covariance of m chosen columns of a filter of the Kalman forms into a matrix of the caller. The filter
+// holds packed factors only, so the block is a sum over all columns: Begin, then Step until it returns true. The filter
+// must not take a row before that. Context: background.
 template <class Filter, int m>
 class CovarianceBlock {
  public:
   using Block = Eigen::Matrix<float, m, m>;
 
   // columns: numbers of filter columns, each below Filter::kSize. scale [Filter::kSize]: AdoptedTable::scale; the block
-  // is then in the parameters' own units. nullptr: in prior units. `block` stays until the end.
+  // is then in the parameters' own units. nullptr: in prior units. `block` must live until the end.
   void Begin(const int (&columns)[m], const float* scale, Block& block) {
     for (int k = 0; k < m; ++k) {
       eigen_assert(columns[k] >= 0 && columns[k] < Filter::kSize);
@@ -58,7 +58,8 @@ class CovarianceBlock {
     next_ = 0;
   }
 
-  // Works `count` terms of the sum in, about 4 Filter::kSize + 3 m^2 instructions each. True: all of them are in.
+  // Adds `count` terms of the sum, about 4 Filter::kSize + 3 m^2 instructions each. Returns true when all terms are
+  // added.
   bool Step(const Filter& filter, int count) {
     for (; count > 0 && next_ < Filter::kSize; --count, ++next_) {
       float u[Filter::kSize];

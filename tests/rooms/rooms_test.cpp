@@ -23,7 +23,7 @@ const Edges kEdges = {
     {"lib/armcal/model",       {kLib + "core", kLib + "math"}},
     {"lib/armcal/signal",      {kLib + "math", kLib + "model"}},
     {"lib/armcal/filter",      {kLib + "core", kLib + "math"}},
-    {"lib/armcal/physical",    {kLib + "core", kLib + "math"}},
+    {"lib/armcal/physical",    {kLib + "core", kLib + "math", kLib + "model"}},
     {"lib/armcal/feedforward", {kLib + "core", kLib + "model"}},
     {"lib/armcal/monitor",     {kLib + "math"}},
     {"lib/armcal/estimator",   {kLib + "core", kLib + "math", kLib + "model", kLib + "signal", kLib + "filter",

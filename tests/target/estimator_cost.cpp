@@ -15,7 +15,7 @@ namespace {
 
 using Model = generated::Er20Like;
 
-estimator::RigidPrior<Model, float> rigid;
+physical::RigidPrior<Model, float> rigid;
 estimator::AdoptedTable<Model> adopted;
 const estimator::Table<Model> defaults = estimator::DefaultTable<Model>();
 

@@ -55,7 +55,7 @@ class ReadOutArm {
     }
   }
 
-  estimator::RigidPrior<Model, float> rigid_;
+  physical::RigidPrior<Model, float> rigid_;
   estimator::AdoptedTable<Model> adopted_;
   estimator::Estimator<Model, filter::KalmanFilter<Model>> estimator_;
   float front_[Model::kFront] = {}, dense_[6 * Model::kDense] = {};

@@ -78,7 +78,7 @@ std::uint32_t ForEachTick(Each each) {
 // taught one of them nothing.
 template <class Model, class... Filters>
 int RunAlong(Run<Model, Filters>&... runs) {
-  static estimator::RigidPrior<Model, float> rigid;
+  static physical::RigidPrior<Model, float> rigid;
   static estimator::AdoptedTable<Model> adopted;
   if (!core::IsOk(estimator::BuildAdoptedTable(estimator::DefaultTable<Model>(), 1, rigid, adopted))) return 1;
   (runs.Start(adopted), ...);

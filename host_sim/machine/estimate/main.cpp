@@ -77,7 +77,7 @@ class HostPort {
     }
   }
   estimator::Table<Model> table_;
-  std::unique_ptr<estimator::RigidPrior<Model, float>> rigid_ = std::make_unique<estimator::RigidPrior<Model, float>>();
+  std::unique_ptr<physical::RigidPrior<Model, float>> rigid_ = std::make_unique<physical::RigidPrior<Model, float>>();
   std::unique_ptr<estimator::AdoptedTable<Model>> adopted_ = std::make_unique<estimator::AdoptedTable<Model>>();
   std::unique_ptr<estimator::Estimator<Model, filter::ForgettingFilter<Model>>> a_ =
       std::make_unique<estimator::Estimator<Model, filter::ForgettingFilter<Model>>>();

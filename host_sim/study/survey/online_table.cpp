@@ -77,7 +77,7 @@ model::Sample<Arm::kJoints> SampleOf(const calibration::Dataset& log, const code
 template <class Arm, class Filter>
 OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm) {
   struct Drive {
-    estimator::RigidPrior<Arm, float> rigid;
+    physical::RigidPrior<Arm, float> rigid;
     estimator::AdoptedTable<Arm> adopted;
     estimator::Estimator<Arm, Filter> estimator;
     estimator::Estimates<Arm> estimates;

@@ -1,4 +1,4 @@
-// controller - connects estimators, feed-forward, table and link to one motion controller without a board and a bus.
+// controller - the class that firmware uses: it connects intake, estimators, feed-forward, table and Modbus registers.
 #pragma once
 
 #include <atomic>
@@ -79,8 +79,9 @@ class Controller {
   // Which axes are under control, a bit each. While an axis is enabled, only a bumpless table is adopted. Context: any.
   void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
 
-  // Lets a client record what Push and FeedForward were given. `ring` must live as long as this object. Call it once,
-  // before the first tick. Answers as link::Trace::Serve. Context: background.
+  // Lets a client record the raw samples of Push, and of FeedForward the positions of the set-point and the torque that
+  // it answered. `ring` must live as long as this object. Call it once, before the first tick. Answers as
+  // link::Trace::Serve. Context: background.
   template <std::uint32_t kRingWords>
   core::Status Record(RawTrace<Model, kRingWords>& ring) {
     const core::Status served = ring.Serve(device_.map(), 0);
@@ -90,8 +91,8 @@ class Controller {
     return served;
   }
 
-  // Joint torque of the set-point by the adopted table. tau_Nm: [n], zero without a valid table. Answers as
-  // feedforward::FeedForward::Evaluate. Context: tick.
+  // Joint torque of the set-point by the adopted table. temperature_degC: [n], NaN where there is no sensor. tau_Nm:
+  // [n], zero without a valid table. Answers as feedforward::FeedForward::Evaluate. Context: tick.
   core::Status FeedForward(const SetPoint<n>& set, const float* temperature_degC, float* tau_Nm) {
     const std::uint32_t since = clock_.Ticks() - adopted_tick_.load(std::memory_order_relaxed);
     const core::Status status =
@@ -107,8 +108,8 @@ class Controller {
     return status;
   }
 
-  // What was measured in one tick. Constant time. kFull: the estimators are late and lost a sample (counted).
-  // Context: tick.
+  // What was measured in one tick. Bounded time; a tick that completes a sample takes longer than others. kFull: the
+  // background is late, and the sample that this tick completed is lost and counted. Context: tick.
   core::Status Push(const model::RawSample<n>& raw) {
     const core::Status status = intake_.Push(raw);
     if (trace_ != nullptr) RecordTick(raw);
@@ -116,7 +117,7 @@ class Controller {
   }
 
   // One bounded slice of all work that is not the tick's: of a table, of the restart after it, or of one of the
-  // estimators. False: nothing was left to do. Context: background.
+  // estimators. Returns false if nothing was left to do. Context: background.
   bool Step() {
     table_slice_ = false;
     device_.Step(clock_.Ms());
@@ -127,13 +128,18 @@ class Controller {
     return busy;
   }
 
+  // Context of engine and map: background.
   link::PduEngine& engine() { return device_.engine(); }  // for a link::RtuService or TcpService
   link::RegisterMap& map() { return device_.map(); }      // for blocks of the integrator's, before the first request
+  // Estimator number k: 0 is filter A, 1 is filter B. For SetObserver, SetPublishEvery, RequestReadOut and the
+  // functions that only read; this class makes the other calls, Take included. Contexts as in estimator::Estimator.
   template <int k>
   auto& estimator() {
     return std::get<k>(estimators_);
   }
   const feedforward::FeedForward<Model>& feed_forward() const { return feed_forward_; }  // context: tick
+  // The table in force; after a Boot without a valid table, the model's defaults. It stays unchanged until the next
+  // adoption. Context: background.
   const estimator::AdoptedTable<Model>& adopted() const { return adopted_[in_force_.load(std::memory_order_relaxed)]; }
   std::uint32_t generation() const { return generation_; }  // adoptions since power-up; context: background
 
@@ -221,7 +227,7 @@ class Controller {
     (void)trace_->Push(words, feed_forward_.generation());
   }
 
-  // What link::Device asks for when a client does. Context: background.
+  // The calls of link::ClientRequests, which link::Device makes when a client asks. Context: background.
   static void TakeResiduals(void* self, int joint, link::ResidualPage& page) {
     static_assert(monitor::ResidualBins::kValues == link::reg::kResidualBinValues &&
                   monitor::ResidualStatistics<n>::kValues == link::reg::kResidualValues);
@@ -244,9 +250,9 @@ class Controller {
     return status;
   }
 
-  // What link::TableTransaction asks for when a table is flashed. Check decodes and builds the table, once and in
-  // slices. What it has built waits in the spare until it is adopted or until another table is checked. Context:
-  // background.
+  // The calls of link::TableApplication, which link::TableTransaction makes when a table is flashed. Check decodes and
+  // builds the table, once and in slices. What it has built waits in the spare until it is adopted or until another
+  // table is checked. Context: background.
   static core::Refusal Check(void* self, const std::uint16_t* words, bool first) {
     auto& c = *static_cast<Controller*>(self);
     c.table_slice_ = true;
@@ -272,7 +278,7 @@ class Controller {
   bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
   // The adopted table that nobody reads: the estimators read the other one, and the feed-forward has a copy.
   estimator::AdoptedTable<Model>& Spare() { return adopted_[1 - in_force_.load(std::memory_order_relaxed)]; }
-  // False: a filter's form cannot hold what the table asks for.
+  // Returns false if a filter's form cannot hold what the table asks for.
   static bool Suits(const estimator::AdoptedTable<Model>& spare) {
     return (estimator::Estimator<Model, Filters, estimator::Intake<Model>&>::Suits(spare) && ...);
   }

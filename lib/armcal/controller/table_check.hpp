@@ -1,4 +1,4 @@
-// controller - decodes, judges and builds a table in slices, so that no call takes long.
+// controller - decodes, checks and builds a table in slices, so that no call takes long.
 #pragma once
 
 #include "armcal/estimator/adopted_table.hpp"
@@ -13,8 +13,9 @@ class TableCheck {
  public:
   static constexpr int n = Model::kJoints;
 
-  // `words`: a table in its layout. It stays as it is until the end, and so does `spare`, which the check fills in.
-  // suits: whether the filters can hold what the table asks for. The other two as model::CheckWords.
+  // `words`: a table in its layout. It must not change until the end. ceilings, bumpless_allowed: see
+  // model::CheckWords. generation: the number of the coming adoption. suits: says whether the filters can hold what the
+  // table asks for. `spare`: the check fills it in; nobody else may use it until the end.
   void Begin(const std::uint16_t* words, const model::CeilingView& ceilings, bool bumpless_allowed,
              std::uint32_t generation, bool (*suits)(const estimator::AdoptedTable<Model>&),
              estimator::AdoptedTable<Model>& spare) {
@@ -27,9 +28,10 @@ class TableCheck {
     stage_ = Stage::kWords;
   }
 
-  // One slice. kBusy: call again. Otherwise what the first check that refuses says: of the heading and the numbers
-  // (model::CheckHeading, CheckWords), of the build (estimator::TableBuild), kOutOfRange (a filter's form cannot hold
-  // it), of the friction (model::CheckFriction). kOk: `spare` is ready.
+  // One slice. kBusy: call again. kOk: `spare` is ready. Any other answer is a refusal. The checks come in this order,
+  // and the first one that refuses ends the check: heading (model::CheckHeading), numbers (model::CheckWords), build
+  // (estimator::TableBuild), filters (kOutOfRange: a filter's form cannot hold the table), friction
+  // (model::CheckFriction).
   core::Refusal Step() {
     core::Refusal refusal;
     switch (stage_) {
@@ -86,7 +88,7 @@ class TableCheck {
   bool (*suits_)(const estimator::AdoptedTable<Model>&) = nullptr;
   estimator::AdoptedTable<Model>* spare_ = nullptr;
   estimator::Table<Model> table_;  // the last one that was decoded
-  estimator::RigidPrior<Model, float> rigid_;
+  physical::RigidPrior<Model, float> rigid_;
   estimator::TableBuild<Model> build_;
   model::Memory<Model> memory_;
   model::Rows<Model> rows_;

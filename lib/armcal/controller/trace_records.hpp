@@ -22,8 +22,9 @@ inline constexpr std::uint32_t kRawMotion = 1, kRawTemperature = 2, kRawFlags = 
 //     a byte a joint, the first in the high byte: 4 bits p >> 16, 2 bits current >> 16, 2 bits state: 0 not enabled,
 //               1 enabled, 2 enabled and saturated, 3 stale, or p changed more than a reader can tell
 //     a word    joint in 4 bits, from 0, in turn; p >> 20 of this joint in 12 bits
-//   A reader continues p by its last two values; so p's second difference from record to record may be -2^19 to 2^19 -
-//   1, which is 32768 counts.
+//   A record holds only 20 bits of p. A reader predicts p from the last two records (2 p1 - p0) and takes the value
+//   with these 20 bits that is nearest. This is right if the prediction is wrong by less than 2^19 sixteenths, that is
+//   32768 counts. Otherwise the state is 3.
 inline constexpr std::uint32_t kRawPacked = 16;
 
 // Trace 1: one record for each estimator sample. Per joint: q, qd, qdd, tau and temperature as f32, flags as u16
@@ -63,6 +64,8 @@ class RawRecord {
  public:
   void Clear() { *this = RawRecord{}; }
 
+  // One tick. Shapes: [n]. q_reference: position of the set-point in rad (m); feedforward_Nm: the torque that
+  // FeedForward answered.
   void Add(const model::RawSample<n>& raw, const float* q_reference, const float* feedforward_Nm) {
     for (int j = 0; j < n; ++j) {
       if (count_ == 0) first_[j] = static_cast<std::uint32_t>(raw.counts[j]);
@@ -77,7 +80,7 @@ class RawRecord {
     ++count_;
   }
 
-  // words [RawRecordWords<n>(channels)].
+  // w [RawRecordWords<n>(channels)].
   void Write(std::uint32_t channels, std::uint16_t* w) const {
     const float share = 1.0f / static_cast<float>(count_ > 0 ? count_ : 1);
     for (int j = 0; j < n; ++j) {
@@ -98,7 +101,7 @@ class RawRecord {
     }
   }
 
-  // words [PackedRecordWords<n>()].
+  // w [PackedRecordWords<n>()].
   void WritePacked(PackedHistory<n>& history, std::uint16_t* w) const {
     constexpr int kBytes = 2 * n;  // where the bytes begin
     constexpr std::uint32_t kHalf = 1u << 19;
@@ -143,7 +146,7 @@ class RawRecord {
   std::uint8_t enabled_[n] = {}, any_[n] = {};
 };
 
-// words [SampleRecordWords<n>(kSampleAll)]. Context: background.
+// w [SampleRecordWords<n>(kSampleAll)], tau_model_Nm [n]. Context: background.
 template <int n>
 void WriteSampleRecord(const model::Sample<n>& s, const float* tau_model_Nm, std::uint16_t* w) {
   using core::PutF32;
@@ -158,6 +161,7 @@ void WriteSampleRecord(const model::Sample<n>& s, const float* tau_model_Nm, std
   }
 }
 
+// The opposite of WriteSampleRecord; s.tick is not in the record and stays. tau_model_Nm [n]. Context: any.
 template <int n>
 void ReadSampleRecord(const std::uint16_t* w, model::Sample<n>& s, float* tau_model_Nm) {
   using core::GetF32;
@@ -172,7 +176,8 @@ void ReadSampleRecord(const std::uint16_t* w, model::Sample<n>& s, float* tau_mo
   }
 }
 
-// The ring of the raw trace. kWords: of 16 bits. A record of six joints takes 33 words (motion and flags) to 69.
+// The ring of the raw trace. kWords: its length in 16-bit words. For six joints a packed record takes 19 words and a
+// record of all channels 69, the three words of its stamp included.
 template <class Model, std::uint32_t kWords = link::kDefaultTraceWords>
 class RawTrace : public link::TraceRing<kWords> {
  public:

@@ -7,7 +7,7 @@
 namespace armcal::core {
 
 namespace crc {
-// Tables of sixteen entries, for half a byte at a time: 64 + 32 bytes of flash instead of 1024 + 512.
+// Look-up tables of sixteen entries, for half a byte at a time: 64 + 32 bytes of flash instead of 1024 + 512.
 struct Tables {
   std::uint32_t ieee[16];
   std::uint16_t modbus[16];
@@ -37,15 +37,15 @@ constexpr std::uint32_t StepIeee(std::uint32_t crc, std::uint8_t byte) {
 }
 }  // namespace crc
 
-// CRC-32 of IEEE 802.3 (reflected, 0xEDB88320, initial and final 0xFFFFFFFF); "123456789" gives 0xCBF43926.
-// `previous`: the result over the bytes before these, so that a long text can be given in pieces.
+// CRC-32 of IEEE 802.3 (reflected, 0xEDB88320, initial and final 0xFFFFFFFF); "123456789" gives 0xCBF43926. bytes
+// [count]. `previous`: the result over the bytes before these, so that a long text can be given in pieces.
 constexpr std::uint32_t Crc32(const std::uint8_t* bytes, std::size_t count, std::uint32_t previous = 0) {
   std::uint32_t c = ~previous;
   for (std::size_t i = 0; i < count; ++i) c = crc::StepIeee(c, bytes[i]);
   return ~c;
 }
 
-// CRC-32 over 16-bit words, high byte first: the checksum of a parameter table.
+// CRC-32 over 16-bit words [count], high byte first: the checksum of a parameter table.
 constexpr std::uint32_t Crc32Words(const std::uint16_t* words, std::size_t count, std::uint32_t previous = 0) {
   std::uint32_t c = ~previous;
   for (std::size_t i = 0; i < count; ++i) {
@@ -55,7 +55,8 @@ constexpr std::uint32_t Crc32Words(const std::uint16_t* words, std::size_t count
   return ~c;
 }
 
-// CRC-16 of Modbus RTU (reflected, 0xA001, initial 0xFFFF); "123456789" gives 0x4B37. Sent low byte first.
+// CRC-16 of Modbus RTU over bytes [count] (reflected, 0xA001, initial 0xFFFF); "123456789" gives 0x4B37. Sent low byte
+// first.
 constexpr std::uint16_t Crc16(const std::uint8_t* bytes, std::size_t count) {
   std::uint32_t c = 0xFFFFu;
   for (std::size_t i = 0; i < count; ++i) {

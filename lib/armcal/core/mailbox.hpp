@@ -1,4 +1,4 @@
-// core - hands the latest value from one context to another.
+// core - hands the latest value from one writer to one reader in another context, without a lock.
 #pragma once
 
 #include <atomic>
@@ -16,24 +16,27 @@ class Mailbox {
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free, "the exchange must not need a lock");
 
  public:
-  // Writer: copies `value` in and publishes it.
+  // Copies `value` in and publishes it. Context: the writer's only.
   void Post(const T& value) {
     draft() = value;
     Publish();
   }
 
-  // Writer, for a large T: fill the slot in place, then call Publish(). The slot holds an older value before.
+  // For a large T: fill the slot in place, then call Publish(). Until then the slot holds an older value. Context: the
+  // writer's only.
   T& draft() { return slots_[back_]; }
   void Publish() { back_ = between_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex; }
 
-  // Reader: copies the latest value out. False: nothing is new since the last Take or Refresh; `value` is unchanged.
+  // Copies the latest value to `value`. Returns false if nothing is new since the last Take or Refresh; `value` is then
+  // unchanged. Context: the reader's only.
   bool Take(T& value) {
     if (!Refresh()) return false;
     value = slots_[front_];
     return true;
   }
 
-  // Reader: makes latest() the newest value. It stays unchanged until the next Refresh. False: nothing is new.
+  // Makes latest() the newest value. It stays unchanged until the next Refresh or Take. Returns false if nothing is
+  // new. Context: the reader's only.
   bool Refresh() {
     if ((between_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
     front_ = between_.exchange(front_, std::memory_order_acq_rel) & kIndex;

@@ -1,4 +1,4 @@
-// core - a queue from one context to another.
+// core - a queue from one producer to one consumer in another context, without a lock.
 #pragma once
 
 #include <atomic>
@@ -39,7 +39,8 @@ class SampleRing {
     return Status::kOk;
   }
 
-  // Items that wait. At the next moment the consumer may find more, and the producer may find fewer. Context: any.
+  // Items that wait. At the next moment the consumer may find more, and the producer may find fewer. Context: any. A
+  // third context that is interrupted inside this call may get more than N.
   std::uint32_t size() const {
     const std::uint32_t tail = tail_.load(std::memory_order_acquire);
     return head_.load(std::memory_order_acquire) - tail;

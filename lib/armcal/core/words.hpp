@@ -6,6 +6,7 @@
 
 namespace armcal::core {
 
+// A 32-bit value in two words w [2], the high word first. A float is stored as its bits.
 inline void PutU32(std::uint16_t* w, std::uint32_t v) {
   w[0] = static_cast<std::uint16_t>(v >> 16);
   w[1] = static_cast<std::uint16_t>(v & 0xFFFFu);
@@ -26,6 +27,7 @@ inline float GetF32(const std::uint16_t* w) {
   return v;
 }
 
+// A 16-bit value in bytes b [2], or a 32-bit value in bytes b [4], the high byte first.
 inline void PutBytes16(std::uint8_t* b, std::uint16_t v) {
   b[0] = static_cast<std::uint8_t>(v >> 8);
   b[1] = static_cast<std::uint8_t>(v & 0xFFu);

@@ -1,18 +1,18 @@
-// estimator - from a decoded parameter table to the numbers that tick and background work with.
+// estimator - the adopted table: what a parameter table means for feed-forward and filters, and how it is computed.
 #pragma once
 
-#include "armcal/estimator/rigid_prior.hpp"
 #include "armcal/estimator/row_gate.hpp"
 #include "armcal/filter/prior.hpp"
 #include "armcal/model/evaluate.hpp"
 #include "armcal/model/parameters.hpp"
+#include "armcal/physical/rigid_prior.hpp"
 
 namespace armcal::estimator {
 
-// D of a dense column in the Kalman form stays above this (prior units): the conditional standard deviation of a column
-// stays above a thousandth of the prior's. Rows must go on to move U by more than its rounding, or U wanders. After a
-// million samples at a regressor condition of 1e4, the estimate is 0.3 standard deviations off with a floor of 1e-9,
-// and 0.01 with this one.
+// The smallest D of a dense column (and of eta) in the Kalman form, in prior units. It keeps the conditional standard
+// deviation of each of them above a thousandth of its prior. Without a floor, D becomes so small that a row changes U
+// by less than one rounding, and rounding errors add up in U. Measured: after a million samples with a regressor
+// condition of 1e4, the estimate is wrong by 0.3 standard deviations with a floor of 1e-9, and by 0.01 with this one.
 inline constexpr float kLinkFloor = 1e-6f;
 // A column whose prior standard deviation is below this (in its own unit) is taken as known.
 inline constexpr float kSmallestSd = 1e-12f;
@@ -20,31 +20,33 @@ inline constexpr float kSmallestSd = 1e-12f;
 template <class Model>
 using Table = model::ParameterTable<Model::kJoints, Model::kParameters>;
 
-// What one table means for feed-forward and filters. It must stay as it is while an estimator works with it.
+// What one table means for feed-forward and filters. It must not change while an estimator works with it. Shapes are
+// those of the arrays; columns are in the order [front, dense, eta].
 template <class Model>
 struct AdoptedTable {
   static_assert(Model::kRigid > 0, "a model has at least one base parameter of its links");
   model::Committed<Model> committed;  // b0, and all that the tick needs
   filter::Prior<Model> prior;
-  // s: an estimate is b = b0 + s x; of a logarithmic eta, ln b = ln b0 + s x.
+  // s: an estimate is b = b0 + s x; of a logarithmic eta, ln b = ln b0 + s x. 0: the column is not estimated.
   float scale[Model::kColumns + Model::kNonlinear] = {};
-  float eta_low[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // bounds of x
+  float eta_low[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // bounds of x of eta, prior units
   float eta_high[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
-  float sigma_Nm[Model::kJoints] = {};
-  float gate_sigma[Model::kJoints] = {};  // of RowGate; 0: open
+  float sigma_Nm[Model::kJoints] = {};    // torque noise of a row
+  float gate_sigma[Model::kJoints] = {};  // limit of RowGate; 0: every row is taken
 };
 
-// A nonlinear parameter whose range excludes zero is positive, and is estimated as its logarithm.
+// True if the lower bound of eta is positive. Then the filter estimates ln eta instead of eta.
 template <class Model>
 constexpr bool IsLogarithmic(int e) {
   return Model::kInfo[Model::kParameters - Model::kNonlinear + e].lower > 0.0f;
 }
-// The value of eta at x in prior units, and its derivative by x.
+// The value of eta number e at x, which is in prior units.
 template <class Model>
 float EtaAt(const AdoptedTable<Model>& table, int e, float x) {
   const float step = table.scale[Model::kColumns + e] * x;
   return IsLogarithmic<Model>(e) ? table.committed.eta[e] * math::Exp(step) : table.committed.eta[e] + step;
 }
+// The derivative of eta number e by x, where its value is `eta`.
 template <class Model>
 float EtaSlope(const AdoptedTable<Model>& table, int e, float eta) {
   return table.scale[Model::kColumns + e] * (IsLogarithmic<Model>(e) ? eta : 1.0f);
@@ -73,7 +75,7 @@ bool RigidConsidered(const Table<Model>& table, const float* w_row) {
 
 // The prior of the dense columns in prior units: rigid columns are correlated with each other, effects with nothing.
 template <class Model>
-void ScaleCorrelation(const RigidPrior<Model, float>& rigid, AdoptedTable<Model>& adopted) {
+void ScaleCorrelation(const physical::RigidPrior<Model, float>& rigid, AdoptedTable<Model>& adopted) {
   constexpr int kRigid = Model::kRigid;
   filter::Prior<Model>& prior = adopted.prior;
   for (float& u : prior.dense_ud) u = 0.0f;
@@ -86,7 +88,7 @@ void ScaleCorrelation(const RigidPrior<Model, float>& rigid, AdoptedTable<Model>
   math::UdScale<kRigid>(prior.dense_ud, inverse, scale);
 }
 
-// The columns of the extended filter, and the range of x that keeps each eta in the range of its record.
+// The eta columns of the extended filter, and the range of x that keeps each eta in the range of its effect's record.
 template <class Model>
 void PriorOfEta(const Table<Model>& table, AdoptedTable<Model>& adopted) {
   for (int e = 0; e < Model::kNonlinear; ++e) {
@@ -116,9 +118,9 @@ void PriorOfEta(const Table<Model>& table, AdoptedTable<Model>& adopted) {
 template <class Model>
 class TableBuild {
  public:
-  // All four stay as they are until the end. `rigid` is work space; afterwards ReadBodies and BeginPhysical may read
-  // it.
-  void Begin(const Table<Model>& table, std::uint32_t generation, RigidPrior<Model, float>& rigid,
+  // `table` must not change until the end. `rigid` and `adopted` must live until the end; Step writes both. Afterwards
+  // ReadBodies and BeginPhysical may read `rigid`.
+  void Begin(const Table<Model>& table, std::uint32_t generation, physical::RigidPrior<Model, float>& rigid,
              AdoptedTable<Model>& adopted) {
     table_ = &table;
     rigid_ = &rigid;
@@ -135,7 +137,7 @@ class TableBuild {
       case Stage::kBodies:
         return Next(Stage::kSpread, MapMeans());
       case Stage::kSpread:
-        SpreadLink<Model>(*rigid_, at_++);
+        physical::SpreadLink<Model>(*rigid_, at_++);
         if (at_ == Model::kJoints) at_ = 0, stage_ = Stage::kConsidered;
         return core::Status::kBusy;
       case Stage::kConsidered:
@@ -188,7 +190,7 @@ class TableBuild {
       rigid_->mean[k] = internal::Amplitude(table_->parameter[k]);
       rigid_->sd[k] = internal::Spread(table_->parameter[k]);
     }
-    MapBodies<Model>(rigid_->mean, base_);
+    physical::MapBodies<Model>(rigid_->mean, base_);
     return core::Status::kOk;
   }
 
@@ -243,7 +245,7 @@ class TableBuild {
   }
 
   const Table<Model>* table_ = nullptr;
-  RigidPrior<Model, float>* rigid_ = nullptr;
+  physical::RigidPrior<Model, float>* rigid_ = nullptr;
   AdoptedTable<Model>* adopted_ = nullptr;
   std::uint32_t generation_ = 0;
   float base_[kRigid] = {}, variance_[kRigid] = {};
@@ -257,7 +259,8 @@ class TableBuild {
 // inlined: the caller's stack frame often holds the table, and this one holds the factors.
 template <class Model>
 [[gnu::noinline]] core::Status BuildAdoptedTable(const Table<Model>& table, std::uint32_t generation,
-                                                 RigidPrior<Model, float>& rigid, AdoptedTable<Model>& adopted) {
+                                                 physical::RigidPrior<Model, float>& rigid,
+                                                 AdoptedTable<Model>& adopted) {
   TableBuild<Model> build;
   build.Begin(table, generation, rigid, adopted);
   core::Status status = core::Status::kBusy;

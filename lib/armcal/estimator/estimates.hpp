@@ -1,4 +1,4 @@
-// estimator - what an estimator publishes, and the statistics of rows that go into it.
+// estimator - the struct of published estimates, and the row statistics in it.
 #pragma once
 
 #include "armcal/estimator/adopted_table.hpp"
@@ -9,7 +9,7 @@
 
 namespace armcal::estimator {
 
-// What the estimator knows at one instant. Columns in filter coordinates [front, dense], in their own units.
+// What an estimator publishes. Columns in filter coordinates [front, dense], in their own units.
 template <class Model>
 struct Estimates {
   std::uint32_t generation = 0;  // of the table that the filter started from
@@ -19,12 +19,14 @@ struct Estimates {
   std::uint32_t refused = 0;     // samples lost because the ring was full, since power-up
   float value[Model::kColumns] = {};
   float sd[Model::kColumns] = {};
-  // Nonlinear parameters. Unless the filter is extended, these are the committed ones and zero.
+  // Nonlinear parameters. Only an extended filter estimates them. For other filters eta is the committed value and
+  // eta_sd is 0.
   float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
   float eta_sd[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
   std::uint32_t clamps = 0;  // how often an eta was cut to its bound
   std::uint32_t rows_used[Model::kJoints] = {};
-  std::uint32_t rows_gated[Model::kJoints] = {};    // not valid, not moving, or outside the gate
+  // rows_gated: not used, because not valid, not moving, memory not ready, outside the gate, or on hold.
+  std::uint32_t rows_gated[Model::kJoints] = {};
   std::uint32_t rows_outside[Model::kJoints] = {};  // of these, in motion and outside the gate: see RowGate
   std::uint32_t rows_refused[Model::kJoints] = {};  // not finite or beyond filter::kRowLimit
   float nis[Model::kJoints] = {};                   // see monitor::JointMonitor
@@ -32,7 +34,8 @@ struct Estimates {
   bool inconsistent = false;                        // the deviations are too small: see monitor::InnovationTest
 };
 
-// Fills in values and standard deviations from a filter's read-out in prior units (x, sd by column).
+// Fills in values and standard deviations from a filter's read-out, which is in prior units. out.x, out.sd: [kColumns],
+// of an extended filter [kColumns + kNonlinear]. Context: background.
 template <class Model, class ReadOut>
 void FromPriorUnits(const AdoptedTable<Model>& table, const ReadOut& out, Estimates<Model>& estimates) {
   for (int k = 0; k < Model::kColumns; ++k) {
@@ -49,7 +52,7 @@ void FromPriorUnits(const AdoptedTable<Model>& table, const ReadOut& out, Estima
   }
 }
 
-// Takes the report of every row to the monitors. Context: background.
+// Hands the report of every row to the monitors. Context of every call: background.
 template <class Model>
 class RowStatistics {
  public:

@@ -1,4 +1,4 @@
-// estimator - works the samples of an intake into a filter, and publishes what the filter knows.
+// estimator - feeds the samples of an intake to a filter, and publishes the estimates.
 #pragma once
 
 #include <type_traits>
@@ -12,7 +12,7 @@
 
 namespace armcal::estimator {
 
-// One joint's row at one sample, whitened and in prior units.
+// One joint's row at one sample, whitened and in prior units: all numbers have unit 1.
 template <class Model>
 struct Row {
   float front[Model::kFront > 0 ? Model::kFront : 1] = {};  // from the joint's first column on
@@ -22,7 +22,7 @@ struct Row {
 };
 
 // Fills in front, dense and y = residual_Nm / sigma, where residual_Nm is the measured torque minus the one at b0.
-// seen: the regressor that the filter sees. One copy serves all estimators of a model. Context: background.
+// seen: the regressor that the filter uses. One copy serves all estimators of a model. Context: background.
 template <class Model>
 ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows<Model>& seen, int joint,
                              float residual_Nm, Row<Model>& row) {
@@ -37,17 +37,19 @@ ARMCAL_NOINLINE void FillRow(const AdoptedTable<Model>& table, const model::Rows
   row.y = residual_Nm * whiten;
 }
 
-// Works the samples of an intake into one filter.
+// Feeds the samples of an intake to one filter.
 // Filter: filter::ForgettingFilter<Model>, filter::ModelBank<Model>, filter::KalmanFilter<Model> or
 // filter::ExtendedKalmanFilter<Model>; the last two in either form.
 // Source: Intake<Model>, if the estimator has an intake of its own; Intake<Model>&, if several estimators share one.
-// Push and PushSample belong to the tick (use one of the two), everything else to the background.
+// Context: tick for Push and PushSample (use one of the two) and for tick_gaps; any for Take, refused_samples, pending
+// and implausible; background for all others.
 template <class Model, class Filter, class Source = Intake<Model>>
 class Estimator {
  public:
   static constexpr int n = Model::kJoints;
   static constexpr std::uint32_t kRingSamples = Intake<Model>::kRingSamples;
-  // Called once a sample after its rows. Flags carry kUsed where a row changed the estimate.
+  // Step calls it once for each sample, after its rows. sample.flags has kUsed for each row that changed the estimate.
+  // tau_model_Nm [n]: the torque of the committed model. Context: background.
   using Observer = void (*)(void* context, const model::Sample<n>& sample, const float* tau_model_Nm);
 
   Estimator() = default;
@@ -58,17 +60,19 @@ class Estimator {
   core::Status Push(const model::RawSample<n>& raw) { return intake_.Push(raw); }
   core::Status PushSample(const model::Sample<n>& sample) { return intake_.PushSample(sample); }
 
-  // False: the filter's form cannot represent what the table asks for (see filter::Form). Do not adopt such a table.
+  // Returns false if the filter's form cannot represent what the table asks for (see filter::Form). Do not adopt such a
+  // table.
   static bool Suits(const AdoptedTable<Model>& table) { return Filter::Suits(table.prior); }
 
-  // Restarts filter, statistics and signal path from `table`, which must suit and must stay as it is until the next
-  // Adopt. Its generation must differ from the one before and from 0. Samples made before are dropped. adopted_tick:
-  // zero of the model's time. Where several estimators share an intake, call Intake::Adopt once, then Restart of each.
-  // Context: background.
+  // Restarts filter, statistics and signal path from `table`. Suits(table) must be true, and the table must not change
+  // until the next Adopt. Its generation must differ from the one before and from 0. Samples made before are dropped.
+  // adopted_tick: zero of the model's time. Where several estimators share an intake, call Intake::Adopt once, then
+  // Restart of each. Context: background.
   void Adopt(const AdoptedTable<Model>& table, std::uint32_t adopted_tick) {
     Restart(table, adopted_tick);
     intake_.Adopt(table, adopted_tick);
   }
+  // The same for filter and statistics, without the intake. Context: background.
   void Restart(const AdoptedTable<Model>& table, std::uint32_t adopted_tick) {
     table_ = &table;
     stands_ = false;
@@ -87,9 +91,9 @@ class Estimator {
     read_out_due_ = true;
   }
 
-  // Works until `budget` is spent, counted in elements of a filter's columns: eight instructions each on a Cortex-M4F.
-  // A column or a regressor is not cut; what it spends too much is taken off the next call. False: nothing to do. May
-  // be interrupted anywhere. Context: background.
+  // Works until `budget` is spent. The unit is one element of a filter's column, which is eight instructions on a
+  // Cortex-M4F. The work on one column or one regressor is not divided. If it costs more than what is left, the next
+  // call gets less. Returns false if there was nothing to do. An interrupt may stop it anywhere. Context: background.
   bool Step(int budget) {
     credit_ += budget;
     bool worked = false;
@@ -102,48 +106,52 @@ class Estimator {
     }
     return true;
   }
-  // One slice. A sample's work is cut into equal slices, whichever rows they hold.
+  // One slice. A sample's work is divided into equal slices, whichever rows they hold.
   bool Step() { return Step(slice_); }
 
-  // True: from the next sample on, rows do not change the estimate, and it does not forget. Statistics go on. An
-  // adoption does not end a hold. Context: background.
+  // hold = true: from the next sample on, rows do not change the estimate, and it does not forget. hold = false: they
+  // do again. Statistics go on. An adoption does not end a hold. Context: background.
   void Hold(bool hold) { hold_ = hold; }
 
-  // From the next sample on, what was known of a block no longer counts: after work on that joint, or with another
+  // From the next sample on, what was known of one part no longer counts: after work on that joint, or with another
   // payload. block: a joint (its own columns), or n: the links and what else acts on several joints. kOutOfRange: there
-  // is no such block, or the filter's form cannot reset it; then only Adopt helps, which restarts all.
-  // Context: background.
+  // is no such part, or the filter's form cannot reset it; then only Adopt helps, which restarts all. Context:
+  // background.
   core::Status Reset(int block) {
     if (!Filter::CanReset(block)) return core::Status::kOutOfRange;
     resets_due_ |= 1u << block;
     return core::Status::kOk;
   }
 
-  // The latest published estimates. False: nothing new since the last call. Context: one reader, any.
+  // Copies the latest published estimates to `out`. Returns false if nothing is new since the last call. Context: any,
+  // but one reader only.
   bool Take(Estimates<Model>& out) { return published_.Take(out); }
 
-  // Publishes after the sample in work. Context: background.
+  // Asks for a read-out after the present sample, in addition to the periodic ones. Context: background.
   void RequestReadOut() { read_out_due_ = true; }
-  // Otherwise it publishes after the first sample of each period of so many samples' ticks. The gate knows what is
-  // published there. Periods are counted from tick 0.
+  // How often estimates are published without a request. A period is `samples` samples long and is counted from tick 0.
+  // The estimates are published after the first sample of each period. The row gate uses these estimates and the first
+  // ones after a restart, not those of RequestReadOut. Context: background.
   void SetPublishEvery(std::uint32_t samples) { publish_every_ = math::Max<std::uint32_t>(samples, 1); }
+  // nullptr: no observer. Context: background.
   void SetObserver(Observer observer, void* context) {
     observer_ = observer;
     observer_context_ = context;
   }
 
   // The residual statistics to fill from now on and to restart with each adoption; nullptr: none. They do not depend on
-  // the filter, so it is enough to give them to one of several estimators.
+  // the filter, so it is enough to give them to one of several estimators. Context: background.
   void SetResiduals(monitor::ResidualStatistics<n>* residuals) { statistics_.SetResiduals(residuals); }
 
-  // Counts of the intake.
+  // Counts of the intake. Context: any, where no other is named.
   std::uint32_t refused_samples() const { return intake_.refused(); }
-  std::uint32_t pending() const { return intake_.pending(); }          // samples waiting for Step; context: any
-  std::uint32_t implausible() const { return intake_.implausible(); }  // ticks that the arm cannot have made
+  std::uint32_t pending() const { return intake_.pending(); }          // samples waiting for Step
+  std::uint32_t implausible() const { return intake_.implausible(); }  // ticks with a refused count or current
   std::uint32_t tick_gaps() const { return intake_.tick_gaps(); }      // restarts of the signal path; context: tick
 
   const Filter& filter() const { return filter_; }
-  // The filter's finished read-out, for BeginPhysical; nullptr: rows have come in since. Context: background.
+  // The filter's finished read-out, for BeginPhysical. nullptr: there is none yet, one is being computed, or rows have
+  // come in since. Context: background.
   const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
 
  private:
@@ -168,7 +176,7 @@ class Estimator {
 
   struct Nothing {};
 
-  // The next piece of work that is not cut. False: there is none.
+  // Does the next piece of work that is not divided. Returns false if there is none.
   bool Advance() {
     switch (stage_) {
       case Stage::kIdle:
@@ -200,7 +208,7 @@ class Estimator {
       case Stage::kReadOut:
         if (filter_.StepReadOut(read_out_, credit_)) {
           stage_ = Stage::kPublish;
-          credit_ = math::Min(credit_, 0);  // what is not cut begins a slice
+          credit_ = math::Min(credit_, 0);  // Publish() cannot be divided, so it starts with a new slice
         }
         return true;
       case Stage::kPublish:
@@ -353,10 +361,12 @@ class Estimator {
   RowStatistics<Model> statistics_;
   RowGate<n> gate_;
   Estimates<Model> estimates_;
-  // Torque that the committed table explains by the dense columns alone, by all columns, and what it leaves.
+  // Per joint, N m, by the committed table: torque of the dense columns; torque of all columns; measured torque minus
+  // the second.
   float load_Nm_[n] = {}, tau_model_Nm_[n] = {}, residual_Nm_[n] = {};
-  // What the gate knows: the estimates at the first sample of each period of ticks, whoever else asks for a read-out.
-  // So the same motion gives the same rows, also to a program on a PC that has not seen the rest before it.
+  // The estimates that the gate uses. They change after a restart and with the first sample of each period, not when a
+  // client asks for a read-out. Periods are counted in ticks. So a PC program that starts with a later sample has the
+  // same periods as the drive.
   float known_[Model::kColumns] = {};
   std::uint32_t period_ = 0;
   int credit_ = 0, slice_ = filter::kSliceCredit;

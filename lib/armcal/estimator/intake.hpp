@@ -1,4 +1,4 @@
-// estimator - from raw samples to the regressor: signal path, ring and model, once however many filters there are.
+// estimator - the intake: makes samples from raw samples and evaluates their regressor, once for all filters.
 #pragma once
 
 #include <atomic>
@@ -41,7 +41,8 @@ signal::Settings<Model::kJoints> SettingsOf(const model::Committed<Model>& commi
 }
 
 // The tick pushes ticks or samples in. In the background one or more readers (estimators) take the samples out. Each
-// sample's regressor is evaluated once, when the first reader asks for it, and stays until every reader is done.
+// sample's regressor is evaluated once, when the first reader asks for it, and stays until every reader is done. A
+// sample is dropped if it was made under another table than the present one (stale()).
 template <class Model>
 class Intake {
  public:
@@ -69,15 +70,15 @@ class Intake {
   }
   std::uint32_t tick_gaps() const { return path_.gap_count(); }  // restarts of the signal path; context: tick
 
-  // One more reader; the answer is its bit. Before the first sample. Context: background.
+  // Adds a reader and returns its bit. At most 32 readers. Call it before the first sample. Context: background.
   std::uint32_t Join() {
     const std::uint32_t reader = readers_ + 1u;
     readers_ |= reader;
     return reader;
   }
 
-  // Samples made before are dropped. `table` must stay as it is until the next Adopt; its generation must differ from
-  // the one before and from 0. adopted_tick: zero of the model's time. Context: background.
+  // Samples made before are dropped. `table` must not change until the next Adopt; its generation must differ from the
+  // one before and from 0. adopted_tick: zero of the model's time. Context: background.
   void Adopt(const AdoptedTable<Model>& table, std::uint32_t adopted_tick) {
     committed_ = &table.committed;
     adopted_tick_ = adopted_tick;
@@ -87,8 +88,9 @@ class Intake {
     settings_.Post(SettingsOf(table.committed));
   }
 
-  // The next sample for `reader`, with its regressor. False: none is there, or another reader is not yet done with the
-  // present one. Takes off `credit` what an evaluation spends (filter/slices.hpp). Context: background.
+  // Makes the next sample for `reader` the present one, with its regressor. Returns false if there is none, or if
+  // another reader is not yet done with the present one. Takes off `credit` what an evaluation costs
+  // (filter/slices.hpp). Context: background.
   bool Next(std::uint32_t reader, int& credit) {
     if ((open_ & reader) != 0u) return true;
     if (open_ != 0u) return false;
@@ -104,7 +106,7 @@ class Intake {
     }
     return false;
   }
-  // `reader` no longer needs the present sample.
+  // `reader` no longer needs the present sample. Context: background.
   void Done(std::uint32_t reader) { open_ &= ~reader; }
 
   // Of the present sample. Context: background.
@@ -114,7 +116,8 @@ class Intake {
   bool gap() const { return gap_; }                 // it does not follow the sample before
   std::uint32_t moving() const { return moving_; }  // joints whose rows may change an estimate, a bit each
 
-  std::uint32_t stale() const { return stale_; }  // samples of another table, dropped since the adoption
+  // Samples that were made under another table, dropped since the adoption. Context: background.
+  std::uint32_t stale() const { return stale_; }
   // Context: any.
   std::uint32_t refused() const { return ring_.refused(); }
   std::uint32_t pending() const { return ring_.size(); }
@@ -130,8 +133,8 @@ class Intake {
     if (settings_.Refresh()) path_.SetSettings(settings_.latest());
   }
 
-  // A row may change an estimate if its joint is valid and moving, and if its effects with memory have forgotten how
-  // they started. Memory runs from sample to sample and starts again after a gap.
+  // A row may change an estimate if its joint is valid and moving, and if its effects with memory no longer depend on
+  // their start values. Memory runs from sample to sample and starts again after a gap.
   void Evaluate() {
     const model::Sample<n>& s = item_.sample;
     moving_ = 0;

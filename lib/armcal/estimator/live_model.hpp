@@ -1,13 +1,14 @@
-// estimator - the regressor and its derivative at the live estimate; only the extended filter takes this way.
+// estimator - linearises the model at the present estimate, for the extended Kalman filter.
 #pragma once
 
 #include "armcal/estimator/adopted_table.hpp"
 
 namespace armcal::estimator {
 
-// The rows of one sample, linearised at the estimate x0 before it: tau = tau(x0) + h (x - x0). The states of effects
-// with memory run here at the live eta, together with their sensitivities; the intake runs those of the committed
-// model. The instructions are the same for any data. Context: background.
+// The rows of one sample, linearised at the estimate x0 before it: tau = tau(x0) + h (x - x0). This class has its own
+// states of effects with memory, and their sensitivities. It computes them with the estimated eta. The states in the
+// intake use the committed eta. The instructions depend on two things only: whether the sample follows the one before,
+// and whether the last states were finite. Context: background.
 template <class Model>
 class LiveModel {
  public:

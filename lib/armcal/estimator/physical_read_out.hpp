@@ -22,14 +22,15 @@ const auto& EstimateOf(const filter::KalmanFilter<Layout, form, beside>& filter,
   return filter.estimate();
 }
 
-// Copies what an estimator's filter knows between two samples. After that, read_out.Step may be called while the
-// estimator goes on. table, rigid: what the estimator works with, and what BuildAdoptedTable left there; both must stay
-// until the read-out is done. warm: the last read-out was of the same table. kBusy: rows have come in since the
-// filter's own read-out; call RequestReadOut and come back. All other answers are those of MapReadOut::Begin and
-// AddSpread. Takes some kColumns^3 multiplications and additions; to cut that into slices, call those two as is done
-// here. Context: background.
+// Copies estimate and covariance of an estimator's filter to `read_out`. Call it when no sample is being processed.
+// Then call read_out.Step until it returns true; the estimator may go on meanwhile. table: the table of the estimator.
+// rigid: the work space that BuildAdoptedTable filled for this table. Both must not change until the read-out is done.
+// warm: true if the last read-out was of the same table. kBusy: the filter has no finished read-out
+// (Estimator::read_out); call RequestReadOut, wait, and call this again. All other answers are those of
+// MapReadOut::Begin and AddSpread. Takes some kColumns^3 multiplications and additions. For shorter slices, call Begin
+// and AddSpread yourself, as below. Context: background.
 template <class Model, class Filter, class Source, class T>
-core::Status BeginPhysical(const AdoptedTable<Model>& table, const RigidPrior<Model, float>& rigid,
+core::Status BeginPhysical(const AdoptedTable<Model>& table, const physical::RigidPrior<Model, float>& rigid,
                            const Estimator<Model, Filter, Source>& estimator, bool warm,
                            physical::MapReadOut<Model, T>& read_out) {
   const typename Filter::ReadOut* done = estimator.read_out();
@@ -46,9 +47,9 @@ core::Status BeginPhysical(const AdoptedTable<Model>& table, const RigidPrior<Mo
   return status;
 }
 
-// From a finished read-out. True: the parameters have moved further than the table's deviations allow. Then parameters
-// that the data hardly determine are less certain than the read-out says. A right table is called too narrow at most
-// once in a thousand times. Context: background.
+// From a finished read-out. Returns true if the parameters have moved further than the table's deviations allow. Then
+// parameters that the data hardly determine are less certain than the read-out says. A right table is called too narrow
+// at most once in a thousand times. Context: background.
 template <class Model, class T>
 bool PriorIsTooNarrow(const physical::MapReadOut<Model, T>& read_out) {
   constexpr float kSigmas = 3.09f;  // of the normal distribution, for one in a thousand

@@ -1,21 +1,26 @@
-// estimator - which rows of a sample fit to those before: decided for all rows before any of them is worked in.
+// estimator - the row gate: refuses rows that differ too much from the earlier rows of their joint.
 #pragma once
 
 #include "armcal/math/elementary.hpp"
 
 namespace armcal::estimator {
 
-// A row is refused if it is further away than this, in standard deviations of what rows of its joint show.
+// A row is refused if it differs from the expected value by more than this many standard deviations. The gate learns
+// the standard deviation from the earlier rows of the joint.
 inline constexpr float kGateSigma = 5.0f;
 
-// The same gate for every filter. For each joint it knows two spreads, in units of the table's noise and never below
-// it:
-//   of the innovation, which is what the last read-out does not explain of a row;
-//   of the change, from row to row, of what the committed table does not explain. Wrong parameters make that change
-//   slowly, a wrong sample makes it jump. So this also works in the first seconds, when nothing is known of the arm.
-// A row must be inside both. Spreads are means of squares, in which a square counts at most kClip times the mean, so
-// single wrong rows hardly widen the gate. No arm is locked out: after kPatience refused rows in turn one is taken, and
-// its innovation becomes the spread. The limit of the change grows with each refused row in turn. Context: background.
+// The same gate for every filter. For each joint it compares two numbers of a row with their mean squares over earlier
+// rows, both in units of the table's noise:
+//   the measured torque minus the torque by the last periodic read-out (here called innovation; in a filter this word
+//   means the difference from the estimate just before the row);
+//   the difference between the residuals of this row and of the last row that was taken. Wrong parameters change the
+//   residual slowly; a wrong sample makes it jump. So this test also works in the first seconds, when the estimates are
+//   still poor.
+// A row is taken if both numbers are within the limit. The mean squares never count as less than 1 (second number: 2).
+// In a mean, one square counts at most kClip times the mean, so single wrong rows hardly widen the gate. The limit is
+// wider while a joint has had few rows, and the first row of a joint is always taken. After kPatience refused rows in
+// turn the next row is taken, and the mean square becomes at least the square of its innovation. The limit of the
+// second number grows with each refused row in turn. Context of every call: background.
 template <int n>
 class RowGate {
  public:
@@ -23,16 +28,17 @@ class RowGate {
     for (Joint& joint : joint_) joint = Joint{};
   }
 
-  // The next row of joint i. residual: whitened, of the committed table; innovation: whitened, of the last read-out.
-  // False: the row is outside. moves: the row may be judged; if not, it says nothing, and the next one follows none.
-  // forward: the joint's direction; where it turns, friction jumps, and the row follows none. gate_sigma = 0: the gate
-  // is open. The instructions are the same for any data.
+  // Returns true if the next row of joint i may update the estimate. residual: measured minus committed model,
+  // whitened. innovation: measured minus last periodic read-out, whitened. moves = false: the row is not used for the
+  // statistics, and the next row is not compared with it. forward: the direction of the joint; after a change of
+  // direction, friction jumps, so the row is not compared with the one before. gate_sigma = 0: every row is taken. The
+  // instructions are the same for any data.
   bool Admit(int i, float residual, float innovation, bool moves, bool forward, float gate_sigma) {
     Joint& j = joint_[i];
     const float apart = (residual - j.reference) / (1.0f + j.refused);
     const float change2 = math::Masked(apart * apart, math::MaskOf(j.follows) & math::MaskOf(j.forward == forward));
     const float level2 = innovation * innovation, few = kFew / math::Max(j.rows, 1.0f);
-    const float gate2 = gate_sigma * gate_sigma * (1.0f + few * few);  // a spread of few rows is not known well
+    const float gate2 = gate_sigma * gate_sigma * (1.0f + few * few);  // a mean of few rows is not known well
     const bool first = !(j.rows > 0.0f);
     const bool near = level2 <= gate2 * math::Max(j.level2, 1.0f),
                steady = change2 <= gate2 * math::Max(j.change2, 2.0f);

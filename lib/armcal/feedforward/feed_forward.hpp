@@ -7,9 +7,11 @@
 
 namespace armcal::feedforward {
 
-// The shortest cross-fade of a bumpless table. A table that asks for less would be a step of the torque.
+// The shortest cross-fade of a bumpless table. If a table asks for less, this time is used, so that the torque does not
+// step.
 inline constexpr float kShortestFade_s = 0.05f;
 
+// The torque of a set-point by the table in force. Context: background for Offer, tick for all others.
 template <class Model>
 class FeedForward {
  public:
@@ -25,14 +27,16 @@ class FeedForward {
     return core::Status::kOk;
   }
 
-  // Torque of the set-point. Shapes: all [kJoints]. t_s: seconds since the table was adopted. A set-point slower than
-  // v_min counts as standing, so that friction does not chatter. kOk; kClamped (a joint was cut to its limit, and that
-  // was counted); kEmpty (no valid table; torque zero); kNotFinite (set-point or model is not finite; that joint's
-  // torque is zero). Constant time, because the old and the new parameters of a cross-fade are always both evaluated;
-  // only the tick that takes a new table takes longer. A cross-fade starts from the present torque, also if another one
-  // is under way. Each table is evaluated with its own v_min, and its torque is cut to its own limit before the two are
-  // mixed. So at an unchanged set-point the fade itself moves the torque by at most the sum of both limits, divided by
-  // the ticks of the fade, in a tick. Context: tick.
+  // Torque of the set-point. Shapes: all [kJoints]. q, qd, qdd: rad (m), rad/s, rad/s^2. temperature_degC: NaN where
+  // there is no sensor. t_s: seconds since the table was adopted. A joint whose set-point speed is below v_min counts
+  // as standing, so that friction does not chatter. tau_Nm: N m (N).
+  // kOk; kClamped (a joint was cut to its limit, and that was counted); kEmpty (no valid table; torque zero);
+  // kNotFinite (set-point or model of a joint is not finite; the torque of that joint is zero).
+  // Constant time: the old and the new parameters are always both evaluated. Only the tick that takes over a new table
+  // takes longer.
+  // A cross-fade starts from the present torque, also if another one is running. Each table is evaluated with its own
+  // v_min, and its torque is cut to its own limit before the two are mixed. So if the set-point does not change, the
+  // torque changes in one tick by at most (old limit + new limit) / ticks of the fade. Context: tick.
   core::Status Evaluate(const float* q, const float* qd, const float* qdd, const float* temperature_degC, float t_s,
                         float* tau_Nm) {
     Adopt();
@@ -92,10 +96,11 @@ class FeedForward {
     blended_ticks_ = 0;
   }
 
-  // The next fade starts from what the last tick gave. Amplitudes are mixed by the share that the fade under way has
-  // reached, so that this start goes on to follow the motion. What differs then, because the two tables had other
-  // nonlinear parameters, memories or columns, is carried along as a torque. rows_ is still what the table in force had
-  // in the last tick. Without a fade under way nothing differs, and no bit changes.
+  // Prepares the next fade. It starts from the torque of the last tick. If no fade is running, it starts from the
+  // parameters in force. If one is running, it starts from the mixture of parameters that this fade has reached. So the
+  // start torque still depends on the set-point. The torque of the mixture may differ from the last torque, because the
+  // two tables may have other eta, memories or columns. remainder_Nm_ holds this difference, and it is added during the
+  // fade. rows_ still holds the regressor of the table in force at the last tick.
   void StartFromHere() {
     const bool was_fading = active_.valid && share_ < 1.0f;
     for (int k = 0; k < Model::kColumns; ++k) {
@@ -112,7 +117,7 @@ class FeedForward {
     previous_t_s_ = t_s_;
   }
 
-  // A speed of the set-point, as a table sees it.
+  // A speed of the set-point, as a table uses it: zero below the table's v_min.
   static float Moving(const model::Committed<Model>& table, const float* qd, int i) {
     return math::Select(math::Abs(qd[i]) < table.v_min_radps[i], 0.0f, qd[i]);
   }

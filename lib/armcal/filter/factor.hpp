@@ -1,12 +1,12 @@
-// filter - an estimate x with its covariance P = U D U': where the numbers are, and how a row or a sum is worked in.
+// filter - the estimate and its covariance P = U D U': memory layout, and the update by one row or one rank-one sum.
 //
 // G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, 1977 (measurement); W. S. Agee, R. H.
 // Turner, 1972 (rank-one sum). A row of zeros leaves every bit as it was. So a row that must not count is masked to
 // zeros, and the instructions are the same whatever the numbers are.
 //
-// FactorWork and the functions before it know an order's tables, but no layout: one copy of their code serves all
-// filters of a form. None of it is inlined. That costs no instructions, because a loop out of line leaves its caller
-// the registers. Context: background.
+// FactorWork and the functions before it use the look-up tables of an order, not the type of a layout. So one copy of
+// their code serves all filters of a form. Their loops are not inlined. That costs no instructions: a loop in a
+// function of its own has all registers, and the caller keeps its own. Context: background.
 #pragma once
 
 #include "armcal/filter/order.hpp"
@@ -17,8 +17,8 @@
 
 namespace armcal::filter {
 
-// Where the numbers are. x points at: the estimate, a row in work and its gain, [shape->size] each, then the factor's
-// elements.
+// Where the numbers are. x points at: the estimate, the row that is being processed and its gain, [shape->size] each,
+// then the factor's elements.
 template <Form form>
 struct Factor {
   const Shape<form>* shape;
@@ -58,7 +58,7 @@ ARMCAL_NOINLINE std::uint32_t HoldFloor(Factor<form> f, float link_floor, const 
 }
 
 // Adds to variance [size] what the columns from `next` on give to the diagonal of P, as long as credit lasts. All
-// columns together, from variance = 0 on, give the diagonal. True: done. x as in Factor.
+// columns together, from variance = 0 on, give the diagonal. Returns true when all are added. x as in Factor.
 template <Form form>
 ARMCAL_NOINLINE bool AddDiagonal(const Shape<form>& shape, const float* x, float* variance, int& next, int& credit) {
   int p = next, left = credit;
@@ -75,8 +75,8 @@ ARMCAL_NOINLINE bool AddDiagonal(const Shape<form>& shape, const float* x, float
   return p == shape.size;
 }
 
-// A row or a rank-one sum in work. A slice (slices.hpp) ends between two columns. Between slices anything may happen
-// but another call that begins work on the same object.
+// The work on one row or one rank-one sum. A slice (slices.hpp) ends between two columns. Between two slices other code
+// may run, but it must not begin other work on the same object, and must not change the factor.
 template <Form form>
 class FactorWork {
  public:
@@ -101,8 +101,8 @@ class FactorWork {
     next_ = f.shape->size - 1;
     stage_ = Stage::kBegun;
   }
-  // True: the row is in. Bit p of `considered`: the column at position p has uncertainty and does not move. nullptr:
-  // there is none.
+  // Returns true when the row is done. Bit p of `considered`: the column at position p has uncertainty and does not
+  // move. nullptr: there is none.
   ARMCAL_NOINLINE bool StepRow(Factor f, const std::uint32_t* considered, int& credit) {
     if (stage_ == Stage::kBegun) {
       credit -= BeginCost(*f.shape, first_);
@@ -116,7 +116,7 @@ class FactorWork {
     }
     return stage_ == Stage::kIdle || StepSum(f, credit);
   }
-  float innovation() const { return innovation_; }  // of the row in work, or of the last one
+  float innovation() const { return innovation_; }  // of the row that was begun last
   float variance() const { return sum_; }           // h' P h + noise, before the row
 
   static constexpr int SumCost(const Shape& shape, int last) {  // of BeginUnitSum
@@ -170,8 +170,9 @@ class FactorWork {
     stage_ = Stage::kSum;
   }
 
-  // row = U' h in place, from the last column back, and h' P h on the way. Two neighbouring columns that begin at the
-  // same position are worked on together. Otherwise the one column stands in the place of both.
+  // row = U' h in place, from the last column to the first; sum_ becomes h' P h + noise. Two neighbouring columns that
+  // begin at the same position are processed together. If there is no such pair, second = column and q = p, so the same
+  // code works for one column.
   ARMCAL_NOINLINE bool Project(Factor f, int& credit) {
     const Shape& shape = *f.shape;
     const int first = first_;
@@ -320,7 +321,7 @@ class UdEstimate {
     return filter::AddDiagonal(kShape, number_, variance, next, credit);
   }
 
-  // A row and a sum in work: see FactorWork.
+  // The work on a row or a sum: see FactorWork.
   float* row() { return factor().row(); }  // [kSize] by positions, for the row's h
   void BeginRow(int first, int joint, float y, float variance) {
     work_.BeginRow(factor(), first, Order::FrontOf(joint), y, variance);

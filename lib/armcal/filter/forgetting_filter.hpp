@@ -37,7 +37,8 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   static constexpr Offsets kOffsets{};
   static constexpr int kTriangle = kOffsets.at[kColumns];
 
-  // Row i is worked in from dense column at[i] on. That is kRowBegin[i], or less where a later row begins before.
+  // First dense column with which row i is processed. It is kRowBegin[i], or the smallest kRowBegin of a later row, if
+  // that is smaller. So the rows that take part in a column are always the first ones.
   struct Starts {
     std::uint8_t at[Layout::kJoints] = {};
     bool ordered = true;  // all are kRowBegin
@@ -74,7 +75,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     bool inside_row = false;
   };
 
-  // Starts without data. The prior must stay as it is while the filter works.
+  // Starts without data. The prior must not change while the filter works.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
     for (float& d : d_) d = kFloor;
@@ -83,8 +84,8 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
 
   // One whitened row of `joint`. Shapes: front [the joint's front columns]; dense [kDense], zero before
   // kRowBegin[joint]. If use is false or the report is not kOk, the row acts as a row of zeros: no bit of the triangle
-  // changes, and the instructions are the same. The rows of a sample are worked in together: after BeginRow and StepRow
-  // of each of them call StepRows, which spends credit (slices.hpp), until it answers true; then report().
+  // changes, and the instructions are the same. The rows of a sample are processed together: after BeginRow and StepRow
+  // of each of them call StepRows, which spends credit (slices.hpp), until it returns true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     const int first = Layout::kRowBegin[joint], width = Layout::kFrontBegin[joint + 1] - Layout::kFrontBegin[joint];
     const int seen = Layout::kDense - first;
@@ -136,10 +137,10 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     return true;
   }
 
-  // What the filter knew of a block no longer counts: its columns start again without data. block: a joint (its front
-  // columns), or kJoints (the dense columns). The rows of front columns also contain dense columns. After a reset of
-  // these, such a row says less about its front column, so its weight is reduced. Only between samples; the calls are
-  // the same for all filters.
+  // What the filter knew of one part of the columns no longer counts: they start again without data. block: a joint
+  // (its front columns), or kJoints (the dense columns). The rows of front columns also contain dense columns. After a
+  // reset of these, such a row says less about its front column, so its weight is reduced. Only between samples; the
+  // calls are the same for all filters.
   static constexpr bool CanReset(int block) { return block >= 0 && block <= Layout::kJoints; }
   void BeginReset(int block) {
     const ColumnRange columns = ColumnsOfBlock<Layout>(block, kColumns);
@@ -174,7 +175,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   }
 
   // Read-out in slices: the prior's factor takes the triangle's rows as measurements of variance 1 / d. BeginReadOut,
-  // then StepReadOut until it answers true. No row between.
+  // then StepReadOut until it returns true. The filter must not take a row in between.
   void BeginReadOut(ReadOut& out) const {
     out.estimate.Start(*prior_);
     for (int p = 0; p < kColumns; ++p) out.estimate.d(p) *= 1.0f / (1.0f - kFloor);
@@ -208,14 +209,15 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   // measurement. The front columns of a row stand just before its first dense column, as in the triangle.
   static constexpr int Slot(int dense) { return (kStart.width + dense) * kJoints; }
 
-  // Some columns whose stored rows take `rows` rows, from row `first` on. length: of the elements after these columns.
+  // One pass: processes `rows` rows of the sample, from row `first` on, with `columns` stored rows, from `column` on.
+  // length: how many elements a row has after these columns.
   struct Pass {
     std::uint16_t stored, block;  // where the first stored row begins in rows_, and its element in block_
     std::uint16_t cost;
     std::uint8_t column, columns, first, rows, length;
   };
   static constexpr int kMostRows = kJoints < 6 ? kJoints : 6;  // of a pass
-  static constexpr int kFewRows = kJoints < 3 ? kJoints : 3;   // so many are worked into four columns at a time
+  static constexpr int kFewRows = kJoints < 3 ? kJoints : 3;   // so many are processed with four columns at a time
   template <int most>
   struct Passes {
     Pass at[most] = {};
@@ -330,7 +332,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     return (Layout::kDense - begin) * (Layout::kDense - begin + 1) / 2;
   }
 
-  // Begins to work row `column` of the triangle into the read-out's estimate.
+  // Begins to add row `column` of the triangle to the read-out's estimate.
   void BeginTake(int column, UdEstimate<Columns>& estimate) const {
     const float* stored = rows_ + kOffsets.at[column];
     const auto& at = Columns::kAt.position;
@@ -353,9 +355,9 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   UpdateReport report_[Layout::kJoints];
   float d_[kColumns] = {};
   float rows_[kTriangle] = {};
-  float block_[(kStart.width + Layout::kDense + 1) * Layout::kJoints] = {};  // what remains of the rows in work
+  float block_[(kStart.width + Layout::kDense + 1) * Layout::kJoints] = {};  // what remains of the rows of the sample
   float weight_[kJoints] = {};
-  std::uint32_t begun_ = 0;  // rows of the sample in work, a bit each
+  std::uint32_t begun_ = 0;  // rows of the present sample, a bit each
   int next_ = 0;             // pass
 };
 

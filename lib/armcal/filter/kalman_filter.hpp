@@ -7,9 +7,10 @@
 
 namespace armcal::filter {
 
-// Takes scalar rows one after the other. Process noise enters by rank-one sums, `considered` columns by Schmidt's form.
-// Each sample adds the noise of one column, in turn, and as much as is due until that column's next turn. The state is
-// [front, dense], and in an extended filter the kEta columns after it. Every call is bounded. Context: background.
+// Takes scalar rows one after the other. Process noise is added by rank-one sums. `considered` columns follow Schmidt's
+// form. After each sample, noise is added to one column only, and the next sample serves the next column. So the filter
+// adds the noise of one full round at once. The state is [front, dense], and in an extended filter eta after it. Every
+// call is bounded. Context: background.
 template <class Layout, Form form = Form::kDense, Beside beside = Beside::kNothing>
 class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
  public:
@@ -26,7 +27,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     int next = 0;
   };
 
-  // True if the form can represent what the prior asks for. The dense form always can.
+  // Returns true if the form can represent what the prior asks for. The dense form always can.
   static bool Suits(const Prior<Layout>& prior) {
     if (form == Form::kDense) return true;
     bool suits = true;
@@ -34,7 +35,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     return suits;
   }
 
-  // Starts at the prior, which must suit, and must stay as it is while the filter works.
+  // Starts at the prior. Suits(prior) must be true, and the prior must not change while the filter works.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
     estimate_.Start(prior);
@@ -54,7 +55,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   // One whitened row of `joint`. Shapes: front [the joint's front columns]; dense [kDense], zero before
   // kRowBegin[joint]; eta [kNonlinear], in an extended filter only. If use is false or the report is not kOk, no bit of
   // the estimate changes, and the instructions are the same. After BeginRow call StepRow, which spends credit
-  // (slices.hpp), until it answers true; then report().
+  // (slices.hpp), until it returns true; then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
     const int first = Columns::kAt.first[joint];
     const std::uint32_t taken = FillRow<Layout, Columns>(joint, front, dense, eta, y, use, estimate_.row(), report_);
@@ -93,10 +94,10 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     return true;
   }
 
-  // What the filter knew of a block no longer counts: the prior's variance is added to the variance of its columns. The
-  // estimate stays until data move it. block: a joint (its front columns), or kJoints (all others), which the block
-  // form cannot reset. Only between samples. After BeginReset call StepReset, which spends credit, until it answers
-  // true.
+  // What the filter knew of one part of the columns no longer counts: the prior's variance is added to the variance of
+  // its columns. The estimate stays until data move it. block: a joint (its front columns), or kJoints (all others),
+  // which the block form cannot reset. Only between samples. After BeginReset call StepReset, which spends credit,
+  // until it returns true.
   static constexpr bool CanReset(int block) {
     return block >= 0 && (form == Form::kDense ? block <= Layout::kJoints : block < Layout::kJoints);
   }
@@ -113,7 +114,8 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     return reset_.begin == reset_.end;
   }
 
-  // Read-out in slices, the same for all filters: BeginReadOut, then StepReadOut until it answers true. No row between.
+  // Read-out in slices, the same for all filters: BeginReadOut, then StepReadOut until it returns true. The filter must
+  // not take a row in between.
   void BeginReadOut(ReadOut& out) const {
     for (float& v : out.variance) v = 0.0f;
     out.next = 0;
@@ -128,14 +130,14 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   }
 
   float x(int column) const { return estimate_.x(Columns::kAt.position[column]); }
-  // Keeps x of a column within [low, high], and counts how often it had to. Only between samples.
+  // Keeps x of a column within [low, high] (prior units), and counts how often it had to. Only between samples.
   void Clamp(int column, float low, float high) {
     float& x = estimate_.x(Columns::kAt.position[column]);
     clamp_count_ += !(x >= low && x <= high);
     x = math::Max(low, math::Min(high, x));
   }
   std::uint32_t clamp_count() const { return clamp_count_; }
-  std::uint32_t floor_count() const { return floor_count_; }  // how often the floor held a D
+  std::uint32_t floor_count() const { return floor_count_; }  // how often a D was raised to the floor
   const Estimate& estimate() const { return estimate_; }
 
  private:
@@ -150,8 +152,8 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   bool AnyConsidered() const { return form == Form::kDense && prior_->any_considered; }
   int ConsideredCost() const { return AnyConsidered() ? Estimate::Work::SumCost(Columns::kShape, kSize - 1) : 0; }
 
-  // A sum starts at the last column that may have a turn, whichever column has it now. So each sum takes the same
-  // instructions.
+  // Where a sum of process noise starts. Dense form: at the last column with process noise, so all sums take the same
+  // instructions. Block form: at the last front column of the joint, so the instructions depend on the joint alone.
   int LastOf(int column) const {
     return form == Form::kBlock ? Columns::kAt.front_end[JointOf<Layout>(column)] - 1 : last_noise_;
   }
@@ -161,16 +163,14 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   UpdateReport report_;
   std::uint32_t considered_[(kSize + 31) / 32] = {};
   std::uint8_t turn_[kSize] = {};  // positions with noise
-  int joint_ = 0;                  // of the row in work
   int turns_ = 0, next_turn_ = 0, last_noise_ = 0;
   ColumnRange reset_ = {};  // what remains of a reset
   std::uint32_t floor_count_ = 0, clamp_count_ = 0;
 };
 
-// The Kalman filter over [front, dense, eta]. Rows are linearised at the estimate before the sample: y = tau - tau(x0)
-// + h x0, where h = [columns, d tau / d eta] at x0. Whoever makes the rows keeps to that (estimator/live_model.hpp). In
-// all else it is the same filter. The block form serves wherever process noise is on front columns only, because eta is
-// a dense column.
+// The Kalman filter over [front, dense, eta]. The caller linearises the rows at the estimate before the sample: y = tau
+// - tau(x0) + h x0, where h = [columns, d tau / d eta] at x0. estimator/live_model.hpp does this. eta counts as dense
+// columns. So the block form suits if only front columns have process noise and no column is considered.
 template <class Layout, Form form = Form::kDense>
 using ExtendedKalmanFilter = KalmanFilter<Layout, form, Beside::kEta>;
 

@@ -18,7 +18,7 @@ class ModeWeights {
     Average();
   }
 
-  // What a member predicted of a whitened row of the joint. A row that is not used says nothing.
+  // What a member predicted of a whitened row of the joint. A row that is not used changes nothing.
   void Add(int joint, int member, float innovation, float variance, bool used) {
     const float unlikely = 0.5f * (innovation * innovation / variance + math::Log(variance));
     log_likelihood_[joint][member] -= math::Masked(unlikely, math::MaskOf(used));
@@ -42,7 +42,7 @@ class ModeWeights {
     Average();
   }
 
-  // The mean of the joints' weights, for the columns that all joints see.
+  // The mean of the joints' weights, for the columns that act on several joints.
   void Average() {
     for (int m = 0; m < kMembers; ++m) {
       float sum = 0.0f;
@@ -51,9 +51,11 @@ class ModeWeights {
     }
   }
 
-  // Since the last exchange the friction may have changed to another member's behaviour. Fills in share[to][from]: how
-  // much of member `from` member `to` goes on with. A joint's weights change accordingly unless `due` is zero; the mean
-  // weights (kJoints) do not. Call it for kJoints first, then for all joints, then call Average.
+  // Step 1 of an exchange (IMM). Between two exchanges the friction may change from the behaviour of one member to that
+  // of another. Fills in share[to][from]: the weight of the old mean of member `from` in the new mean of member `to`;
+  // the sum over `from` is 1. Changes the weights of the joint accordingly, unless `due` is zero. With joint = kJoints
+  // it uses the mean weights and does not change them. Call it for kJoints first, then for all joints, then call
+  // Average.
   void Exchange(int joint, float (&share)[kMembers][kMembers], std::uint32_t due) {
     float next[kMembers];
     for (int to = 0; to < kMembers; ++to) next[to] = Shares(of(joint), to, share[to]);
@@ -81,11 +83,12 @@ class ModeWeights {
   float weight_[kJoints][kMembers] = {}, log_likelihood_[kJoints][kMembers] = {}, dense_[kMembers] = {};
 };
 
-// In each joint, the last front column with process noise has a slope: a second state that is added to the column with
-// each sample in motion. The three members differ in how far column and slope walk. For each joint, the innovations of
-// its rows decide how much each member counts. Every kMixEvery samples each member takes over a share of the others'
-// means, as in an IMM (H. Blom, Y. Bar-Shalom, 1988). It keeps its own covariance: mixing covariances would need new
-// factors of all three, and follows no better (measured). Context of every call: background.
+// In each joint, the last front column with process noise has a slope: a second state. In each sample in which the
+// joint moves, the slope is added to the column. The three members have different process noise for column and slope.
+// For each joint, the innovations of its rows decide the weights of the members. Every kMixEvery samples with motion,
+// the means of the members are mixed, as in an IMM (H. Blom, Y. Bar-Shalom, 1988). The covariances are not mixed: this
+// would need new factors of all three members, and measurements showed no better tracking. Context of every call:
+// background.
 template <class Layout>
 class ModelBank : public WholeRows<ModelBank<Layout>> {
  public:
@@ -108,8 +111,8 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     return suits;
   }
 
-  // Starts at the prior, which must suit, and must stay as it is while the filter works. The prior's process noise only
-  // says which columns change; each member has its own idea of how fast.
+  // Starts at the prior. Suits(prior) must be true, and the prior must not change while the filter works. The prior's
+  // process noise only tells which columns change. How fast they change is set by kModes and kOthers.
   void Restart(const Prior<Layout>& prior) {
     prior_ = &prior;
     for (int i = 0; i < kJoints; ++i) {
@@ -129,7 +132,8 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     floor_count_ = 0;
   }
 
-  // Calls and slices are those of the other filters. The report's innovation and variance are those of the mixture.
+  // Calls and slices are those of the other filters. The innovation and the variance of the report are those of the
+  // mixture.
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
     joint_ = joint;
     y_ = math::Masked(y, FillRow<Layout, Columns>(joint, front, dense, nullptr, y, use, row_, report_));
@@ -260,7 +264,8 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
   }
 
   // Adds the slope to its column, in x and in U. The slope stands after its column, so this adds rows of U and leaves
-  // D. Then adds noise to one front column of the joint, in turn, and as much as is due until its next turn.
+  // D. Then adds noise to one front column of the joint. The next sample in which the joint moves serves the next
+  // column. So it adds the noise of one full round at once.
   void Predict(int i) {
     const int first = Columns::kAt.first[i], slope = Columns::kAt.front_end[i] - 1, width = slope + 1 - first;
     const std::uint32_t moves = math::MaskOf((moving_ >> i & 1u) != 0u);
@@ -283,8 +288,9 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     turn_[i] = static_cast<std::uint8_t>((following & moves) | (turn_[i] & ~moves));
   }
 
-  // Mixes the members' means: first of the columns that all joints see (kJoints), then of each joint's own, joint 0
-  // last. It is computed with every sample, so that all samples cost the same. If `due` is zero, it changes nothing.
+  // Mixes the members' means: first of the columns that act on several joints (kJoints), then of each joint's own,
+  // joint 0 last. It is computed with every sample, so that all samples cost the same. If `due` is zero, it changes
+  // nothing.
   void Mix(int i, std::uint32_t due) {
     const bool dense = i == kJoints;
     float share[kMembers][kMembers];

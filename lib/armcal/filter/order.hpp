@@ -29,12 +29,14 @@ struct Front {
   std::uint8_t begin, end;  // positions
 };
 
-// The tables of an order, without the type of its layout. With these, one copy of the code that works on a factor
-// serves all filters of a form.
+// The look-up tables of an order, without the type of its layout. With these, one copy of the code that works on a
+// factor serves all filters of a form.
+// size: number of positions. fronts, denses: number of front and of dense columns. states: number of columns that have
+// a prior (front, dense and eta, but no slopes).
 struct AnyShape {
-  std::uint8_t size, fronts, denses, states;  // number of positions; of front, of dense, and of all prior columns
-  const std::uint8_t* position;               // of a column
-  const std::uint8_t* column;                 // at a position
+  std::uint8_t size, fronts, denses, states;
+  const std::uint8_t* position;  // by column: its position
+  const std::uint8_t* column;    // by position: its column
 };
 template <Form form>
 struct Shape;
@@ -45,7 +47,7 @@ struct Shape<Form::kDense> : AnyShape {
   constexpr int Origin(int p) const { return 3 * size + p * (p + 1) / 2; }
   constexpr int Begin(int) const { return 0; }
   constexpr int Begin(int, Front) const { return 0; }
-  // The next position that a row touches, after or before p; -1: none.
+  // Above: the next position after p that a row touches; `size`: none. Below: the next one before p; -1: none.
   constexpr int Above(int p, Front) const { return p + 1; }
   constexpr int Below(int p, Front) const { return p - 1; }
 };
@@ -53,8 +55,8 @@ template <>
 struct Shape<Form::kBlock> : AnyShape {
   const std::uint16_t* origin;
   const std::uint8_t* begin;
-  const std::uint8_t* above;  // the next dense position, after or before
-  const std::int8_t* below;
+  const std::uint8_t* above;  // by position: the next dense position after it; size: none
+  const std::int8_t* below;   // before it; -1: none
 
   static constexpr int kColumnCost = 8;
   constexpr int Origin(int p) const { return origin[p]; }

@@ -1,4 +1,4 @@
-// filter - the prior: where a filter starts, and what each column may do.
+// filter - the prior of a filter: start covariance, forgetting, process noise, and which columns are considered.
 //
 // Prior units: x_k = (b_k - b0_k) / s_k, where s_k^2 is the prior variance of column k. So every active column starts
 // with mean 0 and variance 1. Whitened rows: y = (tau - Y b0) / sigma and h_k = Y_k s_k / sigma, so the noise has
@@ -26,7 +26,7 @@ struct Prior {
   bool any_considered = false;
   float lambda[kStates] = {};  // forgetting per sample, in (0, 1] (forgetting form)
   float noise[kStates] = {};   // variance per sample, prior units (Kalman form)
-  float link_floor = 0.0f;     // the smallest D that a dense column may have (Kalman form)
+  float link_floor = 0.0f;     // the smallest D of a dense column and of eta (Kalman form)
 };
 
 // The joint of a front column, or kJoints for any other column. It takes the same instructions for every column.
@@ -36,14 +36,15 @@ constexpr int JointOf(int column) {
   for (int i = 0; i < Layout::kJoints; ++i) joint += column >= Layout::kFrontBegin[i + 1];
   return joint;
 }
-// The joints that must move before a column may change by itself: its own for a front column, all for any other.
+// The joints that must all move in a sample for process noise to be added to the column: its own joint for a front
+// column, all joints for any other. A bit each.
 template <class Layout>
 constexpr std::uint32_t JointsOf(int column) {
   const int joint = JointOf<Layout>(column);
   return joint < Layout::kJoints ? 1u << joint : (1u << Layout::kJoints) - 1u;
 }
 
-// The columns of a block that can be reset: the front columns of a joint, or (block kJoints) all other columns.
+// The columns that a reset takes together: the front columns of a joint, or (block kJoints) all other columns.
 struct ColumnRange {
   int begin, end;
 };

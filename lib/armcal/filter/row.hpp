@@ -1,4 +1,4 @@
-// filter - one whitened row before it is worked in: may it be used, and where its elements stand in a factor.
+// filter - prepares one whitened row: checks its numbers and copies it to the order of a factor.
 #pragma once
 
 #include "armcal/filter/order.hpp"
@@ -10,7 +10,7 @@ namespace armcal::filter {
 
 inline constexpr float kRowLimit = 1e6f;  // a larger element means a broken model, and float32 would overflow
 
-// A row is judged by its element of largest magnitude. The answer is kOk, kNotFinite or kOutOfRange. Context:
+// A row is checked by its element of largest magnitude. The answer is kOk, kNotFinite or kOutOfRange. Context:
 // background.
 inline std::uint32_t MagnitudeBits(float x) { return math::BitsOf(x) & 0x7FFFFFFFu; }
 inline core::Status Judge(std::uint32_t largest_magnitude_bits) {
@@ -23,8 +23,8 @@ inline core::Status GatedUnless(bool taken, core::Status judged) {
   const unsigned gated = !taken & (judged == core::Status::kOk);
   return static_cast<core::Status>(static_cast<unsigned>(judged) | gated * static_cast<unsigned>(core::Status::kGated));
 }
-// Fills in what the report can say before the row is worked in. Returns the mask for the row's elements: zero if the
-// row is not used.
+// Fills in status and accepted of the report, before the filter takes the row. Returns the mask for the row's elements:
+// zero if the row is not used.
 inline std::uint32_t Admit(bool use, std::uint32_t largest_magnitude_bits, UpdateReport& report) {
   report.status = Judge(largest_magnitude_bits);
   report.accepted = use & (report.status == core::Status::kOk);

@@ -1,4 +1,4 @@
-// filter - how a filter is called: in bounded slices or a whole row at once; and what it reports of a row.
+// filter - how a filter is called, in slices or in whole rows (WholeRows), and its report of a row (UpdateReport).
 //
 // Work is counted in elements of a factor's column: one element is eight instructions on a Cortex-M4F. A call in slices
 // is given `credit` and takes off what it spends. When no credit is left, it stops at the next place where it can,
@@ -15,7 +15,7 @@ namespace armcal::filter {
 inline constexpr int kSliceCredit = 2400;  // some 20 000 instructions: 0.2 ms on a Cortex-M4F at 168 MHz
 inline constexpr int kNoSlices = 1 << 30;  // enough for anything in one call
 
-// Credit of each slice when work of that cost is cut into equal ones.
+// Credit of each slice if work of this cost is divided into equal slices.
 constexpr int EqualSlices(int cost) {
   const int slices = (cost + kSliceCredit / 2) / kSliceCredit;
   return slices > 1 ? (cost + slices - 1) / slices : cost;
@@ -24,7 +24,7 @@ constexpr int EqualSlices(int cost) {
 // What one row did. Whitened units. All zero before a filter's first row: a static filter then needs no flash for its
 // initial bytes.
 struct UpdateReport {
-  float innovation = 0.0f;  // row minus its prediction by this filter before the row; 0 unless the row was judged
+  float innovation = 0.0f;  // whitened measurement minus this filter's prediction; 0 if not accepted
   float variance = 0.0f;    // its variance by this filter (forgetting form: from data alone, without the prior)
   bool accepted = false;
   core::Status status = core::Status::kOk;  // kOk, kGated, kNotFinite, kOutOfRange (element beyond kRowLimit)
@@ -33,10 +33,10 @@ struct UpdateReport {
 // The calls without slices, made of those in slices. Base of a Filter that has BeginRow, StepRow, report, BeginEnd and
 // StepEnd. Context: background.
 //
-// A sample: BeginRow, then StepRow until it answers true, for each row; then StepRows until it answers true. Then
-// BeginEnd, and StepEnd until it answers true. A filter that works rows in one by one (kTogether is false) has nothing
-// to do in StepRows, and its report is that of the row before, until the next BeginRow. Else the reports of all rows
-// stand after StepRows.
+// A sample: for each row BeginRow, then StepRow until it returns true. Then StepRows until it returns true. Then
+// BeginEnd, and StepEnd until it returns true. If kTogether is false, a row is finished after StepRow: call report()
+// before the next BeginRow; StepRows does nothing. If kTogether is true, all rows are finished after StepRows: call
+// report() for all rows then.
 template <class Filter>
 class WholeRows {
  public:

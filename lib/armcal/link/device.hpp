@@ -1,4 +1,4 @@
-// link - serves the registers of a drive, all but the traces, and keeps the seat of the one who writes.
+// link - serves the registers of a drive (without the traces), and allows one connection at a time to write.
 #pragma once
 
 #include <cstdint>
@@ -45,24 +45,28 @@ struct ResidualPage {
   float values[reg::kResidualValues] = {};
 };
 
-// What the application does when a client asks for it. None of these may wait. Context: background.
+// What the application does when a client asks for it. None of these may wait. The client gets the Status; if it is a
+// refusal, nothing may have changed. Context: background.
 struct ClientRequests {
   void* context;
-  // Puts learning on hold (true) or lets it go on (false).
+  // Puts learning on hold (true) or lets it go on (false). kOk, or a refusal of the application's choice.
   core::Status (*hold)(void* context, bool hold);
-  // Forgets what was learnt of a block: a joint from 0, or the number of joints for what acts on several of them. If it
-  // is refused, nothing changes.
+  // Forgets what was learnt of one part: a joint from 0, or the number of joints for what acts on several of them. kOk;
+  // kOutOfRange: no filter can reset this part.
   core::Status (*reset)(void* context, int block);
   // Fills all of `page`. joint: from 0.
   void (*take_residuals)(void* context, int joint, ResidualPage& page);
 };
 
-// One session at a time may write: the one that has unlocked. It keeps the seat until it gives it up, until it ends, or
-// until another session unlocks after it has not asked for Sessions::kPatience_ms. What it has staged goes with it.
-// Context of every call: background.
+// Only one session at a time may load tables and command learning: the one that has the seat. A session takes the seat
+// with `unlock`. It loses the seat when it writes 0 to `unlock`, when its connection ends, kUnlock_ms after its last
+// write that needs the seat, or when another session unlocks and this one has sent no request for
+// Sessions::kPatience_ms. The words that it has staged are then dropped; a save that has begun goes on. Context of
+// every call: background.
 class Device {
  public:
-  // The seat is free this long after the last write that needs it.
+  // The session loses the seat when this time has passed since its last write that needs the seat, or since its last
+  // unlock.
   static constexpr std::uint32_t kUnlock_ms = 60000;
 
   // `live` and `transaction` outlive the device.
@@ -77,7 +81,7 @@ class Device {
   // Adds to what the device says it can do (reg::kHasRawTrace ...). Call it before the first request.
   void Declare(std::uint32_t capabilities) { identity_.capabilities |= capabilities; }
 
-  // Tells the transaction and the lock what time it is. Call it in every turn of the background loop.
+  // Gives the time to the sessions, the seat and the transaction. Call it in every turn of the background loop.
   void Step(std::uint32_t now_ms);
 
   RegisterMap& map() { return map_; }  // for further blocks: traces, and the integrator's own

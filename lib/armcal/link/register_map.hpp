@@ -1,4 +1,4 @@
-// link - which block serves which registers, and how an owner of values becomes a block.
+// link - the register map: finds the block that serves a register, and makes blocks from member functions of a class.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,8 @@ enum class WriteRule : std::uint8_t {
   kWhole,   // only the whole block in one request
 };
 
-// A run of registers and who answers for them. `offset` counts from `first`; offset + count never exceeds the block.
+// A run of registers and the functions that serve them. `offset` counts from `first`; offset + count never exceeds the
+// block.
 struct Block {
   RegisterKind kind;
   std::uint16_t first;
@@ -33,7 +34,7 @@ struct Block {
   WriteRule rule;
 };
 
-// The last refusal, served as registers (reg::kErrorBlock).
+// The last refusal, served as registers (reg::kErrorBlock and reg::kErrorRequest).
 struct LastError {
   std::uint8_t exception = 0;
   std::uint8_t function = 0;
@@ -45,7 +46,7 @@ struct LastError {
 // The Modbus exception for a Status; 0 if the status is ok or limited.
 std::uint8_t ExceptionOf(core::Status status);
 
-// Context: background.
+// The blocks of a device, its sessions and its last refusal. Context of every call: background.
 class RegisterMap {
  public:
   static constexpr int kMaxBlocks = 40;

@@ -178,13 +178,13 @@ inline constexpr Register kErrorAddress = In(0x005A, 1, kU16, "error_address", "
 inline constexpr Register kErrorStatus = In(0x005B, 1, kU16, "error_status", "", "its Status");
 inline constexpr Register kErrorRequest = In(0x005C, 1, kU32, "error_request", "", "request_count of that request");
 inline constexpr Register kUnlocked = In(0x005E, 1, kU16, "unlocked", "", "1: table commands are accepted from this connection");
-inline constexpr Register kHealth = In(0x005F, 1, kU16, "health", "", "verdict of the monitor, 0 ok; bits: 1 filter A, 2 filter B: its deviations are smaller than its innovations");
+inline constexpr Register kHealth = In(0x005F, 1, kU16, "health", "", "result of the monitor, 0 ok; bits: 1 filter A, 2 filter B: its deviations are smaller than its innovations");
 inline constexpr Register kRowsUsedA = In(0x0060, 1, kU32, "rows_used_a", "", "rows that updated filter A since the adoption");
 inline constexpr Register kRowsGatedA = In(0x0062, 1, kU32, "rows_gated_a", "", "rows that were not admitted to filter A");
 inline constexpr Register kRowsUsedB = In(0x0064, 1, kU32, "rows_used_b", "", "as above, filter B");
 inline constexpr Register kRowsGatedB = In(0x0066, 1, kU32, "rows_gated_b", "", "as above, filter B");
 inline constexpr Span kStatusBlock = Between(kTransactionState, kRowsGatedB);
-inline constexpr Register kRowsOutsideA = In(0x0068, 1, kU32, "rows_outside_a", "", "rows in motion that the innovation gate kept from filter A since the adoption");
+inline constexpr Register kRowsOutsideA = In(0x0068, 1, kU32, "rows_outside_a", "", "rows in motion that the row gate kept from filter A since the adoption");
 inline constexpr Register kRowsOutsideB = In(0x006A, 1, kU32, "rows_outside_b", "", "as above, filter B");
 inline constexpr Register kImplausibleTicks = In(0x006C, 1, kU32, "implausible_ticks", "", "ticks with a count or current that the arm cannot have made");
 inline constexpr Register kTableFallbacks = In(0x006E, 1, kU32, "table_fallbacks", "", "stored tables passed over since power-up: not readable any more, or refused at boot");
@@ -192,8 +192,8 @@ inline constexpr Span kDoubtBlock = Between(kRowsOutsideA, kTableFallbacks);
 // Writing: why the last table was refused, who may write, and how long the board wants to wait.
 inline constexpr Register kRefusedStatus = In(0x0070, 1, kU16, "refused_status", "", "Status of the last check, 0: the table was accepted");
 inline constexpr Register kRefusedWord = In(0x0071, 1, kU16, "refused_word", "", "word of the table that it refused, from 0; 0xFFFF: no single one");
-inline constexpr Register kRefusedValue = In(0x0072, 1, kF32, "refused_value", "SI", "what was found there");
-inline constexpr Register kRefusedBound = In(0x0074, 1, kF32, "refused_bound", "SI", "what would have been accepted");
+inline constexpr Register kRefusedValue = In(0x0072, 1, kF32, "refused_value", "SI", "the number in that word; for friction the braking torque of the joint, N*m");
+inline constexpr Register kRefusedBound = In(0x0074, 1, kF32, "refused_bound", "SI", "the limit that it must keep; for a word of bits the bits that may be set");
 inline constexpr Register kWriterSeat = In(0x0076, 1, kU16, "writer_seat", "", "0 free, 1 this connection writes, 2 another one does");
 inline constexpr Register kSaveWait = In(0x0077, 1, kU16, "save_wait", "s", "until the board allows the next save, 0: now");
 inline constexpr Span kWritingBlock = Between(kRefusedStatus, kSaveWait);
@@ -202,9 +202,9 @@ inline constexpr Span kErrorBlock = Between(kErrorException, kErrorStatus);
 // Estimates: lists of floats, one a joint or one a column.
 inline constexpr Register kResidualRms = In(0x0080, kMaxJoints, kF32, "residual_rms", "N*m", "per joint: measured torque minus committed model");
 inline constexpr Register kConsistency = In(0x00A0, kMaxJoints, kF32, "consistency", "", "per joint: mean normalised innovation squared, 1 expected");
-inline constexpr Register kEstimateA = In(0x0100, kMaxColumns, kF32, "estimate_a", "SI", "filter A, per column; NaN: no estimate yet");
+inline constexpr Register kEstimateA = In(0x0100, kMaxColumns, kF32, "estimate_a", "SI", "filter A, per column; 0 before the first read-out");
 inline constexpr Register kDeviationA = In(0x0300, kMaxColumns, kF32, "deviation_a", "SI", "its standard deviation");
-inline constexpr Register kEstimateB = In(0x0500, kMaxColumns, kF32, "estimate_b", "SI", "filter B, per column; NaN: no estimate yet");
+inline constexpr Register kEstimateB = In(0x0500, kMaxColumns, kF32, "estimate_b", "SI", "filter B, per column; 0 before the first read-out");
 inline constexpr Register kDeviationB = In(0x0700, kMaxColumns, kF32, "deviation_b", "SI", "its standard deviation");
 
 // Residual statistics of one joint: a header, then values, without a gap.
@@ -268,7 +268,7 @@ inline constexpr Register kScratchU32 = Hold(0x0058, kScratchValues, kU32, kWrit
 // These start a recording and release its pages.
 inline constexpr Register kTraceRecording = Twice(Hold(0x0100, 1, kU16, kBlock, "trace0_arm", "", "client's number of this recording"), "trace1_arm", kStartStride);
 inline constexpr Register kTraceMode = Twice(Within(0, 2, Hold(0x0101, 1, kU16, kBlock, "trace0_mode", "", "0 off, 1 one-shot, 2 streaming")), "trace1_mode", kStartStride);
-inline constexpr Register kTraceDecimation = Twice(Within(1, 65535, Hold(0x0102, 1, kU16, kBlock, "trace0_decimation", "", "samples averaged into one record, at least 1")), "trace1_decimation", kStartStride);
+inline constexpr Register kTraceDecimation = Twice(Within(1, 65535, Hold(0x0102, 1, kU16, kBlock, "trace0_decimation", "", "samples for one record, at least 1: averaged in trace 0, the last one in trace 1")), "trace1_decimation", kStartStride);
 inline constexpr Register kTraceReserved = Twice(Within(0, 0, Hold(0x0103, 1, kU16, kBlock, "trace0_reserved", "", "0")), "trace1_reserved", kStartStride);
 inline constexpr Register kTraceStartTick = Twice(Hold(0x0104, 1, kU32, kBlock, "trace0_start_tick", "", "first tick; one that has passed starts at once"), "trace1_start_tick", kStartStride);
 inline constexpr Register kTraceLimit = Twice(Hold(0x0106, 1, kU32, kBlock, "trace0_limit", "", "records to take, 0: until full or switched off"), "trace1_limit", kStartStride);
@@ -283,7 +283,8 @@ inline constexpr Register kLearningReset = Within(1, kMaxJoints + 1, Hold(0x0151
 inline constexpr Register kStagedTable = Hold(0x1000, kMaxTableWords, kU16, kWrite, "staged_table", "", "the table being loaded");
 inline constexpr Register kActiveTable = Hold(0x2000, kMaxTableWords, kU16, kRead, "active_table", "", "the table in force");
 
-// Every register above. If one is missing here, the compiler notices it inside a block, and a test notices any other.
+// Every register above must be in this list. For a register inside a block that the static_assert below names, the
+// compiler finds an omission. For all others a test finds it.
 inline constexpr const Register* kDeclared[] = {
   &kMagic, &kMapMajor, &kMapMinor, &kLayoutCrc, &kSchema, &kFirmwareVersion, &kSerialNumber, &kProbeFloat, &kProbeU32, &kAxes,
   &kParameters, &kColumns, &kTableWords, &kCapabilities, &kTickRate, &kSampleTicks, &kPageDataWords,
@@ -375,8 +376,8 @@ constexpr bool IsWhole(const Span& block) {
     if (r.kind == block.kind && r.access == block.access && r.address == at && at < block.end()) at = SpanOf(r).end();
   return at == block.end();
 }
-static_assert(IsWhole(reg::kIdentityBlock) && IsWhole(reg::kStatusBlock) && IsWhole(reg::kWritingBlock) &&
-                  IsWhole(reg::kErrorBlock) && IsWhole(reg::kResidualHeaderBlock) &&
+static_assert(IsWhole(reg::kIdentityBlock) && IsWhole(reg::kStatusBlock) && IsWhole(reg::kDoubtBlock) &&
+                  IsWhole(reg::kWritingBlock) && IsWhole(reg::kErrorBlock) && IsWhole(reg::kResidualHeaderBlock) &&
                   IsWhole(reg::kResidualValuesBlock) && IsWhole(reg::kTracePageBlock) && IsWhole(reg::kCommandBlock) &&
                   IsWhole(reg::kWindowHeader) && IsWhole(reg::kWindowBlock) && IsWhole(reg::kTraceStartBlock),
               "a block has a gap, or a register of it is not listed in kDeclared");

@@ -15,7 +15,7 @@ inline constexpr std::size_t kMaxRtuFrame = 1 + kMaxPdu + 2;
 // The receiver of one line. A request of a known function ends at its known length if the checksum agrees. The reply of
 // another device ends in the same way and is skipped. Everything else ends with silence. Silence alone would not be
 // enough, because a host's operating system cannot keep the 3.5 characters of the specification. Length alone would not
-// be enough, because after a garbled length nothing would be heard for a long time.
+// be enough, because after a garbled length nothing would be heard for a long time. Context of every call: background.
 class RtuFramer {
  public:
   enum class Result : std::uint8_t { kNothing, kRequest, kBroadcast };
@@ -50,6 +50,9 @@ class RtuFramer {
   std::uint32_t last_byte_ms_ = 0;
 };
 
+// The service of one serial line, which is one session for as long as the power is on. `engine` must outlive it. Call
+// Poll more often than once in silence_ms, or a frame that arrives in two portions is lost. Context of every call:
+// background.
 class RtuService {
  public:
   RtuService(PduEngine& engine, const hardware::Serial& serial, const hardware::Clock& clock, std::uint8_t address,
@@ -60,8 +63,8 @@ class RtuService {
         framer_(address, silence_ms),
         session_(engine.sessions().Begin()) {}
 
-  // Reads one portion of bytes and answers at most one request. It never waits. While an answer takes more slices of
-  // the background, it reads nothing. Context: background.
+  // Reads one portion of bytes and answers at most one request. It never waits. While the answer to a request is not
+  // ready, it reads nothing.
   void Poll();
 
  private:

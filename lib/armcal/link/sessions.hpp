@@ -1,20 +1,22 @@
-// link - who asks: the connections that are open, the one whose request is carried out, and the one that may write.
+// link - open connections: which one sent the present request, and which one may write.
 #pragma once
 
 #include <cstdint>
 
 namespace armcal::link {
 
-// A session is a TCP connection, or a serial line for as long as the power is on. Its number is never used again for
-// another one (they wrap after 2^28). Session 0 is the firmware itself, which asks without a connection. What a session
-// owns is free for others when it has ended, or when it has not asked for kPatience_ms. Context: background.
+// A session is a TCP connection, or a serial line for as long as the power is on. Session numbers repeat only after
+// some 2^28 sessions. Session 0 is the firmware itself, which asks without a connection. Another session may take over
+// what a session owns (the seat, a recording) when that session has ended, or when it has sent no request during the
+// last kPatience_ms. Context of every call: background.
 class Sessions {
  public:
   static constexpr int kMost = 12;
   static constexpr std::uint32_t kPatience_ms = 10000;
   static constexpr std::uint32_t kNobody = 0xFFFFFFFF;
 
-  // 0: there are kMost sessions already; the new one then shares what the firmware itself may do.
+  // Begins a session and returns its number. 0: there are kMost sessions already; the new connection then shares what
+  // the firmware itself may do.
   std::uint32_t Begin() {
     for (std::uint32_t slot = 0; slot < kMost; ++slot) {
       if (open_[slot] != 0) continue;
@@ -25,6 +27,7 @@ class Sessions {
     }
     return 0;
   }
+  // The session's connection is gone. A session that is not open is ignored.
   void End(std::uint32_t session) {
     if (IsOpen(session) && session != 0) open_[session % 16] = 0;
   }
@@ -33,6 +36,7 @@ class Sessions {
     asking_ = session;
     if (IsOpen(session) && session != 0) seen_ms_[session % 16] = now_ms_;
   }
+  // The present time. Call it in every turn of the background.
   void Tell(std::uint32_t now_ms) { now_ms_ = now_ms; }
 
   std::uint32_t asking() const { return asking_; }
@@ -46,6 +50,7 @@ class Sessions {
 
   // The seat: the one session that has unlocked, or kNobody.
   std::uint32_t writer() const { return writer_; }
+  // Gives the seat to a session, or to kNobody.
   void SetWriter(std::uint32_t session) { writer_ = session; }
 
  private:

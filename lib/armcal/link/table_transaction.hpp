@@ -17,8 +17,8 @@ struct TableApplication {
   // words. Else kOk, or the reason of refusal. What was built stays ready until the next check; nothing is in force
   // yet. `first`: a new check begins, whatever became of the one before.
   core::Refusal (*check)(void* context, const std::uint16_t* words, bool first);
-  // Answers what adopt() would answer now: kOk or kAxisEnabled. It has no effect. The transaction asks before it stores
-  // anything.
+  // Says whether adopt() would succeed now: kOk, kAxisEnabled, or kWrongOrder (no checked table is ready). It has no
+  // effect. The transaction calls it before it stores anything.
   core::Status (*permit)(void* context);
   // Puts in force what the last check built. kBusy: call again, it is not finished. Any other answer but kOk: no
   // effect. The transaction calls it only as long as the staged words are those of the last check.
@@ -42,12 +42,15 @@ struct TableCommand {
 };
 
 // A client opens, stages words in any order, checks, saves and polls the state. A save stores the table, reads it back
-// and then adopts it, so the table in force changes last. If the application goes on refusing the adoption, the stored
-// record is taken back: kFailed always means that everything is as before. A command that comes again with the same
-// sequence number and content has no second effect, so a client that lost a reply may ask again. Context: background.
+// and then adopts it. So the table in force changes last. If the application refuses the adoption (kBusy and
+// kAxisEnabled: if it still does so after kStageTimeout_ms), the stored record is erased, and the state is kFailed: the
+// table before is in force. Status kStorageFault means that the storage failed; see TableStore::Step. A command with
+// the same sequence number and content as the last accepted one has no second effect. So a client that lost a reply may
+// send it again. Context of every call: background.
 class TableTransaction {
  public:
-  // After this time a stage without writes is dropped, and an adoption that stays refused is given up.
+  // After this time without a write, the staged words are dropped. After this time, an adoption that is still refused
+  // is given up.
   static constexpr std::uint32_t kStageTimeout_ms = 30000;
 
   // `staged`, `active`: buffers [words] that outlive this. `active` may hold defaults, which Boot() replaces.
@@ -61,19 +64,21 @@ class TableTransaction {
   core::Status Boot();
 
   // kWrongOrder: not in this state, or the sequence is 0 or was used with other content. kOutOfRange: no such command.
-  // kWrongSchema, kWrongSize: not a table of this firmware. kBadCrc. kBusy: committing, or another command is being
-  // checked. kTooSoon: the rate of saves. Or the application's answer. kUnfinished: it is being checked; the same
-  // command again gives the answer when Step() has done the rest.
+  // kWrongSchema, kWrongSize: not a table of this firmware. kBadCrc: check: the staged words have another checksum;
+  // save: the checksum is not that of the last check. kBusy: committing, or another command is being checked. kTooSoon:
+  // the rate of saves. Or the application's answer. kUnfinished: it is being checked; the same command again gives the
+  // answer when Step() has done the rest. kStorageFault and kTimeout appear in status() only.
   core::Status Command(const TableCommand& command);
-  // True if it is the last command that was accepted, come again: it would have no effect.
+  // Returns true if `command` equals the last accepted command, sequence number included. Then Command() has no effect.
   bool IsRepeat(const TableCommand& command) const;
-  // Drops a stage and a check, because their writer is gone. A commit goes on.
+  // Drops the staged words and a running check, because their writer is gone. A commit goes on.
   void Abandon();
 
-  // offset + count <= words(). kWrongOrder: no stage is open. kBusy: committing.
+  // offset + count <= words(). kWrongOrder: no transaction is open. kBusy: committing or checking.
   core::Status WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
 
-  // Does one bounded piece of a check or a commit. Drops a stage without writes (state kIdle, status kTimeout).
+  // Does one bounded piece of a check or a commit. Drops the staged words after kStageTimeout_ms without a write (state
+  // kIdle, status kTimeout).
   void Step(std::uint32_t now_ms);
 
   TransactionState state() const { return state_; }

@@ -13,12 +13,12 @@ inline constexpr std::size_t kMaxTcpFrame = kMbapBytes + kMaxPdu;
 
 // The receiver of one connection. A frame ends where its header says, whatever its function code is. After a header
 // with another protocol than 0 or a length outside 2..254 the beginning of the next frame is unknown, so the connection
-// has to be closed.
+// has to be closed. Context of every call: background.
 class TcpFramer {
  public:
   enum class Result : std::uint8_t { kNeedMore, kFrame, kBroken };
 
-  // Takes bytes up to the end of one frame; `used` says how many. Call it again with the rest. Context: background.
+  // Takes bytes up to the end of one frame; `used` says how many. Call it again with the rest.
   Result OnBytes(const std::uint8_t* bytes, std::size_t count, std::size_t& used);
 
   // Function code and data. Valid after kFrame, until the next OnBytes.
@@ -38,7 +38,7 @@ class TcpFramer {
 };
 
 // One framer and one session for each connection slot. A byte server calls these functions; `context` is the
-// TcpService.
+// TcpService. Context of every call: background.
 template <int kSlots>
 class TcpService {
  public:
@@ -46,21 +46,22 @@ class TcpService {
 
   explicit TcpService(PduEngine& engine, Rights rights = Rights::kReadWrite) : engine_(engine), rights_(rights) {}
 
-  // A new connection has taken the slot.
+  // A new connection has taken the slot. If all sessions are in use, it is served as session 0 (see Sessions::Begin).
   static void Open(void* context, int slot) {
     Self(context).framers_[slot].Reset();
     Self(context).Restart(slot, Self(context).engine_.sessions().Begin());
   }
   // The slot's connection is gone.
   static void Close(void* context, int slot) { Self(context).Restart(slot, 0); }
-  // True if the slot's connection should not make room for another one, because it writes.
+  // Returns true if the slot's connection should not make room for another one, because it has the seat.
   static bool Keep(void* context, int slot) {
     const std::uint32_t session = Self(context).session_[slot];
     return session != 0 && Self(context).engine_.sessions().writer() == session;
   }
 
-  // Takes at most one request out of `bytes` and puts its reply into `reply` [kMaxReply]. `used` says how many bytes it
-  // took; call it again with the rest. False: the stream cannot be understood any more, close the connection.
+  // Takes at most one request out of `bytes` [count] and puts its reply into `reply` [kMaxReply]. `used` says how many
+  // bytes it took; call it again with the rest. Returns false if the stream cannot be understood any more; then close
+  // the connection.
   static bool Receive(void* context, int slot, const std::uint8_t* bytes, std::size_t count, std::size_t* used,
                       std::uint8_t* reply, std::size_t* reply_bytes) {
     TcpFramer& framer = Self(context).framers_[slot];
@@ -80,11 +81,11 @@ class TcpService {
     return true;
   }
 
-  // True if the slot's request takes more slices of the background. Call Receive again in the next turn, also without
-  // bytes, until this is false; it takes none of them before.
+  // Returns true if the reply to the slot's request is not ready. Then call Receive again in the next turn of the
+  // background, with or without bytes, until Asked returns false. Receive takes no bytes meanwhile.
   static bool Asked(void* context, int slot) { return Self(context).asked_[slot]; }
 
-  // True if a part of a frame is there. The rest should follow soon.
+  // Returns true if a part of a frame is there. The rest should follow soon.
   static bool MidFrame(void* context, int slot) { return Self(context).framers_[slot].mid_frame(); }
 
  private:

@@ -12,9 +12,9 @@ namespace armcal::link {
 
 // What a client asks for when it starts a recording.
 struct Recording {
-  std::uint16_t number = 0;  // the client's; a request that is written twice starts one recording
+  std::uint16_t number = 0;  // the client's; not 0: the same request written again starts no new recording
   TraceMode mode = TraceMode::kOff;
-  std::uint16_t decimation = 1;  // samples averaged into one record
+  std::uint16_t decimation = 1;  // offered samples for one record
   std::uint32_t start_tick = 0;  // a tick in the past (up to 2^31 ticks) starts at once
   std::uint32_t limit = 0;       // records, 0: no limit
   std::uint32_t channels = 0;
@@ -36,13 +36,14 @@ struct TracePage {
   std::uint16_t generation = 0;
 };
 
-// One context produces (tick or background) and one reads (background). Neither waits for the other. When the ring is
-// full, the new record is refused and counted. A recording belongs to the connection that started it; another one may
-// read it, but neither release its pages nor start another recording while the owner is there. A page stays as it is
-// until the reader names the next record it wants, so a reader that lost a reply can read it again.
+// One context writes records (tick or background), and the background reads them. Neither waits for the other. When the
+// ring is full, the new record is refused and counted. A recording belongs to the connection that started it. Other
+// connections may read it. While the owner is present (Sessions::IsPresent), they may not release its pages and may not
+// start another recording (kSeatTaken). A page stays as it is until the reader names the next record that it wants. So
+// a reader that lost a reply can read the page again.
 class Trace {
  public:
-  // Answers how many words a record of these channels has, or 0 if they are not served.
+  // Returns how many words a record of these channels has, without its stamp. 0: the channels are not served.
   using RecordWords = std::uint16_t (*)(void* context, std::uint32_t channels);
 
   // `tick_step`: ticks from one offered sample to the next. `storage` outlives this (see TraceRing below).
@@ -51,6 +52,8 @@ class Trace {
   Trace(const Trace&) = delete;
 
   // Reader ------------------------------------------------------------------------------------------------------------
+  // Context: background.
+
   // Drops all records and starts a new recording. kOutOfRange: no such mode, decimation 0, channels that are not
   // served, or a record that is too long.
   core::Status Start(Recording recording);
@@ -62,10 +65,11 @@ class Trace {
 
   // The present page. If there is none and records wait, it forms one. Count 0: there is no record.
   const TracePage& Page();
-  // Copies words of the present page. kBadAddress: they lie beyond it.
+  // Copies words [count] of the present page, which are its records without stamps. kBadAddress: they lie beyond it.
   core::Status ReadPage(std::uint32_t offset, std::uint16_t count, std::uint16_t* words) const;
 
-  // The window of the present page, which is formed if there is none: header and as many whole records as fit.
+  // Copies words [count] of the short page (registers trace0_window_...): a header and as many whole records of the
+  // present page as fit. Forms a page if there is none. offset + count must not exceed the block.
   core::Status ReadWindow(std::uint16_t offset, std::uint16_t count, std::uint16_t* words);
 
   // Serves this as trace `number`: 0 (raw samples) or 1 (processed samples). kOutOfRange: no such number. Else what
@@ -78,6 +82,8 @@ class Trace {
   TraceState state() const;
 
   // Producer ----------------------------------------------------------------------------------------------------------
+  // Context: the one that writes records (tick or background).
+
   // Call it with every sample. It takes over a recording that a client has started meanwhile. If a tick is missing, the
   // averaging window starts anew.
   TraceTurn Offer(std::uint32_t tick);

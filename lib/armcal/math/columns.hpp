@@ -1,10 +1,10 @@
-// math - the inner loops of every triangular factor, on one column or on two at once.
+// math - inner loops of the filters: products of columns, Bierman's update, Givens rotations of one row or several.
 //
-// A loop over two columns reads and writes the vector that they share only once. That takes seven instructions for an
-// element on a Cortex-M4F instead of eight, and half of the loop's own instructions. Each element sees the same
-// operations in the same order as if one column came after the other, so the bits are the same. A multiplication and an
-// addition stay two operations: this gives the same bits everywhere, and on a Cortex-M4F it takes two cycles where the
-// fused operation takes three. Context: any.
+// A loop over two columns reads and writes their common vector once instead of twice. On a Cortex-M4F that takes seven
+// instructions for an element instead of eight, and the loop's counter and branch run half as often. Each element sees
+// the same operations in the same order as if one column came after the other, so the bits are the same. A
+// multiplication and an addition are never fused. So the bits are the same on all machines, and on a Cortex-M4F the
+// pair takes two cycles instead of three. Context: any.
 #pragma once
 
 #include <cstdint>
@@ -57,7 +57,7 @@ ARMCAL_NOINLINE T Dot(const T* __restrict a, const T* __restrict b, int length, 
   internal::ByFours(length, [&](int k) ARMCAL_INLINE { sum += a[k] * b[k]; });
   return sum;
 }
-// The same for two columns a1 and a2 with one b.
+// The same for two columns a1 and a2 with one b. Shapes: [length]. sum1, sum2: what the two sums start with.
 template <class T>
 struct Two {
   T first, second;
@@ -80,11 +80,12 @@ void AddScaled(T* __restrict x, const T* __restrict a, T step, int length) {
 }
 
 // One column of Bierman's measurement update: u += gain shift and gain += u v, both with the old u and the old gain.
+// Shapes: u, gain [length].
 template <class T>
 void BiermanColumn(T* __restrict u, T* __restrict gain, T shift, T v, int length) {
   for (int k = 0; k < length; ++k) internal::BiermanElement(u[k], gain[k], shift, v);
 }
-// The same with column u1, then with u2.
+// The same with column u1, then with u2. Shapes: [length].
 template <class T>
 ARMCAL_NOINLINE void BiermanColumns(T* __restrict u1, T* __restrict u2, T* __restrict gain, T shift1, T v1, T shift2,
                                     T v2, int length) {
@@ -96,18 +97,19 @@ ARMCAL_NOINLINE void BiermanColumns(T* __restrict u1, T* __restrict u2, T* __res
   });
 }
 
-// Subtracts x0 times r from x, then adds s times what is left of x to r. This is a Givens rotation without square
-// roots, and also a column of a rank-one sum. r changes by a small correction, so that little is lost to rounding.
+// Subtracts x0 times r from x, then adds s times what is left of x to r. Shapes: x, r [length]. This is a Givens
+// rotation without square roots, and also a column of a rank-one sum. r changes by a small correction, so that little
+// is lost to rounding.
 template <class T>
 void Fold(T* __restrict x, T* __restrict r, T x0, T s, int length) {
   for (int k = 0; k < length; ++k) internal::FoldElement(x[k], r[k], x0, s);
 }
-// A row worked into a unit upper triangle R by Givens rotations without square roots: W. M. Gentleman, Least squares
-// computations by Givens transformations without square roots, 1973. The triangle stands for the information R' diag(d)
-// R. A row of zeros leaves every bit as it was.
+// Below: Givens rotations without square roots, which add a row to a unit upper triangle R. W. M. Gentleman, Least
+// squares computations by Givens transformations without square roots, 1973. The triangle stands for the information R'
+// diag(d) R. A row of zeros leaves every bit as it was.
 
-// Adds x0, which has the given weight, to d. Fills in s: the share of the remainder that the stored row takes. Returns
-// the weight of the remainder.
+// Adds weight x0^2 to d. Fills in s, the share of the remainder that Fold adds to the stored row. Returns the weight of
+// the remainder.
 template <class T>
 T GivensPivot(T& d, T x0, T weight, T& s) {
   const T wx = weight * x0;
@@ -119,12 +121,13 @@ T GivensPivot(T& d, T x0, T weight, T& s) {
   return remaining;
 }
 
-// A block of rows is worked in together: element k of row i is x[k * stride + i]. Several stored rows take them at a
-// time. Each stored row takes the rows in their order, so the bits are those of one row after the other. But each
-// element is loaded once for all stored rows, and each stored element once for all rows.
-// Stored rows stand one behind the other: (1, r[0..]) for element 0, then (1, ...) for element 1, and so on; each of
-// them has one element less than the one before. All have d > 0. `length`: the elements of a row after those that are
-// eliminated.
+// Below, "rows" are the new rows of a sample, and "stored rows" are rows of the triangle. One call adds a block of rows
+// to several stored rows. Element k of row i is x[k * stride + i]. Each stored row takes the rows in their order, so
+// the bits are the same as with one row at a time. But each element of a row is loaded once for all stored rows, and
+// each element of a stored row once for all rows.
+// The stored rows lie one after the other in memory: (1, r[0..]) for element 0, then (1, ...) for element 1, and so on.
+// The 1 itself is not stored. Each stored row is one element shorter than the one before. All have d > 0. `length`: how
+// many elements a row has after the eliminated ones.
 
 namespace internal {
 // Calls f for 0 .. count - 1, each a constant. Unrolled by hand: at -O2 a compiler keeps such loops and their arrays.
@@ -160,8 +163,9 @@ ARMCAL_INLINE inline void FoldTurn(T* __restrict x, T* const* r, const T* c) {
 }
 }  // namespace internal
 
-// Folds all elements of `rows` rows, from the second one after the eliminated ones on, into `stored` stored rows. With
-// more than one row `length` is odd.
+// The rest of the elimination, after GivensCorner: folds `rows` rows into `stored` stored rows. GivensCorner has
+// already done the first element after the eliminated ones; this does all others. If rows > 1, `length` must be odd,
+// because the loop may take two elements at a time.
 template <int rows, int stored, int stride, class T>
 ARMCAL_NOINLINE void FoldBlock(T* __restrict x, T* __restrict first, const T* __restrict rotation, int length) {
   constexpr int kTurns = rows * stored <= 10 ? 2 : 1;  // as many as the registers hold
@@ -182,9 +186,11 @@ ARMCAL_NOINLINE void FoldBlock(T* __restrict x, T* __restrict first, const T* __
     if (r[0] < end) turns(std::integral_constant<int, 1>{});
 }
 
-// The part of an elimination that goes row by row: all pivots, and the elements up to the first one after them. Row i
-// begins at element first[i] - column if that is positive, else at 0. Changes the rows' weights [rows] to those of what
-// remains. Fills in rotation [rows][stored][2]: x0 and s of Fold.
+// The part of an elimination that takes the rows one by one: it computes all pivots, and changes the elements up to the
+// first one after the pivots. x: the rows. d [stored], first: the stored rows. `column`: number of the first stored
+// row, counted as in begin [rows]. Row i is zero before stored row begin[i] - column, so these stored rows are skipped,
+// but never the last one. If the number is not positive, none is skipped. weight [rows]: on return the weights of the
+// remainders. Fills in rotation [rows][stored][2] with x0 and s of Fold.
 template <int stored, int stride, class T>
 ARMCAL_NOINLINE void GivensCorner(T* d, T* first, T* __restrict x, int length, const std::uint8_t* begin, int column,
                                   int rows, T* __restrict weight, T* __restrict rotation) {

@@ -179,7 +179,7 @@ T Log(const T& x) {
   return log(x);
 }
 
-// x >= 0; 0 for x = 0. float: relative error < (2 + |y log x|) 2e-7.
+// x^y for x > 0. For x <= 0 the result is 0, also if y is 0. float: relative error < (2 + |y log x|) 2e-7.
 template <class T>
 T Pow(const T& x, const T& y) {
   return Select(x > T(0), Exp(y * Log(x)), x * T(0));

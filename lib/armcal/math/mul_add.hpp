@@ -1,11 +1,11 @@
-// math - a b + c, with one rounding where the machine can do that in one instruction.
+// math - a b + c, for float with one rounding on every machine.
 #pragma once
 
 namespace armcal::math {
 
-// float: rounded once everywhere, so that host and target agree bit for bit. It is one instruction on Cortex-M4F and
-// M7, and the C library's exact fmaf on a host that has no such instruction. Other scalars: rounded once where that is
-// one instruction, else twice. Context: any.
+// float: rounded once on every machine, so that host and target agree bit for bit. That is one instruction on a
+// Cortex-M4F or M7. A host without such an instruction calls the C library's exact fmaf. double: rounded once if the
+// compiler defines __FMA__, else twice. Other scalars: rounded twice. Context: any.
 inline float MulAdd(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
 
 inline double MulAdd(double a, double b, double c) {

@@ -1,9 +1,9 @@
 // math - symmetric matrices, packed, and their factors U D U' and R' R.
 //
 // Packed by columns: element (i, j) with i <= j is number j (j + 1) / 2 + i, and the size is n (n + 1) / 2. P = U D U'
-// with a unit upper triangular U; the diagonal of the packed factor holds D. Every kernel takes the same instructions
-// whatever the numbers are, and allocates nothing. filter/factor.hpp has what rows and noise do to a filter's factor,
-// in slices. Context: any.
+// with a unit upper triangular U; the diagonal of the packed factor holds D. Shape of ud in all functions: [UdSize(n)].
+// Every kernel takes the same instructions whatever the numbers are, and allocates nothing. filter/factor.hpp has what
+// rows and noise do to a filter's factor, in slices. Context: any.
 #pragma once
 
 #include "armcal/math/elementary.hpp"
@@ -32,9 +32,10 @@ void UdAdd(T* __restrict ud, T c, T* __restrict a) {
   }
 }
 
-// P = W W' by modified weighted Gram-Schmidt (Thornton). Shapes: w [n x m] row-major, overwritten by rows w~ with
-// W = U w~, w~ w~' = D; ud [UdSize(n)]. A row that depends on those below it (to 1e-10 of its square) gets D = 0.
-// Begin, then Step until it answers true: a call works on `pairs` pairs of rows, of which there are n (n + 1) / 2.
+// P = W W' = U D U' by modified weighted Gram-Schmidt (Thornton). Shapes: w [n x m] row-major, overwritten by w~ with W
+// = U w~ and w~ w~' = D; ud [UdSize(n)]. If at most 1e-10 of a row's squared length is left after the rows below it are
+// subtracted, its D is 0. Call Begin, then Step until it returns true. One call works on `pairs` pairs of rows. There
+// are n (n + 1) / 2 pairs, because a row with itself counts as one.
 template <int n, int m, class T>
 class UdOfSquareRoot {
  public:

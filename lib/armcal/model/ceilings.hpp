@@ -14,10 +14,10 @@
 namespace armcal::model {
 
 struct JointCeiling {
-  float torque_Nm;    // no torque limit is higher, so no table commands more
-  float friction_Nm;  // no sum of the joint's friction columns is higher
-  float feed_Nm;      // tolerance: the sum may push by this much, with the motion
-  float scale_low, scale_high;
+  float torque_Nm;              // no torque limit is higher, so no table commands more
+  float friction_Nm;            // no sum of the joint's friction columns is higher
+  float feed_Nm;                // tolerance: the friction may drive the joint by up to this torque
+  float scale_low, scale_high;  // of the torque scale
   float sigma_low_Nm, sigma_high_Nm;
   float v_min_low_radps, v_min_high_radps;
   float speed_radps;                          // the joint's limit, where the grid of friction ends
@@ -69,7 +69,7 @@ namespace internal {
 
 inline constexpr std::uint16_t kFlagsWord = 5, kFadeWord = 6, kForgettingWord = 8;
 
-// Keeps the first refusal. An answer of a function says whether all is still well.
+// Keeps the first refusal. Each check takes one number and returns true if that number is allowed.
 class WordCheck {
  public:
   explicit WordCheck(const std::uint16_t* words) : words_(words) {}
@@ -78,7 +78,8 @@ class WordCheck {
     if (core::IsOk(refusal_.status)) refusal_ = {status, static_cast<std::uint16_t>(word), value, bound};
     return false;
   }
-  // The float at `word`: finite, in the documented range, then in the ceiling's.
+  // The float at `word` must be finite (else kNotFinite), and from low to high, the range of the ceiling (else
+  // kBeyondCeiling).
   bool Float(int word, float low, float high) {
     const float value = core::GetF32(words_ + word);
     if (!math::IsFinite(value)) return Refuse(core::Status::kNotFinite, word, value, high);
@@ -86,7 +87,8 @@ class WordCheck {
     if (value > high) return Refuse(core::Status::kBeyondCeiling, word, value, high);
     return true;
   }
-  // The same for a number that must be positive, or not negative, by the layout itself.
+  // The same for a number that must be positive, or not negative, by the layout itself (else kOutOfRange, before the
+  // others).
   bool Positive(int word, float low, float high) {
     const float value = core::GetF32(words_ + word);
     if (value <= 0.0f) return Refuse(core::Status::kOutOfRange, word, value, low);
@@ -97,7 +99,7 @@ class WordCheck {
     if (value < 0.0f) return Refuse(core::Status::kOutOfRange, word, value, 0.0f);
     return Float(word, 0.0f, high);
   }
-  // A word, of which only the bits of `known` may be set.
+  // A word, of which only the bits of `known` may be set (else kOutOfRange).
   bool Bits(int word, unsigned known) {
     const unsigned value = words_[word];
     return (value & ~known) == 0 ||

@@ -2,6 +2,7 @@
 //
 // A generated model is a struct of constants and static functions, `struct Er20Like { ... }`:
 //
+//   kName        the name of the model (const char*)
 //   kJoints      n, rows of the regressor (one torque per joint)
 //   kFront       columns that touch ONE row only (friction, joint effects); ordered by joint:
 //                columns kFrontBegin[i] .. kFrontBegin[i+1]-1 belong to joint i   (int kFrontBegin[n+1])
@@ -22,16 +23,19 @@
 //   kMapBegin[kRigid+1], kMapColumn[], kMapValue[]  base = B body, compressed rows (float)
 //
 //   kCeilings    the hardest values that a table may hold: Ceilings<n, kParameters>
-//   kFriction[kFront]  columns that brake their own joint; kFrictionReads: what they depend on (friction_grid.hpp)
+//   kFriction[kFront]  bool: the column brakes its own joint
+//   kFrictionReads  unsigned: bits kReadsPose, kReadsTemperature, kReadsHistory of friction_grid.hpp
 //
 //   kStates      values that effects with memory carry from sample to sample (0 for most models)
 //   kSensitivities  d state / d eta, carried by the extended Kalman filter only
-//   kReadyState[i]  which state is 1 once the states of row i no longer depend on their start; -1: row i is always
-//   ready
+//   kReadyState[i]  index of a state that becomes 1 when the states of row i no longer depend on their start values.
+//                Until then (up to 0.5) row i may not update an estimate. -1: row i has no such state and may always
+//                update
 //
-// Functions. x: ModelInput<T, n>. committed[kColumns]: the committed parameters; only columns that depend on parameters
-// read them. eta[kNonlinear]. No branch depends on data. Only math functions are called. Float in, float out. Context:
-// any.
+// Functions. x: ModelInput<T, n>. committed[kColumns]: the committed parameters. Only columns that themselves depend on
+// parameters use them, such as load friction, which depends on the committed load torque. eta[kNonlinear]. The code has
+// no branch that depends on data, and it calls math functions only. With T = float all computation is in float.
+// Context: any.
 //
 //   template <class T> static void InitialState(x, committed, eta, T* state);
 //     state[kStates] at the first sample of a stretch, x being that sample. Sensitivities start at zero.

@@ -28,7 +28,7 @@ struct Committed {
 template <class Model>
 struct Rows {
   float front[Model::kFront > 0 ? Model::kFront : 1] = {};
-  float dense[Model::kDense > 0 ? Model::kJoints* Model::kDense : 1] = {};
+  float dense[Model::kDense > 0 ? Model::kJoints * Model::kDense : 1] = {};
 };
 
 // The states of effects with memory. Each stream of samples has a Memory of its own.
@@ -54,9 +54,9 @@ void EvaluateRows(const Committed<Model>& committed, const ModelInput<float, Mod
   }
 }
 
-// sum + the sum of p[k] value[k] for k < count. A column whose parameter is zero adds nothing, even if its value is not
-// finite: an effect in standby may read a sensor that the machine does not have. The instructions are the same for any
-// numbers. Context: any.
+// sum + the sum of p[k] value[k] for k < count. Shapes: p, value [count]. A column whose parameter is zero adds
+// nothing, even if its value is not finite: an effect in standby may read a sensor that the machine does not have. The
+// instructions are the same for any numbers. Context: any.
 ARMCAL_NOINLINE inline float AddTorque(const float* p, const float* value, int count, float sum) {
   math::internal::ByFours(count, [&](int k) ARMCAL_INLINE {
     const bool counts = math::BitsOf(p[k]) << 1 != 0u;  // neither 0 nor -0
@@ -65,14 +65,15 @@ ARMCAL_NOINLINE inline float AddTorque(const float* p, const float* value, int c
   return sum;
 }
 
-// Torque of one joint from the dense columns alone, without the joint's own friction and effects. Context: any.
+// Torque of one joint (N m or N) from the dense columns alone, without the joint's own friction and effects. p
+// [kColumns]. Context: any.
 template <class Model>
 float LoadTorque(const float* p, const Rows<Model>& rows, int joint) {
   const int first = Model::kRowBegin[joint];
   return AddTorque(p + Model::kFront + first, rows.dense + joint * Model::kDense + first, Model::kDense - first, 0.0f);
 }
 
-// Torque of one joint; load_Nm is its LoadTorque. Context: any.
+// Torque of one joint (N m or N). p [kColumns]; load_Nm is its LoadTorque. Context: any.
 template <class Model>
 float RowTorque(const float* p, const Rows<Model>& rows, int joint, float load_Nm) {
   const int first = Model::kFrontBegin[joint];

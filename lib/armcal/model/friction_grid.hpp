@@ -1,4 +1,4 @@
-// model - whether the friction of a table brakes: its torque at a grid of speeds, temperatures and loads.
+// model - checks on a grid of speeds, temperatures and loads that the friction of a table brakes and is not too large.
 //
 // A joint's friction may be a sum of many columns, and a single coefficient may be negative: friction that rises less
 // than in proportion to speed, that falls with temperature, or that differs between the directions. What counts is the
@@ -17,8 +17,9 @@ namespace armcal::model {
 // Bits of a model's kFrictionReads: what its friction columns depend on besides the joint's own speed.
 inline constexpr unsigned kReadsPose = 1, kReadsTemperature = 2, kReadsHistory = 4;
 
-// The grid. Speeds are shares of the joint's limit, poses shares of its range. All joints move at once, because a
-// friction column belongs to one joint. Poses vary the load.
+// The grid. Speeds are shares of the joint's limit, poses are shares of its range. At each point all joints move. One
+// evaluation then checks all joints, because a friction column acts on its own joint only. The poses are there because
+// friction may depend on load.
 inline constexpr float kGridSpeed[] = {0.003f, 0.01f, 0.03f, 0.1f, 0.2f, 0.4f, 0.7f, 1.0f};
 inline constexpr float kGridPose[] = {0.5f, 0.12f, 0.88f, 0.31f};
 inline constexpr float kGridTemperature[] = {0.5f, 0.0f, 1.0f};  // shares of the range
@@ -31,7 +32,8 @@ constexpr int GridPoints(unsigned reads) {
          ((reads & kReadsTemperature) != 0 ? kGridTemperatures : 1);
 }
 
-// Where the joints are at one point. Shapes: q, qd, temp [joints].
+// Fills in the state of the joints at one point of the grid: q in rad (m), qd in rad/s (m/s), temp in deg C. Shapes: q,
+// qd, temp [joints]. point: from 0, below GridPoints(reads).
 template <class T>
 void GridState(const CeilingView& ceilings, unsigned reads, int point, T* q, T* qd, T* temp) {
   const bool backward = point % 2 != 0;
@@ -52,18 +54,19 @@ void GridState(const CeilingView& ceilings, unsigned reads, int point, T* q, T* 
   }
 }
 
-// Judges one joint's friction at one point. braking_Nm: the torque, positive if it is against the motion.
+// Compares the friction of one joint at one point with its ceilings. braking_Nm: the torque, positive if it is against
+// the motion. kOk; kNotFinite; kFeedsEnergy; kBeyondCeiling.
 inline core::Status JudgeFriction(const JointCeiling& c, float braking_Nm) {
   if (!math::IsFinite(braking_Nm)) return core::Status::kNotFinite;
   if (braking_Nm < -c.feed_Nm) return core::Status::kFeedsEnergy;
   return braking_Nm > c.friction_Nm ? core::Status::kBeyondCeiling : core::Status::kOk;
 }
 
-// Judges the friction of parameters that BuildAdoptedTable has accepted at one point of the grid. kFeedsEnergy;
-// kBeyondCeiling (a joint's friction is higher than the hardest); kNotFinite. The refusal's word is that of the joint's
-// friction column with the greatest part in it. It evaluates the regressor once, or twice if friction has memory.
-// `memory` and `rows`: work space; memory.running is false before the first point, and `rows` has been zero and belongs
-// to this model. Context: background.
+// Checks the friction at one point of the grid. `committed` comes from BuildAdoptedTable. kFeedsEnergy; kBeyondCeiling
+// (a joint's friction is higher than its ceiling); kNotFinite. The refusal's word is that of the joint's friction
+// column with the largest torque. Evaluates the regressor once, or twice if friction has memory. `memory` and `rows`
+// are work space. Before the first point set memory.running to false. `rows` starts as zeros and is used for this model
+// only. Context: background.
 template <class Model>
 core::Refusal CheckFrictionAt(int point, const Committed<Model>& committed, const CeilingView& ceilings,
                               Memory<Model>& memory, Rows<Model>& rows) {

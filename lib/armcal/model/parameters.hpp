@@ -53,7 +53,8 @@ struct ParameterTable {
   ParameterEntry parameter[p] = {};
 };
 
-// words: [ParameterTable<n,p>::kWords], native 16-bit values (the wire and the store put the high byte first).
+// w: [ParameterTable<n,p>::kWords], native 16-bit values (the wire and the store put the high byte first). Context:
+// any.
 template <int n, int p>
 void Encode(const ParameterTable<n, p>& t, std::uint16_t* w) {
   core::PutU32(w, t.schema);
@@ -79,9 +80,10 @@ void Encode(const ParameterTable<n, p>& t, std::uint16_t* w) {
   }
 }
 
-// kWrongSchema; kWrongSize (layout version, joints or parameters differ); kNotFinite; kOutOfRange (sigma, v_min, limit,
-// scale or forgetting is not positive, sd or noise is negative, state or group is unknown). On refusal `t` is
-// unchanged. This does not check whether bodies can exist; see physical::IsPhysical. Context: background.
+// w: [ParameterTable<n,p>::kWords]. kWrongSchema; kWrongSize (layout version, joints or parameters differ); kNotFinite;
+// kOutOfRange (sigma, v_min, limit, scale or forgetting is not positive, forgetting is above 1, sd or noise is
+// negative, state or group is unknown). On refusal `t` is unchanged. This does not check the reserved bits and words
+// (see CheckWords), nor whether bodies can exist (see physical::IsPhysical). Context: background.
 template <int n, int p>
 core::Status Decode(const std::uint16_t* w, std::uint32_t schema, ParameterTable<n, p>& t) {
   using core::Status;

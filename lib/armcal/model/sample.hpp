@@ -25,8 +25,9 @@ inline constexpr std::uint8_t kValid = 1;   // enabled and not saturated in all 
 inline constexpr std::uint8_t kMoving = 2;  // |qd| above v_min and of one sign in all five windows
 inline constexpr std::uint8_t kUsed = 4;    // set by the estimator: this row updated the estimate
 
-// One estimator sample. All quantities belong to one instant: the middle of the averaging window whose first tick is
-// `tick`. Joint side, SI: rad or m, N m or N. tau is the measured torque x the table's torque scale.
+// One estimator sample. All its quantities hold for one instant: the middle of the averaging window whose first tick is
+// `tick`. Joint side, SI: rad or m, N m or N. tau is the measured torque: the table's torque_scale x nominal torque
+// constant (AxisInfo) x measured current.
 template <int n>
 struct Sample {
   std::uint32_t tick = 0;

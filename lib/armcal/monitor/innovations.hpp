@@ -1,4 +1,4 @@
-// monitor - are the innovations as large as the filter says: statistics for each joint, and one verdict for all.
+// monitor - compares innovations with the variances that the filter predicts, per joint and for all joints.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// monitor - how the residual of each joint depends on speed, position, load and temperature, and when it was how large.
+// monitor - residual statistics: sums by speed, position, load and temperature, and a history of the residuals' size.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +22,11 @@ struct ResidualRow {
 enum ResidualSum : int { kCount, kResidual, kSquare, kSpeed, kPosition, kLoad, kLoadSize, kTemperature, kResidualSums };
 enum ResidualSignal : int { kBySpeed, kByPosition, kByLoad, kByTemperature, kResidualSignals };
 
-// The residual statistics of one joint. For each signal, a row is added to one bin. The direction of motion chooses the
-// bin, because friction changes its sign with it and other torques do not. The other choice is the quarter of the range
-// that the signal (of speed: its magnitude) has covered since the restart. Ranges are learned, so nobody has to
-// configure limits. When a range grows, the borders of its bins move; the means of a bin still tell what lies inside.
+// The residual statistics of one joint. A row is added to one bin of each signal. The bin is given by two things: the
+// direction of motion, because friction changes its sign with it and other torques do not; and the quarter of the
+// signal's range in which the value lies. The range is what the signal (speed: its magnitude) has covered since the
+// restart. Ranges are learned, so nobody has to configure limits. When a range grows, the borders of its bins move; the
+// means of a bin still tell what lies inside.
 //
 // There are two sets of bins. The first kReferenceRows rows go to the reference set and stay there: they show how well
 // the model fitted when it was adopted. Later rows go to the recent set, which forgets: with every row one bin is
@@ -48,9 +49,10 @@ class ResidualBins {
     faded_ = 0;
   }
 
-  // use: the row may be judged, because the joint is under control and moves in one direction. False: it may not, or a
-  // number is not finite; then no bit has changed. Without a temperature only the bins by temperature stay as they are.
-  // The cost is the same in every case. Context: background.
+  // use: whether the row counts: the joint is under control and moves in one direction. Returns true if the row was
+  // added. A row with a number that is not finite, or not below 1e12 in size, is not added. If it is not added, no bit
+  // changes. Without a temperature it is added to all bins but those by temperature. The cost is the same in every
+  // case. Context: background.
   bool Add(const ResidualRow& row, bool use) {
     const bool good = (use & Usable(row.residual_Nm) & Usable(row.speed_radps) & Usable(row.position_rad) &
                        Usable(row.load_Nm)) != 0u;
@@ -111,11 +113,11 @@ class ResidualBins {
   int faded_ = 0;
 };
 
-// When the residuals were how large: slices of time, each with the number of rows and the sum of squared residuals of
-// every joint. When there is no room for another slice, two neighbours are joined: those that together are shortest for
-// their age. So the slices always reach back to the restart, and the length of each is some share of its age: a change
-// of an hour ago is dated to minutes, one of last month to days. Only time in which a joint moved fills a slice; a
-// night at rest fills none.
+// The size of the residuals over time. Time is divided into slices. (In the other rooms a slice is a piece of work;
+// here it is a piece of time.) A slice holds, for every joint, the number of rows and the sum of squared residuals.
+// When all slices are in use, two neighbours are joined: the pair with the smallest ratio of length to age. So the
+// slices always reach back to the restart, and old slices are longer than new ones: a change of an hour ago is dated to
+// minutes, one of last month to days. Only samples in which a joint moves count for the length of a new slice.
 template <int n>
 class ResidualHistory {
  public:
@@ -134,7 +136,7 @@ class ResidualHistory {
     samples_ = 0;
   }
 
-  // A row that may be judged and is finite. Context: background.
+  // One row that ResidualBins::Add has taken. Context: background.
   void Add(int joint, float residual_Nm) {
     slices_[size_ - 1].count[joint] += 1.0f;
     slices_[size_ - 1].square[joint] += residual_Nm * residual_Nm;

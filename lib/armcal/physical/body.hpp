@@ -13,9 +13,9 @@ namespace armcal::physical {
 // roundings.
 inline constexpr float kPivotMargin = 1e-5f;
 
-// True if the pseudo-inertia [[tr(I)/2 E - I, mc], [mc', m]] is positive definite: positive mass, and principal
-// moments about the centre that are positive and obey the triangle inequality. P. M. Wensing, S. Kim, J.-J. Slotine,
-// Linear matrix inequalities for physically consistent inertial parameter identification, 2018.
+// Returns true if the pseudo-inertia [[tr(I)/2 E - I, mc], [mc', m]] of body [10] is positive definite: positive mass,
+// and principal moments about the centre that are positive and obey the triangle inequality. P. M. Wensing, S. Kim,
+// J.-J. Slotine, Linear matrix inequalities for physically consistent inertial parameter identification, 2018.
 template <class T>
 bool IsPhysical(const T* body) {
   const T half = (body[4] + body[7] + body[9]) * T(0.5f);
@@ -35,8 +35,8 @@ bool IsPhysical(const T* body) {
   return good;
 }
 
-// The same for a link: a block of 11, which is a body and after it the rotor inertia of the motor. Both must be
-// possible; the rotor inertia may be zero.
+// The same for link [11], which is a body and after it the rotor inertia of the motor. Both must be possible; the rotor
+// inertia may be zero.
 template <class T>
 bool CanExist(const T* link) {
   return IsPhysical(link) && link[10] >= T(0);  // also false for NaN
@@ -53,7 +53,7 @@ void AddParallelAxis(T m, const T* c, T* inertia) {
   inertia[5] += m * (c[0] * c[0] + c[1] * c[1]);
 }
 
-// Block -> central block. A body without mass has its centre at the origin.
+// Block -> central block, and back. Shapes: [10]. A body without mass has its centre at the origin.
 template <class T>
 void ToCentral(const T* body, T* central) {
   central[0] = body[0];
@@ -91,9 +91,9 @@ void BodyJacobian(T m, const T* c, T* jacobian) {
   }
 }
 
-// The barrier. In central coordinates the determinant of the pseudo-inertia is m det S, where S = tr(I)/2 E - I are the
-// second moments about the centre: -logdet needs neither the centre nor a 4 x 4 matrix. A margin keeps S that far
-// inside the cone of possible bodies.
+// The barrier is -log det of the pseudo-inertia. In central coordinates this determinant is m det S, where S = tr(I)/2
+// E - I holds the second moments about the centre. So the barrier needs neither the centre nor a 4 x 4 matrix. The code
+// uses S - margin E instead of S, so that the result keeps a distance from bodies that cannot exist.
 
 // For a unit mass, g' I with I = c'c E - c c' is the quadratic form c' theta c. g belongs to the six moments of
 // inertia; theta is xx xy xz yy yz zz.
@@ -126,7 +126,7 @@ void PullBack(T m, const T* c, const T* g, T* out) {
 
 // Moves a body on a line that is straight in m, m c and I about the origin, by the step J move (J = d body / d
 // central). Torques and the pseudo-inertia are linear in those, so they are linear along the line. Coordinates of the
-// inertia for which `held` is true stay. Shapes: [10].
+// inertia for which `held` is true do not change. Shapes: [10].
 template <class T>
 void Move(const T* central, const T* move, const bool* held, T* moved) {
   T bent[6] = {};
@@ -137,7 +137,7 @@ void Move(const T* central, const T* move, const bool* held, T* moved) {
   for (int k = 4; k < 10; ++k) moved[k] = central[k] + (held[k] ? T(0) : move[k] - bent[k - 4]);
 }
 
-// S - margin E of a central block, as xx xy xz yy yz zz.
+// s [6] = S - margin E of a central block [10], as xx xy xz yy yz zz.
 template <class T>
 void SecondMoments(const T* central, T margin, T* s) {
   const T half = (central[4] + central[7] + central[9]) * T(0.5f) - margin;
@@ -145,7 +145,7 @@ void SecondMoments(const T* central, T margin, T* s) {
   for (const int k : {0, 3, 5}) s[k] += half;
 }
 
-// m det(S - margin E) by its pivots. Zero unless all pivots are positive.
+// m det(S - margin E) of a central block [10], by its pivots. Zero unless all pivots are positive.
 template <class T>
 T ConeDeterminant(const T* central, T margin) {
   T s[6];

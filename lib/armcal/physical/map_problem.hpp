@@ -1,4 +1,6 @@
-// physical - what a read-out minimises: the information of the data, and prior and barrier of the bodies.
+// physical - the minimum problem of the physical read-out: information of the data, prior and barrier of the bodies.
+//
+// Map in the names means maximum a posteriori: the read-out looks for the most probable bodies.
 #pragma once
 
 #include "armcal/math/symmetric.hpp"
@@ -6,18 +8,18 @@
 
 namespace armcal::physical {
 
-// What a read-out is asked. Layout: the constants of a generated model (model/contract.hpp). Columns are [front, rigid,
+// What a read-out is given. Layout: the constants of a generated model (model/contract.hpp). Columns are [front, rigid,
 // dense effects]. Prior units: x_k = (b_k - b0_k) / s_k.
 template <class Layout>
 struct MapPrior {
   const float* body;      // [kBodyParameters] the table's means, 11 for each link: ten about the origin, rotor inertia
-  const float* body_sd;   // [kBodyParameters] of m, c, I about the centre, rotor; 0: held
+  const float* body_sd;   // [kBodyParameters] of m, c, I about the centre, rotor; 0: fixed
   const float* column;    // [kColumns] b0
-  const float* scale;     // [kColumns] s; 0: held
+  const float* scale;     // [kColumns] s; 0: fixed
   const float* dense_ud;  // [UdSize(kDense)] the filter's prior of the dense columns, in prior units
 };
 
-// What a read-out answers.
+// The result of a read-out.
 template <class Layout, class T>
 struct MapResult {
   T body[Layout::kBodyParameters] = {};     // about the link origins, the table's order
@@ -31,7 +33,8 @@ struct MapResult {
   T barrier = T(0);        // the last eps
   bool converged = false;  // less than 1e-4 of chi^2 is left to gain. The bodies can exist in any case.
 
-  // Adds one parameter to moved and learned. before = 0: it is held.
+  // Adds one parameter to moved and learned. change: in prior units. after, before: the standard deviations of the
+  // result and of the prior, both in the same unit. before = 0: the parameter is fixed.
   void Learn(T change, T after, T before) {
     const T left = math::Divide(after, before);
     moved += change * change;
@@ -74,8 +77,8 @@ class DataInformation {
     for (T& a : packed_) a = T(0);
   }
   // Adds row k of the filter's U^-1, then (from kDense on) of the prior's. x [kColumns], ud [UdSize(kColumns)]: the
-  // filter's result in the order [front, dense]. In this order, the dense part of the factor is that of P without the
-  // front columns. The row's part is added to gradient [kFree].
+  // filter's result in prior units, in the order [front, dense]. In this order, the dense part of the factor is that of
+  // P without the front columns. The row's part is added to gradient [kFree], which is over y.
   void AddRow(int k, const MapPrior<Layout>& prior, const T* x, const T* ud, T* gradient) {
     constexpr int kFront = Layout::kFront;
     T v[Layout::kDense] = {}, a[kFree], at = T(0), weight;
@@ -153,8 +156,8 @@ class MapArm {
   using Point = MapPoint<Layout, T>;
   static_assert(kBlock == 11, "a link has ten parameters about its origin, and a rotor inertia");
 
-  // False: a body of the prior cannot exist, or a rotor inertia is zero and uncertain. A body near the border gets a
-  // smaller margin.
+  // Returns false if a body of the prior cannot exist, or if a rotor inertia is zero and uncertain. A body near the
+  // border gets a smaller margin.
   bool Start(const MapPrior<Layout>& prior) {
     prior_ = prior;
     bool inside = true;
@@ -188,7 +191,8 @@ class MapArm {
     ToOrigins(point);
   }
 
-  // to = from + share x step, with step [kFree] in u. The bodies move on straight lines about their origins (see Move).
+  // to = from + share x step, with step [kFree] in u (prior units). The bodies move on straight lines about their
+  // origins (see Move).
   void Step(const Point& from, T share, const T* step, Point& to) const {
     for (int link = 0; link < kLinks; ++link) {
       const int at = link * kBlock;
@@ -203,8 +207,8 @@ class MapArm {
     ToOrigins(to);
   }
 
-  // Adds to sum the change of the barrier between two points: -logdet, and -log for a rotor. False: `to` is outside the
-  // cone.
+  // Adds to sum the change of the barrier between two points: -logdet, and -log for a rotor. Returns false if `to` is
+  // outside the cone.
   bool AddBarrierChange(const Point& from, const Point& to, T& sum) const {
     bool inside = true;
     for (int link = 0; link < kLinks; ++link) {
@@ -218,7 +222,8 @@ class MapArm {
     return inside;
   }
 
-  // Turns g over [bodies about the link origins, effects] into g over u, for the first `links` links, in place.
+  // Turns the gradient g [kFree] over [bodies about the link origins in SI units, effects in prior units] into the
+  // gradient over u, for the first `links` links, in place.
   void ToFree(const Point& point, int links, T* g) const {
     for (int link = 0; link < links; ++link) {
       const T* central = point.central + link * kBlock;
@@ -230,7 +235,7 @@ class MapArm {
     }
   }
 
-  // d body / d u_k, for the link of k. Shape: push [kBlock].
+  // d body / d u_k, for the link of k: SI units for one prior unit. Shape: push [kBlock].
   void Push(const Point& point, int k, T* push) const {
     const int link = k / kBlock, own = k % kBlock;
     for (int i = 0; i < kBlock; ++i) push[i] = T(0);
@@ -242,8 +247,8 @@ class MapArm {
     for (int i = 0; i < 10; ++i) push[i] = jacobian[i * 10 + own] * sd(k);
   }
 
-  // Of the prior plus eps / 2 times the barrier: returns the first derivative by u_k, and adds the second derivatives
-  // to column [k + 1].
+  // Of the prior plus eps / 2 times the barrier (a minus log likelihood) over u: returns the first derivative by u_k,
+  // and adds the second derivatives to column [k + 1].
   T AddCurvature(const Point& point, T eps, int k, T* column) const {
     if (k >= kBodies) return T(0);  // an effect's prior is part of the data term
     const int at = k / kBlock * kBlock, own = k % kBlock;

@@ -20,9 +20,10 @@
 namespace armcal::physical {
 
 // T: double, on a PC and on cores with a double FPU; float is too coarse for P^-1 - C^-1. Takes some 60 KB for six
-// joints. Use: Begin, AddSpread for every column of the filter's factor, then Step until it answers true. From the
-// first Step on the filter may go on, but the table must stay. A slice costs at most kFree^2 multiplications and
-// additions; AddSpread is a slice, too. Context of every call: background.
+// joints. Use: Begin, then AddSpread for every column of the filter's factor, then Step until it returns true. After
+// the last AddSpread the filter may take rows again. Everything that MapPrior points to must not change until Step
+// returns true. One Step costs at most some kFree^2 multiplications and additions, one AddSpread some kColumns^2.
+// Context of every call: background.
 template <class Layout, class T>
 class MapReadOut {
  public:
@@ -55,7 +56,7 @@ class MapReadOut {
 
   // Adds to the filter's covariance in prior units: P += d column column'. Call it for every column of the filter's
   // factor, in any order. column [kColumns]. kNotFinite: a number is not finite, or d < 0. Then the read-out cannot go
-  // on, and result() is the last one.
+  // on, and result() is the last one. kNotFinite also if it is called before Begin, or after the first Step.
   core::Status AddSpread(float d, const float* column) {
     bool good = math::IsFinite(d) && d >= 0.0f;
     for (int k = 0; k < kColumns; ++k) {
@@ -68,7 +69,7 @@ class MapReadOut {
     return core::Status::kOk;
   }
 
-  // One bounded slice. True: done, result() is there.
+  // One bounded slice. Returns true when the read-out is done and result() holds it.
   bool Step() {
     const int k = next_++;
     switch (stage_) {
@@ -141,10 +142,10 @@ class MapReadOut {
     next_ = 0;
   }
 
-  // y of the point in work (see DataInformation).
+  // y of point_ (see DataInformation).
   T Shift(int i) const { return i < kBodies ? point_.body[i] - T(arm_.prior().body[i]) : point_.u[i]; }
 
-  // Makes column k of the Hessian, works it into the factor, and sets entry k of minus the gradient.
+  // Makes column k of the Hessian, adds it to the factor, and sets entry k of minus the gradient.
   void MakeColumn(int k, T eps) {
     T* column = factor_ + math::UdIndex(0, k);
     const int begin = k < kBodies ? k / Arm::kBlock * Arm::kBlock : k;

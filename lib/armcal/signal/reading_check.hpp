@@ -1,5 +1,4 @@
-// signal - which readings of encoders and currents an arm can have made, and which not: a flipped bit, a repeated or
-// swapped frame, an encoder that stands still while its axis moves, one that jumps, a current that is stuck.
+// signal - detects encoder and current readings that cannot be real.
 #pragma once
 
 #include <cstdint>
@@ -8,26 +7,34 @@
 
 namespace armcal::signal {
 
-// No axis of an arm turns faster or accelerates more, on the joint's side (rad or m). An axis is first taken for one of
-// kUsualAcceleration_radps2; faster ones are learned.
+// Upper bounds of speed and acceleration of any axis, on the joint side (rad or m). At the start an axis is expected to
+// accelerate by up to kUsualAcceleration_radps2. If it accelerates more, the check raises this bound, up to
+// kLargestAcceleration_radps2.
 inline constexpr float kLargestSpeed_radps = 40.0f;
 inline constexpr float kLargestAcceleration_radps2 = 200.0f;
 inline constexpr float kUsualAcceleration_radps2 = 10.0f;
 
-// One axis. A step is what the count moves from tick to tick. Steps may differ by three times the largest acceleration
-// that the axis has shown over three ticks, by the encoder's noise, and by a few counts.
-//   Away: a step differs by more. What the axis has jumped by is summed up, and it is back once the sum is near zero.
-//   So
-//     only wrong ticks are refused, and not the one after a flipped bit, where the count is right again. An axis that
-//     does not come back is taken as it is: after a few ticks if it is hardly away, and else after kPatience_s.
-//   Frozen: the count stays although the axis was not about to stop.
-//   Settling: after frozen, and after a jump out of standstill, where nothing tells the wrong count from the right one.
-//     Two steps that fit together end it; sixteen, after an axis that jumped about.
+// Checks the encoder of one axis: flipped bits, repeated or swapped frames, jumps, an encoder that stands still. Call
+// Start once, then Check in each tick. A step is the change of the count from one tick to the next. A step fits if it
+// differs from the last good step by at most a limit: three times the learned acceleration, plus four times the mean
+// noise, plus eight counts. The learned acceleration is the largest one that the axis has kept for three ticks; it
+// fades slowly. A step does not fit if it is faster than kLargestSpeed_radps, or if it is zero although the axis was
+// not about to stop.
+//   Good: the last steps fitted. The count can be believed.
+//   Away: a step did not fit. The differences from the last good step are summed up. When the sum is near zero again
+//     and the count moves, the state is Good. So after one flipped bit only one tick is refused. If the sum does not
+//     return, the state is Settling: after 8 ticks if the sum is small, else after kPatience_s or after eight steps
+//     that did not fit. Frozen is a flag of this state: the count stands still although the axis was moving. When a
+//     frozen count moves again and the sum is not near zero, the state is Settling.
+//   Settling: also entered if a step does not fit in the first ticks, or after four ticks at rest, because then nobody
+//     can tell the wrong count from the right one. Two fitting steps in turn lead to Good; after eight steps that did
+//     not fit, sixteen are needed.
 // Context: tick.
 class CountCheck {
  public:
   static constexpr float kPatience_s = 2.0f;
 
+  // counts_to_rad: angle of the joint (rad or m) by one count. Call it once, before the first Check.
   void Start(float counts_to_rad, float tick_rate_Hz) {
     const float counts = math::Divide(1.0f, math::Abs(counts_to_rad) * tick_rate_Hz);
     fastest_ = Whole(kLargestSpeed_radps * counts) + kFewCounts;
@@ -37,14 +44,15 @@ class CountCheck {
     patience_ = static_cast<std::uint32_t>(kPatience_s * tick_rate_Hz);
     Restart();
   }
-  // The next tick does not follow the one before.
+  // Call it if the next tick does not follow the one before.
   void Restart() {
     age_ = 0;
     state_ = kGood;
     sign_run_ = 0;
   }
 
-  // True: the count can be believed. The time depends on the counts by some instructions.
+  // Takes the count of the next tick. Returns true if the count can be believed. The time depends on the counts by some
+  // instructions.
   ARMCAL_NOINLINE bool Check(std::int32_t counts) {  // out of line, so that it has the registers
     const std::int32_t step = Less(counts, last_), jump = Less(step, step_), bend = Less(step, before_);
     last_ = counts;
@@ -169,14 +177,16 @@ class CountCheck {
   std::uint8_t calm_ = 0, needed_ = 0, wild_ = 0, sign_run_ = 0;
 };
 
-// The current of one axis. A sensor has noise, and its readings change from tick to tick: one that repeats itself while
-// the axis moves is stuck. One that changes several times in a few ticks by far more than usual is broken, too; a
-// torque that really steps does so once. A reading at the end of its 16 bits says nothing. Context: tick.
+// Checks the current of one axis. Call Check in each tick. A sensor has noise, so its readings change from tick to
+// tick. If the sensor is usually noisy (more than 4 LSB) and a reading repeats for eight ticks while the axis moves,
+// the sensor is stuck. If the reading changes several times within some eight ticks by far more than usual, the sensor
+// is broken; a real step of the torque changes it once. Readings of +-32767 and beyond are refused, because the
+// converter is at its end. Context: tick.
 class CurrentCheck {
  public:
   void Restart() { stuck_ = 0, rough_ = 0, change_ = 0, running_ = false; }
 
-  // moves: the axis's count has moved. True: the reading can be believed.
+  // moves: the count of the axis has moved. Returns true if the reading can be believed.
   ARMCAL_NOINLINE bool Check(std::int16_t current, bool moves) {
     const std::int32_t change = running_ ? current - last_ : 0, bend = change - change_;
     const std::uint32_t size = SizeOf(change), wide = 6u * (usual_ / (kPart / 256u)) / 256u + 8u;

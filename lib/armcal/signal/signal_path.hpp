@@ -33,11 +33,11 @@ struct Settings {
 // windows: q, qd and qdd come from five-point fourth-order formulas over the window averages, tau and temperature from
 // the centre window. Sample::tick is the FIRST tick of the centre window; all quantities belong to the instant
 // (kSampleTicks - 1) / 2 ticks later. A window starts where tick % kSampleTicks == 0. Differences are taken in integers
-// before any float. Limit: counts over five windows x kSampleTicks < 2^31.
-// A count that the arm cannot have made (CountCheck) acts as a stale axis, such a current (CurrentCheck) as a saturated
-// one. Such ticks are counted.
-// Context of every call: tick. The time depends on the data by a few instructions. Each tick that completes a window
-// takes longer.
+// before any float. Limit: within five windows a count may change by less than 2^31 / kSampleTicks.
+// If CountCheck refuses a count, the axis is treated as stale. If CurrentCheck refuses a current, the axis is treated
+// as saturated. implausible_count() counts the ticks with a refused count or current.
+// Context of every call: tick. The time depends on the data by a few instructions. A tick that completes a window takes
+// longer.
 template <int n, int kSampleTicks>
 class SignalPath {
  public:
@@ -60,7 +60,7 @@ class SignalPath {
     Restart();
   }
 
-  // True: sample() is new. A tick that does not follow the tick before restarts the history.
+  // Takes one tick. Returns true if sample() is new. A tick that does not follow the tick before restarts the history.
   bool PushTick(const model::RawSample<n>& raw) {
     if (running_ && raw.tick != last_tick_ + 1u) {
       Restart();
@@ -82,7 +82,7 @@ class SignalPath {
   const model::Sample<n>& sample() const { return sample_; }
   std::uint32_t generation() const { return settings_.generation; }
   std::uint32_t gap_count() const { return gap_count_; }                  // restarts because a tick was missing
-  std::uint32_t implausible_count() const { return implausible_count_; }  // ticks that the arm cannot have made
+  std::uint32_t implausible_count() const { return implausible_count_; }  // ticks with a refused count or current
 
  private:
   static constexpr int kWindows = 5;

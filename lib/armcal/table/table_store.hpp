@@ -46,11 +46,11 @@ enum class SlotState : std::uint8_t {
   kRefused = 4,  // whole, but its content was refused at boot
 };
 
-// A save reads the record in force three times more, because a cell may read well only now and then. Then it erases the
-// other slot, programs it, reads it back and programs the commit word. Each Step does one storage operation. If the
-// record in force no longer reads well and the other slot holds a good one, the new record goes into the slot of the
-// one in force, and the older good one stays: at any time at least one good record is left alone. Context of every
-// call: background.
+// The steps of a save: it reads the record in force three times and checks it, because a weak cell may read well only
+// sometimes. It erases the other slot, programs it, reads it back, programs the commit word and reads that back. Each
+// Step erases one sector, programs one piece of at most kChunkBytes, or reads up to three such pieces.
+// If the record in force can no longer be read and the other slot holds a good record, the new record replaces the bad
+// one, and the good one is not touched. So a save never erases the only good record. Context of every call: background.
 class TableStore {
  public:
   static constexpr int kSlots = 2;
@@ -60,24 +60,27 @@ class TableStore {
 
   // Reads both slots and copies the good record with the highest sequence to `out` [words]. It reads everything at
   // once, so call it at power-up only. kOk. Without a good record: kWrongSchema (another one is kept), kCorrupt or
-  // kBlank. kWrongSize: a record does not fit this storage. Unless kOk, `out` may hold words of a record that was
-  // rejected.
+  // kBlank. kWrongSize: a record does not fit this storage. kBusy: a save is running. Unless kOk, `out` may hold words
+  // of a record that was rejected.
   core::Status Load(std::uint16_t* out);
 
-  // The record that Load or this copied last is of no use: its content is refused. Copies the good one with the next
-  // lower sequence to `out` [words] in its place. Answers as Load. Call it at power-up only.
+  // Call it if the application refused the record that Load or LoadOlder copied last. Marks that record as kRefused,
+  // and copies the good record with the next lower sequence to `out` [words]. Answers as Load, but never kWrongSize.
+  // Call it at power-up only.
   core::Status LoadOlder(std::uint16_t* out);
 
-  // Starts a save. `words` [words] must stay unchanged until Step no longer answers kBusy.
-  // kBusy: a save is running. kWrongSize: a record does not fit this storage.
+  // Starts a save. `words` [words] must not change until Step no longer answers kBusy. kOk: it has begun. kBusy: a save
+  // is running. kWrongSize: a record does not fit this storage.
   core::Status Save(const std::uint16_t* words);
 
-  // Takes the last completed save back: erases its slot, so that the table before it is in force again.
-  // kWrongOrder: no completed save to take back. kBusy: a save is running.
+  // Takes the last completed save back: erases its slot, so that the table before it is in force again. Call Step until
+  // it no longer answers kBusy. kOk: it has begun. kWrongOrder: no completed save to take back. kBusy: a save is
+  // running.
   core::Status Revoke();
 
-  // Does one storage operation. kBusy: call again. kOk: nothing is left to do. kStorageFault: the save failed; its slot
-  // has been erased, and the table before it is still in force.
+  // One piece of a save or of Revoke. kBusy: call again. kOk: nothing is left to do. kStorageFault: the save or the
+  // Revoke failed; the table before it is in force. If the driver has also refused to erase the new record (slot_state:
+  // kCorrupt), the next power-up may load that record.
   core::Status Step();
 
   bool busy() const { return stage_ != Stage::kIdle; }

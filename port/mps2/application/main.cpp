@@ -7,9 +7,9 @@ using Model = armcal::generated::SelectedModel;
 using Filter = armcal::filter::ForgettingFilter<Model>;
 static armcal::controller::Controller<Model, Filter> controller(board::Storage(), board::Clock(), {}, board::Rules());
 static armcal::link::RtuService modbus(controller.engine(), board::Serial(), board::Clock(), 1, board::kSilence_ms);
-static armcal::controller::RawTrace<Model, 16384> trace;  // 32 KB: a client that records may be 4 s late
+static armcal::controller::RawTrace<Model, 16384> trace;  // 32 KB: with six joints a client may be 1.9 s late
 
-extern "C" void TickInterrupt() {  // bounded time, the same whatever is measured
+extern "C" void TickInterrupt() {  // bounded time; the data change it by a few instructions
   armcal::model::RawSample<Model::kJoints> raw;
   armcal::controller::SetPoint<Model::kJoints> set;
   float tau_Nm[Model::kJoints];
@@ -21,7 +21,7 @@ extern "C" void TickInterrupt() {  // bounded time, the same whatever is measure
 extern "C" void SerialInterrupt() { board::OnSerial(); }  // bytes into a ring, nothing else
 extern "C" void Application() {                           // all the rest, in bounded slices
   (void)controller.Record(trace);                         // what Push and FeedForward are given, if a client asks
-  (void)controller.Boot();                                // why there is no table, if so, is served as a register
+  (void)controller.Boot();                                // if there is no valid table, a register says why
   board::Start(Model::kTickRate_Hz);
   for (;;) {
     modbus.Poll();                           // at most one request

@@ -16,7 +16,7 @@ class PretendAxes {
     const auto table = estimator::DefaultTable<Model>();
     float bodies[Model::kBodyParameters];
     for (int k = 0; k < Model::kBodyParameters; ++k) bodies[k] = table.parameter[k].mean;
-    estimator::MapBodies<Model>(bodies, arm_.p + Model::kFront);
+    physical::MapBodies<Model>(bodies, arm_.p + Model::kFront);
     for (int k = 0; k < Model::kFront; ++k) arm_.p[k] = table.parameter[Model::kBodyParameters + k].mean;
   }
 

@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint32_t kTicks = 8000;
 
 TraceTick trace[kTicks];
-estimator::RigidPrior<Model, float> rigid;
+physical::RigidPrior<Model, float> rigid;
 estimator::AdoptedTable<Model> adopted;
 std::uint32_t next;
 

@@ -43,7 +43,7 @@ class Judge {
 
  private:
   estimator::Table<Model> table_;
-  estimator::RigidPrior<Model, float> rigid_;
+  physical::RigidPrior<Model, float> rigid_;
   estimator::AdoptedTable<Model> adopted_;
   model::Memory<Model> memory_;
   model::Rows<Model> rows_;

@@ -20,7 +20,8 @@ constexpr int kFrontEntry = TwoLink::kBodyParameters;
 
 struct AdoptedTableTest : testing::Test {
   Table<TwoLink> table = DefaultTable<TwoLink>();
-  std::unique_ptr<RigidPrior<TwoLink, float>> rigid = std::make_unique<RigidPrior<TwoLink, float>>();
+  std::unique_ptr<physical::RigidPrior<TwoLink, float>> rigid =
+      std::make_unique<physical::RigidPrior<TwoLink, float>>();
   std::unique_ptr<AdoptedTable<TwoLink>> adopted = std::make_unique<AdoptedTable<TwoLink>>();
   Status Build(std::uint32_t generation = 1) { return BuildAdoptedTable<TwoLink>(table, generation, *rigid, *adopted); }
   // Variance of a rigid column in its own unit.

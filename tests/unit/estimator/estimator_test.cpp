@@ -159,9 +159,7 @@ TYPED_TEST(Both, Observer_SeesUsedRowsAndTheCommittedModelTorque) {
     float tau[2];
   } seen = {};
   this->host->estimator.SetObserver(
-      [](void* context, const Sample& s, const float* tau) {
-        *static_cast<Seen*>(context) = {s, {tau[0], tau[1]}};
-      },
+      [](void* context, const Sample& s, const float* tau) { *static_cast<Seen*>(context) = {s, {tau[0], tau[1]}}; },
       &seen);
   Sample s = this->run.Next();
   s.flags[1] = model::kValid | model::kUsed;  // not moving; a flag from elsewhere must not survive
@@ -231,7 +229,7 @@ TYPED_TEST(Both, PublishesByItselfEverySoManySamples) {
 // What a form cannot hold is said before it is adopted.
 TEST(Forms, BlockAndBankRefuseNoiseOnSharedColumns_TheOthersDoNot) {
   Table<TwoLink> table = DefaultTable<TwoLink>();
-  auto rigid = std::make_unique<RigidPrior<TwoLink, float>>();
+  auto rigid = std::make_unique<physical::RigidPrior<TwoLink, float>>();
   auto adopted = std::make_unique<AdoptedTable<TwoLink>>();
   using Block = Estimator<TwoLink, KalmanFilter<TwoLink, filter::Form::kBlock>>;
   using Bank = Estimator<TwoLink, filter::ModelBank<TwoLink>>;

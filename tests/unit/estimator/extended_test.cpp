@@ -310,7 +310,7 @@ struct NoEta : armcal::test::TwoLink {
 
 // Without nonlinear parameters there is nothing to linearise, so both filters are the same up to rounding.
 TEST(Extended, ModelWithoutEta_IsThePlainKalmanFilter) {
-  const auto rigid = std::make_unique<RigidPrior<NoEta, float>>();
+  const auto rigid = std::make_unique<physical::RigidPrior<NoEta, float>>();
   const auto table = std::make_unique<AdoptedTable<NoEta>>();
   ASSERT_EQ(BuildAdoptedTable<NoEta>(DefaultTable<NoEta>(), 1, *rigid, *table), core::Status::kOk);
   Estimator<NoEta, filter::KalmanFilter<NoEta>> plain;

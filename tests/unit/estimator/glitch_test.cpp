@@ -146,7 +146,7 @@ const std::vector<Glitch>& Battery() {
 template <class Filter>
 struct GlitchTest : testing::Test {
   using Arm = Estimator<Model, Filter>;
-  std::unique_ptr<RigidPrior<Model, float>> rigid = std::make_unique<RigidPrior<Model, float>>();
+  std::unique_ptr<physical::RigidPrior<Model, float>> rigid = std::make_unique<physical::RigidPrior<Model, float>>();
   std::unique_ptr<AdoptedTable<Model>> table = std::make_unique<AdoptedTable<Model>>();
   std::unique_ptr<Arm> arm;
 
@@ -211,7 +211,7 @@ template <class Filter>
 double FollowsIn(bool gate, float forgetting) {
   auto entries = DefaultTable<Model>();
   for (float& f : entries.forgetting) f = forgetting;
-  const auto rigid = std::make_unique<RigidPrior<Model, float>>();
+  const auto rigid = std::make_unique<physical::RigidPrior<Model, float>>();
   const auto table = std::make_unique<AdoptedTable<Model>>();
   EXPECT_EQ(BuildAdoptedTable<Model>(entries, 1, *rigid, *table), core::Status::kOk);
   if (!gate)

@@ -19,7 +19,7 @@ inline Vector Truth() {
   std::uniform_real_distribution<double> off(0.85, 1.15);
   double body[TwoLink::kBodyParameters], base[TwoLink::kRigid];
   for (int k = 0; k < TwoLink::kBodyParameters; ++k) body[k] = TwoLink::kInfo[k].mean * off(random);
-  MapBodies<TwoLink>(body, base);
+  physical::MapBodies<TwoLink>(body, base);
   Vector p = Vector::Zero(kColumns);
   for (int k = 0; k < TwoLink::kRigid; ++k) p(TwoLink::kFront + k) = base[k];
   p(0) = 11;

@@ -101,7 +101,7 @@ struct MovingArm {
   }
   void MapTruth() {
     double base[Model::kRigid];
-    MapBodies<Model>(body, base);
+    physical::MapBodies<Model>(body, base);
     for (int k = 0; k < Model::kRigid; ++k) truth(Model::kFront + k) = base[k];
   }
 };

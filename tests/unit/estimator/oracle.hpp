@@ -60,7 +60,7 @@ Matrix PriorCovariance(const Table<Model>& table) {
         central[own] += step;
         physical::FromCentral(central, block);
       }
-      MapBodies<Model>(body, base[side].data());
+      physical::MapBodies<Model>(body, base[side].data());
     }
     spread.col(k) = (base[1] - base[0]) / (2 * kStep) * table.parameter[k].sd;
   }
@@ -158,7 +158,7 @@ std::vector<unsigned char> Bits(const T& result) {
 template <class Model, class Filter>
 struct Host {
   Table<Model> table = DefaultTable<Model>();
-  RigidPrior<Model, float> rigid;
+  physical::RigidPrior<Model, float> rigid;
   AdoptedTable<Model> adopted;
   Estimator<Model, Filter> estimator;
   Estimates<Model> estimates;

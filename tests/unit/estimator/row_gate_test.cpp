@@ -121,7 +121,7 @@ TEST(RowGate, Joints_DoNotShareTheirSpreads) {
 // A torque that is wrong in one sample leaves every bit of the estimate, and the joint's other rows are worked in.
 template <class Filter>
 void OneWrongTorque() {
-  const auto rigid = std::make_unique<RigidPrior<test::TwoLink, float>>();
+  const auto rigid = std::make_unique<physical::RigidPrior<test::TwoLink, float>>();
   const auto table = std::make_unique<AdoptedTable<test::TwoLink>>();
   ASSERT_EQ(BuildAdoptedTable<test::TwoLink>(DefaultTable<test::TwoLink>(), 1, *rigid, *table), core::Status::kOk);
   Estimates<test::TwoLink> end[2];

@@ -31,7 +31,7 @@ struct Together {
   using Shared = Estimator<Model, Filter, Intake<Model>&>;
 
   Table<Model> table = DefaultTable<Model>();
-  RigidPrior<Model, float> rigid;
+  physical::RigidPrior<Model, float> rigid;
   AdoptedTable<Model> adopted[2];
   Intake<Model> intake;
   Shared<Forgetting> forgetting{intake};

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "armcal/estimator/rigid_prior.hpp"
+#include "armcal/physical/rigid_prior.hpp"
 #include "tests/unit/estimator/two_link_model.hpp"
 
 namespace armcal {
@@ -32,7 +32,7 @@ TEST(TwoLink, RigidColumns_AreLagrangesEquation) {
   for (int trial = 0; trial < 20; ++trial) {
     double body[TwoLink::kBodyParameters], base[TwoLink::kRigid];
     for (double& b : body) b = any(random);
-    estimator::MapBodies<TwoLink>(body, base);
+    physical::MapBodies<TwoLink>(body, base);
     model::ModelInput<double, 2> x{};
     for (int i = 0; i < 2; ++i) {
       x.q[i] = any(random);

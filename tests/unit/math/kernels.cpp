@@ -21,9 +21,9 @@ template class estimator::Estimator<Model, filter::ForgettingFilter<Model>>;
 template class estimator::Estimator<Model, filter::ExtendedKalmanFilter<Model>>;
 template class estimator::Estimator<Model, filter::ModelBank<Model>>;
 template core::Status estimator::BuildAdoptedTable<Model>(const estimator::Table<Model>&, std::uint32_t,
-                                                          estimator::RigidPrior<Model, float>&,
+                                                          physical::RigidPrior<Model, float>&,
                                                           estimator::AdoptedTable<Model>&);
-template void estimator::ReadBodies<Model, float>(const estimator::RigidPrior<Model, float>&, const float*, float*);
+template void physical::ReadBodies<Model, float>(const physical::RigidPrior<Model, float>&, const float*, float*);
 
 void Elementary(const float* x, float* y) {
   math::SinCosBlock<6>(x, y, y + 6);

@@ -42,16 +42,16 @@ TEST(MapReadOut, NearAPriorThatIsNarrow_IsTheLinearReadOut) {
   auto read_out = std::make_unique<ReadOut<Six>>();
   const auto& got = Solve(*read_out, c);
 
-  auto linear = std::make_unique<estimator::RigidPrior<Six, double>>();
+  auto linear = std::make_unique<physical::RigidPrior<Six, double>>();
   std::copy(c.rigid->mean, c.rigid->mean + 66, linear->mean);
   std::copy(c.rigid->sd, c.rigid->sd + 66, linear->sd);
-  estimator::SpreadPrior(*linear);
-  estimator::FactorPrior(*linear);
+  physical::SpreadPrior(*linear);
+  physical::FactorPrior(*linear);
   std::vector<double> base(Six::kRigid), expected(66);
-  estimator::MapBodies<Six>(linear->mean, base.data());
+  physical::MapBodies<Six>(linear->mean, base.data());
   for (int r = 0; r < Six::kRigid; ++r)
     base[r] += static_cast<double>(c.adopted->scale[Six::kFront + r]) * c.x[Six::kFront + r];
-  estimator::ReadBodies(*linear, base.data(), expected.data());
+  physical::ReadBodies(*linear, base.data(), expected.data());
   EXPECT_LT(Distance(c, got.body, expected.data()), 0.01);
   // Columns, friction too, are then the filter's own.
   const Matrix p = Covariance(c.ud.data(), Six::kColumns);
@@ -155,7 +155,7 @@ double Objective(const Case<Two>& c, const Vector& t) {
     for (int k = 0; k < 11; ++k) cost += 0.5 * std::pow((t(at + k) - central[k]) / c.rigid->sd[at + k], 2);
   }
   const Vector shift = body - Eigen::Map<const Eigen::VectorXf>(c.rigid->mean, 22).cast<double>();
-  estimator::MapBodies<Two>(shift.data(), rigid.data());
+  physical::MapBodies<Two>(shift.data(), rigid.data());
   for (int r = 0; r < 7; ++r) w(r) = rigid(r) / c.adopted->scale[Two::kFront + r];
   w(7) = t(22);
   const Matrix p = Covariance(c.ud.data(), Two::kColumns).bottomRightCorner(kDense, kDense);

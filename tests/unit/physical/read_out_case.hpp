@@ -31,7 +31,7 @@ template <class Model>
 struct Case {
   static constexpr int kColumns = Model::kColumns;
   estimator::Table<Model> table = estimator::DefaultTable<Model>();
-  std::unique_ptr<estimator::RigidPrior<Model, float>> rigid = std::make_unique<estimator::RigidPrior<Model, float>>();
+  std::unique_ptr<physical::RigidPrior<Model, float>> rigid = std::make_unique<physical::RigidPrior<Model, float>>();
   std::unique_ptr<estimator::AdoptedTable<Model>> adopted = std::make_unique<estimator::AdoptedTable<Model>>();
   std::vector<float> x = std::vector<float>(kColumns), ud = std::vector<float>(math::UdSize(kColumns));
 

@@ -1,5 +1,5 @@
-// estimator - base coordinates against the standard-parameter Kalman filter, in double.
-#include "armcal/estimator/rigid_prior.hpp"
+// physical - base coordinates against the standard-parameter Kalman filter, in double.
+#include "armcal/physical/rigid_prior.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <memory>
 #include <random>
 
-namespace armcal::estimator {
+namespace armcal::physical {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
@@ -120,4 +120,4 @@ TEST_F(RigidPriorTest, UnchangedBase_ReadsTheMean) {
 }
 
 }  // namespace
-}  // namespace armcal::estimator
+}  // namespace armcal::physical

@@ -1,10 +1,10 @@
-// estimator - maps the prior of the bodies to the prior of the base parameters b = B phi, and base parameters to
-// bodies.
+// physical - converts the prior of the bodies to the prior of the base parameters, and base parameters to bodies.
 //
-// The prior of a body is Gaussian in (m, c, I about the centre, rotor inertia): phi ~ phi0 + J S xi with xi ~ N(0, 1),
-// J = d(m, mc, Io) / d(m, c, Ic) at the mean, and S = diag(sd). In base coordinates, b - b0 = W xi with W = B J S. W is
-// factored as W = U w~, where U is unit upper triangular and w~ w~' = D is diagonal. Then the Kalman read-out of the
-// bodies,
+// The base parameters are b = B phi, where phi are the parameters of the bodies and the matrix B is constant for a
+// model (kMapBegin, kMapColumn, kMapValue). The prior of a body is Gaussian in (m, c, I about the centre, rotor
+// inertia): phi ~ phi0 + J S xi with xi ~ N(0, 1), J = d(m, mc, Io) / d(m, c, Ic) at the mean, and S = diag(sd). In
+// base coordinates, b - b0 = W xi with W = B J S. W is factored as W = U w~, where U is unit upper triangular and w~
+// w~' = D is diagonal. Then the Kalman read-out of the bodies,
 //   phi = phi0 + P0 B' (B P0 B')^-1 (b - b0), is phi0 + J S w~' D^-1 U^-1 (b - b0).
 // T: float on the target, double on a PC. Context: background.
 #pragma once
@@ -13,7 +13,7 @@
 #include "armcal/model/contract.hpp"
 #include "armcal/physical/body.hpp"
 
-namespace armcal::estimator {
+namespace armcal::physical {
 
 template <class Model, class T>
 struct RigidPrior {
@@ -40,7 +40,7 @@ template <class T>
 void LinkJacobian(const T* body, T* jacobian) {
   T centre[3];
   for (int i = 0; i < 3; ++i) centre[i] = math::Divide(body[1 + i], body[0]);
-  physical::BodyJacobian(body[0], centre, jacobian);
+  BodyJacobian(body[0], centre, jacobian);
 }
 
 // The columns of W = B J S of one link, from mean and sd.
@@ -104,4 +104,4 @@ void ReadBodies(const RigidPrior<Model, T>& prior, const T* base, T* body) {
   }
 }
 
-}  // namespace armcal::estimator
+}  // namespace armcal::physical

@@ -1,9 +1,11 @@
 // calibration - derives speeds and accelerations, decides which rows count, and delays a log's motion.
 #include "host_sim/identify/calibration/dataset.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/logs/quintic_spline.hpp"
 #include "host_sim/identify/calibration/band.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
@@ -19,7 +21,10 @@ constexpr double kWholeBand = 0.2;  // of the sample rate: averages down to it w
 constexpr double kBelowEdge = 1.5;  // edge over band: what the two filters do differently at the edge is 7 dB down then
 constexpr double kOfAPeriod = 10;   // samples of a period of the band that a thinned log keeps
 constexpr double kAboveBand = 1.5;  // cut-off over band: the filter then takes 4 % of what is at the band's edge
-constexpr int kPoses = 8;           // at a single one an entry of the mass matrix may vanish
+constexpr double kBesideTurn = 1;   // periods of the edge
+constexpr int kFiner = 4;           // samples of a filtered log for each of its own
+constexpr double kUnsmoothed = 0.4;  // of the sample rate: a position with a cut-off from here on is not smoothed
+constexpr int kPoses = 8;            // at a single one an entry of the mass matrix may vanish
 // Signals and masks for given inertias.
 Dataset Derive(const codegen::Model& model, const logs::Log& log, const logs::Sensitivity& sensitivity,
                const logs::Bandwidth& bandwidth) {
@@ -85,15 +90,39 @@ void UseTurns(Dataset& d, int joint) {
 
 namespace {
 
-// Where the torque was filtered before it was saved, the change of friction's sign at a turn was, too. The averages
-// pass over a turn: the samples near it count. A joint that stands does not.
-void PassTurns(Dataset& d, int j) {
+// A joint that sticks does not change its friction at once: at rest it may be anything between the two signs. A filter
+// carries that to the rows beside it. They are left out; what the filter carries further is in the prediction, too.
+void LeaveOutTurns(Dataset& d, int j) {
   const double step_s = (d.s.t[d.samples() - 1] - d.s.t[0]) / (d.samples() - 1);
-  const int reach = static_cast<int>(std::ceil(0.5 / (d.saved_Hz[j] * step_s)));
+  const int reach = static_cast<int>(std::ceil(kBesideTurn / (d.saved_Hz[j] * step_s)));
+  const Eigen::VectorXi slides = d.used.col(j);
   for (int k = 0; k < d.samples(); ++k) {
     const int first = std::max(0, k - reach), last = std::min(d.samples() - 1, k + reach);
-    d.used(k, j) = d.sound(k, j) && d.moving.col(j).segment(first, last - first + 1).any();
+    d.used(k, j) = slides.segment(first, last - first + 1).minCoeff();
   }
+}
+
+// A log that was filtered before it was saved, with more samples in between. Its motion and torque are smooth, but the
+// sign of friction is not: at the log's own samples it changes up to a sample late, and the filter does not. Log:
+// without gaps, on which no sample may hang.
+logs::Log Finer(const logs::Log& log) {
+  const Eigen::Index count = (log.samples() - 1) * kFiner + 1;
+  logs::Log out = log;
+  out.t.resize(count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Eigen::Index i = k / kFiner, part = k % kFiner;
+    out.t[k] = log.t[i] + (part ? (log.t[i + 1] - log.t[i]) * static_cast<double>(part) / kFiner : 0);
+  }
+  for (Eigen::MatrixXd* block : {&out.q, &out.tau, &out.qd, &out.qref, &out.tauff, &out.ext, &out.temp})
+    if (block->rows() == log.samples()) *block = logs::QuinticSpline(log.t, *block).Evaluate(out.t, 0);
+  if (log.flags.rows() == log.samples()) {
+    out.flags.resize(count, log.flags.cols());
+    for (Eigen::Index k = 0; k < count; ++k)
+      for (Eigen::Index j = 0; j < out.flags.cols(); ++j)
+        out.flags(k, j) = log.flags(k / kFiner, j) | log.flags((k + kFiner - 1) / kFiner, j);
+  }
+  out.line.resize(0);
+  return out;
 }
 
 // The log itself shows up to which frequency torque follows the prediction.
@@ -182,11 +211,20 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
   Dataset out = Derive(model, log, sensitivity, {0, 1, chosen_Hz});
   const SeenBands seen = SeeBands(model, out);
   const Eigen::VectorXd each_Hz = chosen_Hz.cwiseMin(kAboveBand * seen.agreed_Hz);
-  if (bandwidth.scale != 1 || each_Hz != chosen_Hz)
+  if (seen.saved_Hz.array().isFinite().any() && log.gaps.empty()) {
+    const double rate_Hz = out.rate_Hz();
+    Eigen::VectorXd finer_Hz = each_Hz * bandwidth.scale;
+    for (double& cutoff_Hz : finer_Hz)
+      if (cutoff_Hz >= kUnsmoothed * rate_Hz * (1 - 1e-9)) cutoff_Hz *= kFiner;
+    out = Derive(model, Finer(log), sensitivity, {0, 1, finer_Hz});
+    for (Eigen::Index k = 0; k < out.scored.size(); ++k)
+      if (k % kFiner) out.scored[k] = 0;
+  } else if (bandwidth.scale != 1 || each_Hz != chosen_Hz) {
     out = Derive(model, log, sensitivity, {0, bandwidth.scale, each_Hz});
+  }
   out.saved_Hz = seen.saved_Hz;
   for (int j = 0; j < n; ++j)
-    if (std::isfinite(out.saved_Hz[j])) PassTurns(out, j);
+    if (std::isfinite(out.saved_Hz[j])) LeaveOutTurns(out, j);
   LimitBands(out, seen.agreed_Hz.cwiseMin(out.saved_Hz / kBelowEdge));
   return out;
 }

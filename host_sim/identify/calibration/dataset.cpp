@@ -21,7 +21,7 @@ constexpr double kWholeBand = 0.2;  // of the sample rate: averages down to it w
 constexpr double kBelowEdge = 1.5;  // edge over band: what the two filters do differently at the edge is 7 dB down then
 constexpr double kOfAPeriod = 10;   // samples of a period of the band that a thinned log keeps
 constexpr double kAboveBand = 1.5;  // cut-off over band: the filter then takes 4 % of what is at the band's edge
-constexpr double kBesideTurn = 1;   // periods of the edge
+constexpr double kBesideTurn = 1;   // periods of a filter's edge, from a turn on
 constexpr int kFiner = 4;           // samples of a filtered log for each of its own
 constexpr double kUnsmoothed = 0.4;  // of the sample rate: a position with a cut-off from here on is not smoothed
 constexpr int kPoses = 8;            // at a single one an entry of the mass matrix may vanish
@@ -103,8 +103,8 @@ void LeaveOutTurns(Dataset& d, int j) {
 }
 
 // A log that was filtered before it was saved, with more samples in between. Its motion and torque are smooth, but the
-// sign of friction is not: at the log's own samples it changes up to a sample late, and the filter does not. Log:
-// without gaps, on which no sample may hang.
+// sign of friction is not: at the log's own samples it changes up to a sample late, and the filter was not late. The
+// log has no gaps.
 logs::Log Finer(const logs::Log& log) {
   const Eigen::Index count = (log.samples() - 1) * kFiner + 1;
   logs::Log out = log;
@@ -146,11 +146,23 @@ Eigen::VectorXd Agreed_Hz(const Dataset& d, const Eigen::MatrixXd& predicted) {
   return out;
 }
 
+// A logger filters all columns alike: where half of the joints show an edge, the others have its median.
+void SpreadEdge(Eigen::VectorXd& saved_Hz) {
+  std::vector<double> seen;
+  for (const double edge_Hz : saved_Hz)
+    if (std::isfinite(edge_Hz)) seen.push_back(edge_Hz);
+  if (2 * static_cast<Eigen::Index>(seen.size()) < saved_Hz.size()) return;
+  std::sort(seen.begin(), seen.end());
+  for (double& edge_Hz : saved_Hz)
+    if (!std::isfinite(edge_Hz)) edge_Hz = seen[seen.size() / 2];
+}
+
 SeenBands SeeBands(const codegen::Model& model, Dataset& d) {
   const Fit fit = WeightedFit(model, {&d});
   const Eigen::MatrixXd predicted = Predict(model, d, fit.x, fit.eta);
   SeenBands out{{}, Eigen::VectorXd(d.joints())};
   for (int j = 0; j < d.joints(); ++j) out.saved_Hz[j] = FilteredAbove_Hz(d, j, predicted.col(j));
+  SpreadEdge(out.saved_Hz);
   d.saved_Hz = out.saved_Hz;
   out.agreed_Hz = Agreed_Hz(d, AsSaved(d, predicted));
   return out;
@@ -211,12 +223,13 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
   Dataset out = Derive(model, log, sensitivity, {0, 1, chosen_Hz});
   const SeenBands seen = SeeBands(model, out);
   const Eigen::VectorXd each_Hz = chosen_Hz.cwiseMin(kAboveBand * seen.agreed_Hz);
-  if (seen.saved_Hz.array().isFinite().any() && log.gaps.empty()) {
+  if (seen.saved_Hz.array().isFinite().all() && log.gaps.empty()) {
     const double rate_Hz = out.rate_Hz();
     Eigen::VectorXd finer_Hz = each_Hz * bandwidth.scale;
     for (double& cutoff_Hz : finer_Hz)
       if (cutoff_Hz >= kUnsmoothed * rate_Hz * (1 - 1e-9)) cutoff_Hz *= kFiner;
     out = Derive(model, Finer(log), sensitivity, {0, 1, finer_Hz});
+    out.per_sample = kFiner;
     for (Eigen::Index k = 0; k < out.scored.size(); ++k)
       if (k % kFiner) out.scored[k] = 0;
   } else if (bandwidth.scale != 1 || each_Hz != chosen_Hz) {

@@ -35,6 +35,7 @@ struct Dataset {
   std::vector<Eigen::SparseMatrix<double, Eigen::RowMajor>> average;
   Eigen::MatrixXd reference;  // [N x n] commanded position; empty where the log has none
   std::string source;
+  int per_sample = 1;  // N - 1 over the log's own samples - 1: a filtered log is computed on a finer grid
 
   int samples() const { return s.samples(); }
   double rate_Hz() const { return static_cast<double>(s.t.size() - 1) / (s.t[s.t.size() - 1] - s.t[0]); }

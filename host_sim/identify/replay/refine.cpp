@@ -242,7 +242,8 @@ class Shooting {
 }  // namespace
 
 Training MakeTraining(const logs::Log& log, const calibration::Dataset& data) {
-  return {MakeRecord(log), data.s.q, data.s.qd, data.used};
+  const auto own = Eigen::seqN(0, log.samples(), static_cast<Eigen::Index>(data.per_sample));
+  return {MakeRecord(log), data.s.q(own, Eigen::all), data.s.qd(own, Eigen::all), data.used(own, Eigen::all)};
 }
 
 Refined Refine(const codegen::Model& model, const std::vector<Training>& logs, const calibration::Fit& fit,

@@ -222,7 +222,7 @@ int FromLog(const Options& o, const codegen::Model& m) {
   const calibration::TableFile table = o.table.empty() ? calibration::DefaultTable(m) : calibration::ReadTable(o.table);
   HostPort port(calibration::EncodeTable(table));
   const calibration::Dataset d = calibration::Prepare(m, logs::ReadLog(o.log));
-  for (int k = 0; k < d.samples(); ++k) {
+  for (int k = 0; k < d.samples(); k += d.per_sample) {
     Sample s;
     s.tick = static_cast<std::uint32_t>(std::lround(d.s.t[k] * m.robot().tick_rate_Hz));
     for (int j = 0; j < n; ++j) {

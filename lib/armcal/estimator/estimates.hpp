@@ -25,7 +25,8 @@ struct Estimates {
   float eta_sd[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};
   std::uint32_t clamps = 0;  // how often an eta was cut to its bound
   std::uint32_t rows_used[Model::kJoints] = {};
-  // rows_gated: not used, because not valid, not moving, memory not ready, outside the gate, or on hold.
+  // rows_gated: rows that were not used. Either the row is not valid or its joint does not move; or an effect's memory is
+  // not ready; or the gate refused it; or learning is on hold.
   std::uint32_t rows_gated[Model::kJoints] = {};
   std::uint32_t rows_outside[Model::kJoints] = {};  // of these, in motion and outside the gate: see RowGate
   std::uint32_t rows_refused[Model::kJoints] = {};  // not finite or beyond filter::kRowLimit

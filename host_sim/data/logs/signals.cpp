@@ -29,7 +29,6 @@ constexpr double kLeastCutoff_Hz = 2;  // a lower cut-off would take seconds to 
 // Cut-off over the motion's band. The filter then removes 4 % of a signal at the edge of the band, and less below it.
 constexpr double kAboveMotion = 1.5;
 constexpr double kHighest_Hz = 60;      // above, the current loop no longer follows
-constexpr double kHighestOfRate = 0.4;  // the filter needs room below half the rate
 // Torque from encoder noise, as a share of the torque's own jitter. It then adds 0.25 % to the noise power.
 constexpr double kShareOfJitter = 0.07;
 // Noise of the speed, as a share of the speed over which friction changes its sign. Friction is a hundred times the

@@ -16,6 +16,10 @@ struct Derivatives {
   Eigen::VectorXi settled;     // [N] 0 within 3 periods of the lowest cut-off from an end or a wide gap, else 1
 };
 
+// Of the sample rate: no cut-off is higher, because the filter needs room below half the rate. A position with this
+// cut-off is not smoothed.
+inline constexpr double kHighestOfRate = 0.4;
+
 // What the choice of a joint's cut-off rests on.
 struct JointNoise {
   double position_rad = 0;  // standard deviation of q's sample noise (encoder step / sqrt 12, or more if q is noisier)

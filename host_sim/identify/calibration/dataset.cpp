@@ -23,7 +23,6 @@ constexpr double kOfAPeriod = 10;   // samples of a period of the band that a th
 constexpr double kAboveBand = 1.5;  // cut-off over band: the filter then takes 4 % of what is at the band's edge
 constexpr double kBesideTurn = 1;   // periods of a filter's edge, from a turn on
 constexpr int kFiner = 4;           // samples of a filtered log for each of its own
-constexpr double kUnsmoothed = 0.4;  // of the sample rate: a position with a cut-off from here on is not smoothed
 constexpr int kPoses = 8;            // at a single one an entry of the mass matrix may vanish
 // Signals and masks for given inertias.
 Dataset Derive(const codegen::Model& model, const logs::Log& log, const logs::Sensitivity& sensitivity,
@@ -130,31 +129,34 @@ struct SeenBands {
   Eigen::VectorXd agreed_Hz, saved_Hz;  // [n]
 };
 
+// The median of the joints that show something; infinity if none does.
+double MedianSeen_Hz(const Eigen::VectorXd& each_Hz) {
+  std::vector<double> seen;
+  for (const double one_Hz : each_Hz)
+    if (std::isfinite(one_Hz)) seen.push_back(one_Hz);
+  if (seen.empty()) return INFINITY;
+  std::sort(seen.begin(), seen.end());
+  return seen[(seen.size() - 1) / 2];
+}
+
 // Noise of one joint's acceleration is in every row: no joint's band goes beyond the median of those that end.
 Eigen::VectorXd Agreed_Hz(const Dataset& d, const Eigen::MatrixXd& predicted) {
   Eigen::VectorXd out(d.joints());
   for (int j = 0; j < d.joints(); ++j) out[j] = AgreedBand_Hz(Transfer(d, j, predicted.col(j)));
-  std::vector<double> seen;
-  for (const double band_Hz : out)
-    if (std::isfinite(band_Hz)) seen.push_back(band_Hz);
-  if (seen.empty()) return out;
-  std::sort(seen.begin(), seen.end());
-  out = out.cwiseMin(seen[(seen.size() - 1) / 2]);
-  const double rate_Hz = d.rate_Hz();
-  for (double& band_Hz : out)
-    if (band_Hz > kWholeBand * rate_Hz) band_Hz = INFINITY;
+  const double common_Hz = MedianSeen_Hz(out);
+  for (double& band_Hz : out) {
+    band_Hz = std::min(band_Hz, common_Hz);
+    if (band_Hz > kWholeBand * d.rate_Hz()) band_Hz = INFINITY;
+  }
   return out;
 }
 
 // A logger filters all columns alike: where half of the joints show an edge, the others have its median.
 void SpreadEdge(Eigen::VectorXd& saved_Hz) {
-  std::vector<double> seen;
-  for (const double edge_Hz : saved_Hz)
-    if (std::isfinite(edge_Hz)) seen.push_back(edge_Hz);
-  if (2 * static_cast<Eigen::Index>(seen.size()) < saved_Hz.size()) return;
-  std::sort(seen.begin(), seen.end());
+  if (2 * saved_Hz.array().isFinite().count() < saved_Hz.size()) return;
+  const double common_Hz = MedianSeen_Hz(saved_Hz);
   for (double& edge_Hz : saved_Hz)
-    if (!std::isfinite(edge_Hz)) edge_Hz = seen[seen.size() / 2];
+    if (!std::isfinite(edge_Hz)) edge_Hz = common_Hz;
 }
 
 SeenBands SeeBands(const codegen::Model& model, Dataset& d) {
@@ -227,7 +229,7 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
     const double rate_Hz = out.rate_Hz();
     Eigen::VectorXd finer_Hz = each_Hz * bandwidth.scale;
     for (double& cutoff_Hz : finer_Hz)
-      if (cutoff_Hz >= kUnsmoothed * rate_Hz * (1 - 1e-9)) cutoff_Hz *= kFiner;
+      if (cutoff_Hz >= logs::kHighestOfRate * rate_Hz * (1 - 1e-9)) cutoff_Hz *= kFiner;
     out = Derive(model, Finer(log), sensitivity, {0, 1, finer_Hz});
     out.per_sample = kFiner;
     for (Eigen::Index k = 0; k < out.scored.size(); ++k)

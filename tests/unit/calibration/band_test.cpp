@@ -6,6 +6,7 @@
 #include <random>
 
 #include "host_sim/identify/calibration/band.hpp"
+#include "tests/unit/calibration/windowed_sinc.hpp"
 
 namespace armcal::calibration {
 namespace {
@@ -77,30 +78,15 @@ TEST(Band, ALateOrFilteredTorque_IsNoLimit) {
   }
 }
 
-// Zero-phase window of a sinc, far steeper than what a drive or a gear does.
-VectorXd Decimation(const VectorXd& x, double edge_Hz) {
-  constexpr Index kReach = 200;
-  VectorXd y = VectorXd::Zero(x.size());
-  for (Index k = 0; k < x.size(); ++k)
-    for (Index i = -kReach; i <= kReach; ++i) {
-      if (k + i < 0 || k + i >= x.size()) continue;
-      const auto at = static_cast<double>(i);
-      const double t = at / kRate_Hz, w = std::cos(0.5 * std::numbers::pi * at / (kReach + 1.0));
-      const double sinc = i == 0 ? 2 * edge_Hz : std::sin(kTau * edge_Hz * t) / (std::numbers::pi * t);
-      y[k] += x[k + i] * sinc * w * w / kRate_Hz;
-    }
-  return y;
-}
-
 TEST(Band, AFilterBeforeTheLogWasSaved_IsFoundAtItsEdge) {
   const VectorXd motion = LowPass(White(8, 1), 3);
   // The spectrum has a bin every 0.8 Hz, and three are taken together.
   for (const double edge_Hz : {15.0, 20.0, 28.0})
-    EXPECT_NEAR(FilteredAbove_Hz(OneJoint(Decimation(motion + White(9, 0.1), edge_Hz)), 0, motion), edge_Hz, 1.6);
+    EXPECT_NEAR(FilteredAbove_Hz(OneJoint(tests::WindowedSinc(motion + White(9, 0.1), edge_Hz, kRate_Hz)), 0, motion), edge_Hz, 1.6);
 }
 
 TEST(Band, ALag_ABelt_AndASmoothMotion_AreNoFilter) {
-  const VectorXd motion = LowPass(White(10, 1), 3), smooth = Decimation(motion, 4), noise = White(11, 0.01);
+  const VectorXd motion = LowPass(White(10, 1), 3), smooth = tests::WindowedSinc(motion, 4, kRate_Hz), noise = White(11, 0.01);
   EXPECT_EQ(FilteredAbove_Hz(OneJoint(LowPass(motion, 4) + noise), 0, motion), INFINITY);
   EXPECT_EQ(FilteredAbove_Hz(OneJoint(LowPass(LowPass(motion, 4), 4) + noise), 0, motion), INFINITY);
   EXPECT_EQ(FilteredAbove_Hz(OneJoint(smooth + noise), 0, smooth), INFINITY);

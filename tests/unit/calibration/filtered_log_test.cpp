@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
+#include "tests/unit/calibration/windowed_sinc.hpp"
 
 namespace armcal::calibration {
 namespace {
@@ -17,22 +17,11 @@ using Eigen::MatrixXd;
 constexpr double kFast_Hz = 125, kEdge_Hz = 10;
 constexpr int kEvery = 5;
 
-// What a logger does to each column: a zero-phase low-pass at four tenths of the new rate (a windowed sinc), then every
-// fifth sample.
+// Every fifth sample of the low-passed columns, without the filter's reach at both ends.
 MatrixXd Decimated(const MatrixXd& x) {
-  constexpr Index kReach = 150;
-  MatrixXd y((x.rows() - 2 * kReach) / kEvery, x.cols());
-  for (Index k = 0; k < y.rows(); ++k) {
-    y.row(k).setZero();
-    for (Index i = -kReach; i <= kReach; ++i) {
-      const auto at = static_cast<double>(i);
-      const double t = at / kFast_Hz, w = std::cos(0.5 * std::numbers::pi * at / (kReach + 1.0));
-      const double sinc =
-          i == 0 ? 2 * kEdge_Hz : std::sin(2 * std::numbers::pi * kEdge_Hz * t) / (std::numbers::pi * t);
-      y.row(k) += x.row(kReach + k * kEvery + i) * (sinc * w * w / kFast_Hz);
-    }
-  }
-  return y;
+  constexpr Index kEnd = 200;
+  const MatrixXd smooth = tests::WindowedSinc(x, kEdge_Hz, kFast_Hz);
+  return smooth(Eigen::seqN(kEnd, (x.rows() - 2 * kEnd) / kEvery, kEvery), Eigen::all);
 }
 
 // What the declared model leaves of a decimated log, as a ratio to the torque's noise in the same band, [6].

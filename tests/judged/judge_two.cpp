@@ -137,8 +137,9 @@ class Judge {
     for (const json& t : terms)
       if (!TrueAsWell(t, truth_)) own_.push_back(t);
     const bool told = own_.size() < terms.size();
+    const bool payload = !verdict_.is_null() && !verdict_.at("payload").is_null();
     if (group_ == "controls_late") Count("II late channel: named as such", told);
-    if (group_ == "payload" && !Count("II payload of the held-out run: named at the flange", told))
+    if (group_ == "payload" && !Count("II payload of the held-out run: named at the flange", payload))
       Fail("payload not named");
     int spurious = 0;
     for (const json& t : own_) {

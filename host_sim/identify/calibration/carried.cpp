@@ -28,6 +28,7 @@ constexpr double kNamed = 15;         // score of each half; odds of e^7 to one
 // Of the errors on the other half: geometric mean over the joints, and of one joint that gains. Wrong friction and
 // magnets that warm up gained 8 % at most in 20 draws.
 constexpr double kWorthIt = 0.9, kJointGains = 0.95;
+constexpr double kOtherSign = 2;  // standard deviations that such a mass may be on the other side of zero
 constexpr int kNoiseRounds = 6;  // of noise, prior and load; three settle
 constexpr int kFewestRows = 20;  // of a joint in one half
 
@@ -266,13 +267,14 @@ Carried FindCarried(const codegen::Model& model, const Fit& fit, const VectorXd&
   const LoadOfRun run(model, fit, sigma, data, residual);
   out.begin_second = run.begin_second();
   out.joints = model.joints();
-  std::array<double, 2> beside_gains_kg{};  // masses of the halves if torque constants may have changed, too
+  // With torque constants that may have changed, too. These leave little of the mass determined.
+  std::array<Estimate, 2> beside_gains;
   for (int half = 0; half < 2; ++half) {
     const auto at = static_cast<std::size_t>(half), other = static_cast<std::size_t>(1 - half);
     const Estimate without = run.Solve({half}, false), with = run.Solve({half}, true);
     const Estimate load = run.Solve({half}, true, true);
     out.half[at] = run.Load(load), out.half_sd_kg[at] = run.MassSd(load);
-    beside_gains_kg[at] = run.Load(with)[0];
+    beside_gains[at] = with;
     const Worth worth = OnOtherHalf(run, 1 - half, without, with);
     out.score[other] = worth.score, out.factor[other] = worth.factor;
     out.joints = std::min(out.joints, worth.joints);
@@ -295,8 +297,12 @@ Carried FindCarried(const codegen::Model& model, const Fit& fit, const VectorXd&
   const Eigen::Vector3d centre_m = out.load.segment<3>(1) / out.mass_kg;
   out.named = std::min(out.score[0], out.score[1]) > kNamed && std::max(out.factor[0], out.factor[1]) < kWorthIt &&
               out.joints > 1 && std::abs(out.mass_kg) > kMassSeen * out.sd_kg && centre_m.norm() < kFarthest_m;
-  for (const double mass_kg : {out.half[0][0], out.half[1][0], beside_gains_kg[0], beside_gains_kg[1]})
-    out.named = out.named && mass_kg * out.mass_kg > 0;
+  const double sign = out.mass_kg > 0 ? 1 : -1;
+  for (const int half : {0, 1}) {
+    const Estimate& beside = beside_gains[static_cast<std::size_t>(half)];
+    out.named = out.named && sign * out.half[static_cast<std::size_t>(half)][0] > 0 &&
+                sign * run.Load(beside)[0] > -kOtherSign * run.MassSd(beside);
+  }
   return out;
 }
 

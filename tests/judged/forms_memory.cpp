@@ -190,12 +190,13 @@ std::vector<Form> GearForms() {
          const int j = 1 + static_cast<int>(r.Uniform(0, 1.999));
          const double stiffening = r.Uniform(0.5, 2);
          const auto bend_rad = e.Strength(0.01, 0.06);  // at the largest load
-         OnGear(e, j, {"belt_elasticity"}, [=, &a, largest = LargestLoad()](const Motion& m, const MatrixXd& links) {
-           const ArrayXd load = links.col(j).array() / largest(links.col(j));
-           Motion moved = m;
-           moved.q.col(j).array() -= *bend_rad * (1 + stiffening) * load / (1 + stiffening * load.abs());
-           return MatrixXd(LinkTorque(a, moved) - links);
-         });
+         OnGear(e, j, {"belt_elasticity", "joint_compliance"},
+                [=, &a, largest = LargestLoad()](const Motion& m, const MatrixXd& links) {
+                  const ArrayXd load = links.col(j).array() / largest(links.col(j));
+                  Motion moved = m;
+                  moved.q.col(j).array() -= *bend_rad * (1 + stiffening) * load / (1 + stiffening * load.abs());
+                  return MatrixXd(LinkTorque(a, moved) - links);
+                });
        }},
   };
 }

@@ -1,6 +1,7 @@
 // generator - evaluates the parts of the rigid torque together, so that common terms are computed once.
 #include "codegen/src/generator/arm_torque.hpp"
 
+#include "codegen/src/generator/derivative.hpp"
 #include "codegen/src/generator/dynamics.hpp"
 
 namespace armcal::codegen {
@@ -20,6 +21,11 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
     tilted.gravity_mps2[axis] = 1;
     add(BodyRegressor(graph_, tilted, false), [axis](int i) { return InputId{Quantity::kGravitySlope, i, 0, axis}; });
   }
+  const BodyRows gravity = BodyRegressor(graph_, robot, false);
+  for (int j = 0; j < joints_; ++j)
+    for (int i = 0; i < joints_; ++i)
+      part_.push_back(
+          {{Quantity::kGravityStiffness, i, j}, GravityStiffness(graph_, gravity, model.base_columns(), i, j)});
 }
 
 std::set<InputId> ArmTorque::parts() const {
@@ -41,6 +47,7 @@ void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const s
   }
   out.rigid.resize(samples, n), out.gravity.resize(samples, n);
   out.mass.resize(n, std::vector<Eigen::VectorXd>(n)), out.tilt.resize(n, std::vector<Eigen::VectorXd>(3));
+  out.stiffness.resize(n, std::vector<Eigen::VectorXd>(n));
   std::vector<double*> place;
   for (int i = 0; i < n; ++i) place.push_back(out.rigid.col(i).data());
   for (int i = 0; i < n; ++i) place.push_back(out.gravity.col(i).data());
@@ -52,6 +59,8 @@ void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const s
     for (int i = 0; i < n; ++i) entry(out.mass[i][j]);
   for (int axis = 0; axis < 3; ++axis)
     for (int i = 0; i < n; ++i) entry(out.tilt[i][axis]);
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) entry(out.stiffness[i][j]);
   std::vector<Expr> roots;
   std::vector<double*> target;
   for (std::size_t k = 0; k < part_.size(); ++k)

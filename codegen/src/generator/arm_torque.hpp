@@ -1,4 +1,5 @@
-// generator - the rigid torque, its gravity part, the mass matrix and the slope over gravity, over whole logs.
+// generator - the rigid torque, its gravity part, the mass matrix and the slopes over gravity and position, over whole
+// logs.
 #pragma once
 
 #include <set>
@@ -12,6 +13,8 @@ struct TorqueParts {
   Eigen::MatrixXd rigid, gravity;                  // [N x n]
   std::vector<std::vector<Eigen::VectorXd>> mass;  // [row][joint] entry of M of (1)
   std::vector<std::vector<Eigen::VectorXd>> tilt;  // [row][axis] per m/s^2 of gravity along the base frame's x, y, z
+  std::vector<std::vector<Eigen::VectorXd>>
+      stiffness;  // [row][joint] gravity's torque per unit of the joint's position
 };
 
 // One graph for all of them; immutable after construction.

@@ -91,6 +91,9 @@ Expr Model::QuantityOf(const InputId& id) {
       return CommittedTorque(AccelerationRows(*graph_, robot_, id.body), id.row);
     case Quantity::kGravitySlope:
       return CommittedTorque(TiltedRows(id.parameter), id.row);
+    case Quantity::kGravityStiffness:
+      depends_on_estimate_ = true;
+      return GravityStiffness(*graph_, gravity_rows_, base_.column, id.row, id.body);
     case Quantity::kModelTorque:
     case Quantity::kDelayedTorque:
       throw io::InputError(robot_.path + ": effect: a sensor record acts on the measurement, not on the torque");
@@ -288,7 +291,7 @@ void Model::MakeTable() {
     const EffectColumn& c = effect_column(static_cast<int>(k));
     const EffectInstance& e = effect_[effect_column_[k].effect];
     const EffectUse& use = use_[effect_column_[k].effect];
-    const int joint = static_cast<int>(k) < front_ ? column_joint_[k] : -1;
+    const int joint = e.joints.empty() ? -1 : e.joints[0];
     // A record that takes the friction law's place is one, and starts from the same nominal values.
     const bool friction = e.record->friction_law || !e.record->replaces.empty();
     TableParameter p{c.name, c.unit,    c.amplitude,      c.sd,  c.lower,       c.upper,

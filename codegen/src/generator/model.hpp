@@ -25,7 +25,7 @@ struct TableParameter {
   double mean = 0, sd = 0, lower = 0, upper = 0, process_noise = 0;
   std::string state = "estimated";
   int group = 0;       // 0 bodies, 1 friction, 2 effects
-  int joint = -1;      // 0-based; -1: several
+  int joint = -1;      // 0-based: of a body or an effect, of a pair the first one; -1: the whole arm
   std::string effect;  // record; empty for bodies
 };
 

@@ -24,6 +24,8 @@ constexpr QuantityInfo kTable[] = {
      "entry of the mass matrix"},
     {Quantity::kGravitySlope, "dtau_dg", "dY/dgravity", Indexing::kRowAxis, true, false, "N*m per m/s^2",
      "torque of the row per unit of gravity along x, y or z of the base"},
+    {Quantity::kGravityStiffness, "dgravity_dq", "dgravity_dq", Indexing::kRowJoint, true, false, "N*m/rad",
+     "gravity's torque of the row per unit of a joint's position"},
     {Quantity::kModelTorque, "tau_model", "tau_model", Indexing::kJoint, true, true, "N*m or N",
      "torque of the whole model"},
     {Quantity::kDelayedTorque, "tau_delayed", "tau_delayed", Indexing::kJoint, true, true, "N*m or N",

@@ -25,6 +25,7 @@ enum class Quantity : std::uint8_t {
   kBodyColumn,
   kMassMatrix,
   kGravitySlope,
+  kGravityStiffness,
   // what a sensor record acts on
   kModelTorque,
   kDelayedTorque,
@@ -38,7 +39,7 @@ enum class Quantity : std::uint8_t {
 struct InputId {
   Quantity quantity;
   int row = 0;        // the joint, or the row of a matrix
-  int body = 0;       // kBodyColumn: the body; kMassMatrix: the column
+  int body = 0;       // kBodyColumn: the body; kMassMatrix, kGravityStiffness: the column
   int parameter = 0;  // kBodyColumn: of the body's ten; kGravitySlope: axis 0 to 2
   std::string symbol = {};
 

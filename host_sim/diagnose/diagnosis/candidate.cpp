@@ -91,6 +91,8 @@ const double* ColumnOf(const Quantities& quantities, const Eigen::MatrixXd& dela
       return quantities.parts.mass[input.row][input.body].data();
     case codegen::Quantity::kGravitySlope:
       return quantities.parts.tilt[input.row][input.parameter].data();
+    case codegen::Quantity::kGravityStiffness:
+      return quantities.parts.stiffness[input.row][input.body].data();
     case codegen::Quantity::kModelTorque:
       return joint(quantities.tau_model);
     case codegen::Quantity::kDelayedTorque:

@@ -52,7 +52,8 @@ Quantities PickSamples(const Quantities& q, int every, calibration::Dataset& dat
   Quantities out;
   out.data = &data;
   out.parts.rigid = PickRows(q.parts.rigid, every), out.parts.gravity = PickRows(q.parts.gravity, every);
-  for (const auto& [from, to] : {std::pair{&q.parts.mass, &out.parts.mass}, std::pair{&q.parts.tilt, &out.parts.tilt}})
+  for (const auto& [from, to] : {std::pair{&q.parts.mass, &out.parts.mass}, std::pair{&q.parts.tilt, &out.parts.tilt},
+                                 std::pair{&q.parts.stiffness, &out.parts.stiffness}})
     for (const auto& row : *from) {
       to->emplace_back();
       for (const VectorXd& v : row) to->back().push_back(PickRows(v, every));

@@ -24,7 +24,7 @@ double Needed(Candidate& c, const std::vector<double>& eta) {
   f.tried = c.unknowns().empty() ? 1 : kTried;
   f.gain.rank = c.columns(eta);
   f.searched = static_cast<int>(c.unknowns().size());
-  return GainOfChance(f, kLogRare);
+  return std::max(GainOfChance(f, kLogRare), -Score(f, 0));
 }
 
 }  // namespace

@@ -34,7 +34,38 @@ constexpr double kNothing = 6;          // a gain that chance often has
 constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms differ a little from any record
 constexpr int kFewTurns = 100;          // rows
 constexpr double kTurnShare = 0.03;     // of a joint's rows
+constexpr double kTurnsBack = 0.2;      // of what a state of a run spans: less is no turn
 constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
+
+}  // namespace
+
+namespace {
+
+// Neither noise nor one term too many explains the gain.
+bool IsRare(const Found& f) { return f.log_chance < kLogRare && f.score > 0; }
+
+// What changes during a run, such as a sensor's zero or a lubricant, goes one way, or there and back. A curve over time
+// that goes to and fro follows the motion instead. amplitude: of cubic B-splines on even knots, without the first one.
+bool GoesToAndFro(const Candidate& c, const VectorXd& amplitude) {
+  const codegen::EffectRecord& record = c.record();
+  if (record.effect_class != codegen::EffectClass::kRunState || record.search.how != codegen::SearchWay::kSpline)
+    return false;
+  VectorXd spline(amplitude.size() + 1);
+  spline << 0, amplitude;
+  const Eigen::Index knots = spline.size() - 2;
+  const VectorXd value = (spline.head(knots) + 4 * spline.segment(1, knots) + spline.tail(knots)) / 6;
+  const double least = kTurnsBack * (value.maxCoeff() - value.minCoeff());
+  int turns = 0, way = 0;
+  for (double furthest = value[0]; const double now : value) {
+    const double step = now - furthest;
+    if (way == 0 ? std::abs(step) < least : way * step < 0 && std::abs(step) < least) continue;
+    const int next = step > 0 ? 1 : -1;
+    turns += way != 0 && step != 0 && next != way;
+    if (step != 0) way = next;
+    furthest = now;
+  }
+  return turns > 1;
+}
 
 }  // namespace
 
@@ -201,7 +232,7 @@ bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chose
   refused_.clear();
   Sort(ranked);
   for (std::size_t k = 0; k < ranked.size(); ++k)
-    if (ranked[k].log_chance < kLogRare && Accept(grounds, terms, ranked, k, out)) return true;
+    if (IsRare(ranked[k]) && Accept(grounds, terms, ranked, k, out)) return true;
   return false;
 }
 
@@ -212,7 +243,7 @@ bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others
   Rescore(grounds, f);
   term.eta = f.eta;
   term.found = f;
-  return f.log_chance < kLogRare;
+  return IsRare(f);
 }
 
 std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds) {
@@ -332,6 +363,10 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
         "out of fold it keeps {:.0f} % of its gain (accepted above {:.0f} %) and improves {} of {} folds "
         "(accepted from {})",
         100 * folds.sum() / gain.gain, 100 * kKeepsOutOfFold, (folds.array() > 0).count(), kFolds, kFoldsThatImprove);
+    return false;
+  }
+  if (GoesToAndFro(*f.candidate, gain.amplitude)) {
+    refused_[f.candidate] = "over time it goes to and fro, which a state of a run does not";
     return false;
   }
   if (!StaysAtLowerBandwidth(f, terms, gain, noise)) {

@@ -29,8 +29,8 @@ constexpr double kNamed = 15;         // score of each half; odds of e^7 to one
 // magnets that warm up gained 8 % at most in 20 draws.
 constexpr double kWorthIt = 0.9, kJointGains = 0.95;
 constexpr double kOtherSign = 2;  // standard deviations that such a mass may be on the other side of zero
-constexpr int kNoiseRounds = 6;  // of noise, prior and load; three settle
-constexpr int kFewestRows = 20;  // of a joint in one half
+constexpr int kNoiseRounds = 6;   // of noise, prior and load; three settle
+constexpr int kFewestRows = 20;   // of a joint in one half
 
 // One joint's rows of one half: residual, and the columns [what may differ between runs, load].
 struct Rows {

@@ -23,7 +23,7 @@ constexpr double kOfAPeriod = 10;   // samples of a period of the band that a th
 constexpr double kAboveBand = 1.5;  // cut-off over band: the filter then takes 4 % of what is at the band's edge
 constexpr double kBesideTurn = 1;   // periods of a filter's edge, from a turn on
 constexpr int kFiner = 4;           // samples of a filtered log for each of its own
-constexpr int kPoses = 8;            // at a single one an entry of the mass matrix may vanish
+constexpr int kPoses = 8;           // at a single one an entry of the mass matrix may vanish
 // Signals and masks for given inertias.
 Dataset Derive(const codegen::Model& model, const logs::Log& log, const logs::Sensitivity& sensitivity,
                const logs::Bandwidth& bandwidth) {

@@ -82,11 +82,13 @@ TEST(Band, AFilterBeforeTheLogWasSaved_IsFoundAtItsEdge) {
   const VectorXd motion = LowPass(White(8, 1), 3);
   // The spectrum has a bin every 0.8 Hz, and three are taken together.
   for (const double edge_Hz : {15.0, 20.0, 28.0})
-    EXPECT_NEAR(FilteredAbove_Hz(OneJoint(tests::WindowedSinc(motion + White(9, 0.1), edge_Hz, kRate_Hz)), 0, motion), edge_Hz, 1.6);
+    EXPECT_NEAR(FilteredAbove_Hz(OneJoint(tests::WindowedSinc(motion + White(9, 0.1), edge_Hz, kRate_Hz)), 0, motion),
+                edge_Hz, 1.6);
 }
 
 TEST(Band, ALag_ABelt_AndASmoothMotion_AreNoFilter) {
-  const VectorXd motion = LowPass(White(10, 1), 3), smooth = tests::WindowedSinc(motion, 4, kRate_Hz), noise = White(11, 0.01);
+  const VectorXd motion = LowPass(White(10, 1), 3), smooth = tests::WindowedSinc(motion, 4, kRate_Hz),
+                 noise = White(11, 0.01);
   EXPECT_EQ(FilteredAbove_Hz(OneJoint(LowPass(motion, 4) + noise), 0, motion), INFINITY);
   EXPECT_EQ(FilteredAbove_Hz(OneJoint(LowPass(LowPass(motion, 4), 4) + noise), 0, motion), INFINITY);
   EXPECT_EQ(FilteredAbove_Hz(OneJoint(smooth + noise), 0, smooth), INFINITY);

@@ -1,5 +1,5 @@
-// calibration tests - what a logger does to each column before it keeps fewer samples: a zero-phase low-pass that is far
-// steeper than a drive or a gear.
+// calibration tests - what a logger does to each column before it keeps fewer samples: a zero-phase low-pass that is
+// far steeper than a drive or a gear.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,8 +16,8 @@ inline Eigen::MatrixXd WindowedSinc(const Eigen::MatrixXd& x, double edge_Hz, do
   for (Eigen::Index i = -kReach; i <= kReach; ++i) {
     const double at = static_cast<double>(i), turns = edge_Hz * at / rate_Hz,
                  window = std::pow(std::cos(0.5 * std::numbers::pi * at / (kReach + 1.0)), 2);
-    const double sinc = i == 0 ? 2 * edge_Hz / rate_Hz
-                               : std::sin(2 * std::numbers::pi * turns) / (std::numbers::pi * at);
+    const double sinc =
+        i == 0 ? 2 * edge_Hz / rate_Hz : std::sin(2 * std::numbers::pi * turns) / (std::numbers::pi * at);
     weight[kReach + i] = sinc * window;
   }
   Eigen::MatrixXd y(x.rows(), x.cols());

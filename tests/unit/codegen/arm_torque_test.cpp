@@ -63,6 +63,14 @@ class ArmTorqueOf : public testing::TestWithParam<const char*> {
           compare(parts.mass[i][j][k], (arm.Torque(q, none, VectorXd::Unit(n(), j)) - gravity)[i]);
         for (int axis = 0; axis < 3; ++axis) tilt[i][axis][k] = tilted[axis].Torque(q, none, none)[i];
       }
+      for (int j = 0; j < n(); ++j) {
+        // four places: the error is of fourth order, 1e-13
+        const auto gravity_at = [&](double step) { return arm.Torque(q + step * VectorXd::Unit(n(), j), none, none); };
+        const VectorXd slope = (8 * (gravity_at(kStep_rad) - gravity_at(-kStep_rad)) - gravity_at(2 * kStep_rad) +
+                                gravity_at(-2 * kStep_rad)) /
+                               (12 * kStep_rad);
+        for (int i = 0; i < n(); ++i) compare(parts.stiffness[i][j][k], slope[i]);
+      }
     }
     // What turns with joint 1 about an upright axis gravity does not see while the arm is level: no base parameter says
     // how heavy it is, so its part of the tilted torque in row 1, any a cos q1 + b sin q1, is not there.
@@ -78,6 +86,7 @@ class ArmTorqueOf : public testing::TestWithParam<const char*> {
   }
 
   static constexpr int kSamples = 25;
+  static constexpr double kStep_rad = 1e-3;
   codegen::Robot robot_;
   codegen::Model model_;
   codegen::ArmTorque arm_;
@@ -103,15 +112,18 @@ TEST_P(ArmTorqueOf, SomeParts_AreThoseAloneThatChange) {
            {{codegen::Quantity::kGravityTorque, 1},
             {codegen::Quantity::kMassMatrix, 1, 0},
             {codegen::Quantity::kGravitySlope, 1, 0, 2},
+            {codegen::Quantity::kGravityStiffness, 1, 1},
             {codegen::Quantity::kModelTorque, 0}},
            some);
   codegen::TorqueParts expected = before;
   expected.gravity.col(1) = after.gravity.col(1);
   expected.mass[1][0] = after.mass[1][0], expected.tilt[1][2] = after.tilt[1][2];
+  expected.stiffness[1][1] = after.stiffness[1][1];
   EXPECT_EQ(some.rigid, expected.rigid);
   EXPECT_EQ(some.gravity, expected.gravity);
   EXPECT_EQ(some.mass, expected.mass);
   EXPECT_EQ(some.tilt, expected.tilt);
+  EXPECT_EQ(some.stiffness, expected.stiffness);
   EXPECT_NE(some.mass, before.mass);
 }
 

@@ -85,7 +85,8 @@ std::vector<T> As(const VectorXd& v) {
 
 std::string Effect(const std::string& parameter) { return parameter.substr(0, parameter.find('.')); }
 
-// share: of the largest value of the same effect over the run: the splines of one sum are rounded alike.
+// share: of the largest value of the same effect over the run, in any row: the splines of one sum are rounded alike,
+// and so are the rows of one sum of gravity's terms.
 template <class T>
 void Compare(const std::vector<std::vector<T>>& emitted, const std::vector<MatrixXd>& graph, double share,
              const std::function<std::string(int)>& name) {
@@ -94,7 +95,7 @@ void Compare(const std::vector<std::vector<T>>& emitted, const std::vector<Matri
       double largest = 0;
       for (int other = 0; other < graph[i].cols(); ++other)
         if (Effect(name(other)) == Effect(name(c)))
-          largest = std::max(largest, graph[i].col(other).cwiseAbs().maxCoeff());
+          for (const MatrixXd& row : graph) largest = std::max(largest, row.col(other).cwiseAbs().maxCoeff());
       for (int k = 0; k < kSamples; ++k)
         ASSERT_NEAR(static_cast<double>(emitted[k][i * graph[i].cols() + c]), graph[i](k, c), share * largest + 1e-30)
             << name(c) << " in row " << i << ", sample " << k;

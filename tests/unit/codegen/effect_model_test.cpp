@@ -118,6 +118,23 @@ TEST(EffectsInAModel, BeltElasticity_TakesTheMassMatrixsColumn) {
   }
 }
 
+// The links stand lower by C times the load: to first order in C, what gravity's torque then changes by.
+TEST(EffectsInAModel, JointCompliance_MovesTheLinksUnderGravity) {
+  constexpr double kCompliance = 1e-9;  // rad/(N m); the second order is a millionth
+  for (const char* name : kArms) {
+    WithEffect arm(Use("joint_compliance", {1}), name);
+    KdlArm kdl(arm.robot(), arm.bodies());
+    const MatrixXd column = arm.Column("joint_compliance.C2", {});
+    for (int k = 0; k < WithEffect::kSamples; ++k) {
+      const VectorXd q = arm.signals().q.row(k);
+      const double load = kdl.Torque(q, arm.signals().qd.row(k), arm.signals().qdd.row(k))[1];
+      const VectorXd lower = q - kCompliance * load * VectorXd::Unit(6, 1);
+      const VectorXd change = (kdl.Torque(lower, kRest, kRest) - kdl.Torque(q, kRest, kRest)) / kCompliance;
+      for (int i = 0; i < 6; ++i) EXPECT_NEAR(column(k, i), change[i], 1e-4 * change.norm() + 1e-4) << name << " " << k;
+    }
+  }
+}
+
 // Torque at rest is linear in gravity; rows 2..6 see all of it through the base parameters of an upright arm.
 TEST(EffectsInAModel, BaseTilt_IsTheSlopeOfGravityTorque) {
   for (const char* name : kArms) {

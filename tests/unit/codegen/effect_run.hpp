@@ -40,6 +40,7 @@ inline std::string TestName(const codegen::InputId& i) {
   if (i.quantity == Quantity::kBodyColumn) return "Y" + numbers(i.row, i.body) + "_" + std::to_string(i.parameter);
   if (i.quantity == Quantity::kMassMatrix) return "M" + numbers(i.row, i.body);
   if (i.quantity == Quantity::kGravitySlope) return "G" + numbers(i.row, i.parameter);
+  if (i.quantity == Quantity::kGravityStiffness) return "K" + numbers(i.row, i.body);
   return codegen::NameOf(i);
 }
 

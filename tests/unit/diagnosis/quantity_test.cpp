@@ -82,6 +82,12 @@ class EveryQuantity : public testing::Test {
     if (gravity_axis >= 0) robot.gravity_mps2 = {}, robot.gravity_mps2[gravity_axis] = 1;
     return KdlArm(robot, bodies).Torque(At(data_.s.q, sample), qd, qdd);
   }
+  VectorXd GravityAt(int sample, int joint, double moved_rad) const {
+    const VectorXd none = VectorXd::Zero(n());
+    VectorXd q = At(data_.s.q, sample);
+    q[joint] += moved_rad;
+    return KdlArm(arm_.model().robot(), arm_.bodies()).Torque(q, none, none);
+  }
   VectorXd Rigid(int sample) const {
     return Torque(arm_.bodies(), sample, At(data_.s.qd, sample), At(data_.s.qdd, sample));
   }
@@ -115,6 +121,10 @@ class EveryQuantity : public testing::Test {
       }
       case Quantity::kGravitySlope:
         return Torque(arm_.bodies(), sample, none, none, w.index)[row];
+      case Quantity::kGravityStiffness: {
+        constexpr double kStep_rad = 1e-4;
+        return (GravityAt(sample, w.index, kStep_rad) - GravityAt(sample, w.index, -kStep_rad))[row] / (2 * kStep_rad);
+      }
       case Quantity::kBodyColumn: {  // the torque is linear in the bodies
         VectorXd more = arm_.bodies();
         more[11 * w.index + w.parameter] += 1;

@@ -24,6 +24,7 @@ int Main(int argc, char** argv) {
   AddIdentify(app, action);
   AddEvaluate(app, action);
   AddReplay(app, action);
+  AddChoose(app, action);
   AddDiagnose(app, action);
   AddImport(app, action);
   AddGenerate(app, action);

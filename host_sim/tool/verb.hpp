@@ -28,6 +28,7 @@ void AddEstimate(CLI::App& app, Action& action);
 void AddIdentify(CLI::App& app, Action& action);
 void AddEvaluate(CLI::App& app, Action& action);
 void AddReplay(CLI::App& app, Action& action);
+void AddChoose(CLI::App& app, Action& action);
 void AddDiagnose(CLI::App& app, Action& action);
 void AddExport(CLI::App& app, Action& action);
 void AddFlash(CLI::App& app, Action& action);

@@ -59,6 +59,7 @@ const Edges kEdges = {
     {"host_sim/identify/calibration", {kCode, kHost + "data/files", kHost + "data/logs", kLib + "math", kLib + "model"}},
     {"host_sim/identify/methods", {kCode, kHost + "data/logs", kHost + "identify/search", kHost + "identify/calibration"}},
     {"host_sim/identify/description", {kCode, kHost + "identify/calibration"}},  // the identified arm for other programs
+    {"host_sim/identify/choice", {kCode, kHost + "identify/calibration", kHost + "identify/methods"}},
     {"host_sim/identify/replay", {kCode, kHost + "data/logs", kHost + "identify/calibration", kHost + "identify/methods"}},
 
     // Diagnose: causes of what the model leaves, and how a person is told.

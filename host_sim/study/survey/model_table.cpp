@@ -6,6 +6,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/channels.hpp"
+#include "host_sim/identify/choice/fit_model.hpp"
 #include "host_sim/machine/plant/random.hpp"
 #include "host_sim/study/survey/platform.hpp"
 #include "host_sim/study/survey/tables.hpp"
@@ -125,7 +126,7 @@ void Simulated(const Settings& settings, const Motions& motions, Findings& out) 
       const calibration::Dataset log = Measured(truth->train, truth->tau + Noise(samples, truth->sigma_Nm, seed));
       const calibration::Dataset other =
           Measured(truth->other, truth->tau_other + Noise(samples, truth->sigma_Nm, seed + 1));
-      const ModelFit fit = FitModel(model, {&log}, settings.stop);
+      const choice::ModelFit fit = choice::FitModel(model, {&log}, settings.stop);
       by = fit.method, why = fit.why;
       if (fit.z.size() == 0) break;
       const MatrixXd error = log.tau - Torque(model, log.s, fit.z);
@@ -206,7 +207,7 @@ void FitMeasured(const Settings& settings, const std::string& robot, const std::
         logs.push_back(calibration::Prepare(model, logs::ReadLog(folder + name, map)));
       std::vector<const calibration::Dataset*> train;
       for (const auto& log : logs) train.push_back(&log);
-      const ModelFit fit = FitModel(model, train, settings.stop);
+      const choice::ModelFit fit = choice::FitModel(model, train, settings.stop);
       if (fit.z.size() == 0) {
         sheet.rows.push_back({robot, split.held_out, LawName(law), fit.why, "-", "-"});
         continue;

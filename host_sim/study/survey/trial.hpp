@@ -101,18 +101,6 @@ Cell Mean(const std::vector<Score>& scores, double Score::*index);
 Cell Mean(const std::vector<double>& values);
 Statistic Over(const std::vector<Score>& scores, double Score::*index);
 
-struct ModelFit {
-  Eigen::VectorXd z;   // empty: `why`
-  std::string method;  // the method that fitted it
-  std::string why;
-};
-
-// One friction model fitted to logs without a prior: weighted least squares for a linear model, variable projection for
-// a nonlinear one. Variable projection has least squares inside, so a model never fits worse than one that it contains
-// at fixed eta.
-ModelFit FitModel(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
-                  const std::atomic<bool>* stop = nullptr);
-
 // The robot file with its declared effects, and with another friction law on every joint.
 codegen::Robot WithLaw(const codegen::Robot& file, Law law, const Stribeck& stribeck);
 

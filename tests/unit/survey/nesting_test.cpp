@@ -2,6 +2,7 @@
 // this.
 #include <gtest/gtest.h>
 
+#include "host_sim/identify/choice/fit_model.hpp"
 #include "host_sim/study/survey/platform.hpp"
 #include "host_sim/study/survey/trial.hpp"
 #include "tests/unit/survey/survey_arm.hpp"
@@ -19,7 +20,7 @@ class Nesting : public testing::Test {
   }
   double TrainingError(Law law) const {
     const codegen::Model model = test::Arm(law, Bodies::kBase);
-    const ModelFit fit = FitModel(model, {&log_});
+    const choice::ModelFit fit = choice::FitModel(model, {&log_});
     EXPECT_GT(fit.z.size(), 0) << LawName(law) << ": " << fit.why;
     return fit.z.size() ? BaseError(log_.tau - Torque(model, log_.s, fit.z), sigma_) : 1e9;
   }

@@ -14,7 +14,7 @@ namespace armcal::faults {
 struct Fault {
   std::string room;   // whose tests must notice
   std::string name;   // what is wrong, as a sentence
-  std::string file;   // below lib/armcal
+  std::string file;   // below the sources
   std::string right;  // text of the file, found once
   std::string wrong;  // what stands there instead
 };

@@ -1,5 +1,5 @@
-// faults - copies lib/armcal with a switch at the place of every fault; knows text, not what it means.
-//   plant_faults FAULTS LIB COPY: folders of <room>.toml, of armcal/ and of its copy
+// faults - copies sources with a switch at the place of every fault; knows text, not what it means.
+//   plant_faults FAULTS SOURCES COPY: folders of <room>.toml, of the sources and of their copy
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -67,15 +67,16 @@ bool Plant(const std::string& file, const std::vector<Fault>& faults, std::strin
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 4) throw std::runtime_error("usage: plant_faults FAULTS LIB COPY");
+  if (argc != 4) throw std::runtime_error("usage: plant_faults FAULTS SOURCES COPY");
   const std::vector<Fault> faults = armcal::faults::ReadFaults(argv[1]);
-  const fs::path lib = fs::path(argv[2]) / "armcal", copy = fs::path(argv[3]) / "armcal";
+  const fs::path sources = argv[2], copy = argv[3];
   bool good = true;
   for (const Fault& fault : faults)
-    if (!fs::exists(lib / fault.file)) throw std::runtime_error("\"" + fault.name + "\": there is no " + fault.file);
-  for (const auto& entry : fs::recursive_directory_iterator(lib)) {
+    if (!fs::exists(sources / fault.file))
+      throw std::runtime_error("\"" + fault.name + "\": there is no " + fault.file);
+  for (const auto& entry : fs::recursive_directory_iterator(sources)) {
     if (!entry.is_regular_file()) continue;
-    const std::string file = fs::relative(entry.path(), lib).string();
+    const std::string file = fs::relative(entry.path(), sources).string();
     std::string text = Read(entry.path());
     good &= Plant(file, faults, text);
     Write(copy / file, text);

@@ -117,6 +117,25 @@ TEST(Carried, AsCoordinates_PredictsTheRun) {
   }
 }
 
+// The arm drops its payload halfway, or takes it up. What one half carries makes the errors of the other half larger.
+// No payload of the whole run is named.
+TEST(Carried, ByOneHalfAlone_IsWorthNothingOnTheOther) {
+  LadenArm arm(7, 0);
+  const plant::Body body{6, {0.03, -0.05, 0.1}, {0.05, 0, 0, 0.04, 0, 0.03}};
+  const Dataset train = arm.Run(10, 1, {}), bare = arm.Run(10, 2, {});
+  for (const bool first : {true, false}) {
+    Dataset run = arm.Run(10, 2, body);  // the same motion
+    const int half = run.samples() / 2;
+    if (first) run.tau.bottomRows(run.samples() - half) = bare.tau.bottomRows(run.samples() - half);
+    else run.tau.topRows(half) = bare.tau.topRows(half);
+    const Carried found = Ask(arm.model(), {&train}, run);
+    const std::size_t empty = first ? 1 : 0;
+    EXPECT_LT(found.score[empty], 0) << empty;
+    EXPECT_GT(found.factor[empty], 1) << empty;
+    EXPECT_FALSE(found.named) << empty;
+  }
+}
+
 TEST(Carried, AWarmerRunOrWrongFriction_IsNoPayload) {
   int named = 0, asked = 0;
   for (int draw = 0; draw < Draws(); ++draw)

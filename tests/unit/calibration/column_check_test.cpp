@@ -70,6 +70,25 @@ TEST_F(ColumnCheck, AnOffsetOfTheFirstJoint_LeavesTheFitAsItIs) {
   EXPECT_NEAR(left(), before, 0.05);  // the ridge alone differs
 }
 
+// A log whose clock runs at half the speed shows sin(3 t) where the arm moves by sin(6 u), u being true time.
+TEST(ColumnChange, OfTheUnitOfTime_GivesTheDerivativesByTrueTime) {
+  const Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(20, 0, 2), u = t / 2;
+  codegen::Signals log;
+  log.t = t;
+  log.q.resize(20, 2), log.qd.resize(20, 2), log.qdd.resize(20, 2);
+  log.q << (3 * t).sin(), t.sin();
+  log.qd << 3 * (3 * t).cos(), t.cos();
+  log.qdd << -9 * (3 * t).sin(), -t.sin();
+  ColumnChange change(2);
+  change.pace = 2;
+  change.q = {1, 0}, change.q_sign = {1, -1};
+  const codegen::Signals moved = change.Moved(log);
+  EXPECT_LT((moved.q.col(1).array() + (6 * u).sin()).abs().maxCoeff(), 1e-12);
+  EXPECT_LT((moved.qd.col(1).array() + 6 * (6 * u).cos()).abs().maxCoeff(), 1e-12);
+  EXPECT_LT((moved.qdd.col(1).array() - 36 * (6 * u).sin()).abs().maxCoeff(), 1e-12);
+  EXPECT_LT((moved.qdd.col(0).array() + 4 * (2 * u).sin()).abs().maxCoeff(), 1e-12);
+}
+
 TEST_F(ColumnCheck, GoodLogs_GainNothing) {
   for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
     const Dataset d = arm_.Run(12, seed, {}, seed > 2 ? 0.1 : 0.5);

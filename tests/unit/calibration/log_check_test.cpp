@@ -123,6 +123,19 @@ TEST_F(LogCheck, OfExchangedTorqueColumns_NamesThem) {
   ExpectRefused("tau1 and tau2");
 }
 
+// The bodies tell the torque's size and sign even where its signals look well.
+TEST_F(LogCheck, OfATorqueThatTheBodiesCannotNeed_NamesTheJoint) {
+  data_.source = "run.csv";
+  const Eigen::MatrixXd tau = data_.tau;
+  for (const double factor : {100.0, 0.01, -1.0}) {
+    data_.tau = tau;
+    data_.tau.col(1) *= factor;
+    ExpectRefused("joint 2: torque is ");
+  }
+  data_.tau = 0.5 * tau;  // the gear ratio or the motor may be another one
+  EXPECT_EQ(Said(), "");
+}
+
 // Rows that can be fitted are what a fit is made of: without any there is none, and a moving joint without any is
 // named.
 TEST_F(LogCheck, OfLogsWithoutAUsableRow_RefusesThem) {

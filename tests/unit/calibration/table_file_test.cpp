@@ -91,6 +91,24 @@ TEST(TableFile, TheHostsWords_AreWhatTheFirmwareDecodes) {
   EXPECT_EQ(decoded.blend_ms, 250u);
 }
 
+// Current times the nominal torque constant reads 1.25 times the torque. The drive multiplies by torque_scale.
+TEST(TableFile, OfADriveThatReadsAQuarterTooMuch_ScalesByFourFifths) {
+  const codegen::Model& model = Er20Model();
+  const int size = model.columns() + model.joints();
+  Fit fit;
+  fit.x = Eigen::VectorXd::Zero(size), fit.sd = Eigen::VectorXd::Ones(size), fit.prior_sd = fit.sd;
+  fit.sigma = Eigen::VectorXd::Ones(model.joints());
+  PhysicalReadOut read;
+  read.bodies = Eigen::VectorXd::Zero(model.body_parameters()), read.bodies_sd = read.bodies;
+  read.x = fit.x;
+  read.x[model.columns() + 1] = 0.25;
+  const double sample_s = model.robot().sample_ticks / model.robot().tick_rate_Hz;
+  const TableFile t = IdentifiedTable(model, fit, fit, read, 4 * sample_s);
+  EXPECT_DOUBLE_EQ(t.joint[1].torque_scale, 0.8);
+  EXPECT_DOUBLE_EQ(t.joint[0].torque_scale, 1);
+  EXPECT_DOUBLE_EQ(t.joint[1].sigma_Nm, 2);  // a row of the log is the mean of four samples
+}
+
 TEST(TableFile, AnotherSchemaOrSize_IsRefused) {
   auto words = EncodeTable(DefaultTable(Er20Model()));
   words.pop_back();

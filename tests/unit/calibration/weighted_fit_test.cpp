@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
+#include <numbers>
+#include <random>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
@@ -109,6 +112,67 @@ TEST(WeightedFit, HeldColumns_StayAtThePrior) {
     EXPECT_EQ(fit.x[c], MakePrior(arm.model()).mean[c]);
     EXPECT_EQ(fit.sd[c], 0);
   }
+}
+
+// One car on a rail: its force can be written by hand.
+struct Car {
+  static constexpr double kMass_kg = 95, kCoulomb_N = 20, kViscous_Nspm = 200, kOffset_N = -3, kNoise_N = 2;
+  codegen::Model model{codegen::ReadRobot("codegen/robots/emps.toml"), tests::Records()};
+  std::mt19937_64 random{11};
+
+  // keeps: share of one row's noise that the next row has, too.
+  Dataset Run(int samples, double step_s, double keeps) {
+    Dataset d;
+    d.s.t = VectorXd::LinSpaced(samples, 0, (samples - 1) * step_s);
+    d.s.q.setZero(samples, 1), d.s.qd = d.s.q, d.s.qdd = d.s.q, d.tau = d.s.q;
+    d.used.setZero(samples, 1);
+    std::normal_distribution<double> normal(0, kNoise_N);
+    double noise_N = normal(random);
+    for (int k = 0; k < samples; ++k) {
+      for (const auto& [size_m, f_Hz] : {std::pair{0.2, 0.2}, std::pair{0.04, 0.63}}) {
+        const double w = 2 * std::numbers::pi * f_Hz, x = w * d.s.t[k] + 0.3;
+        d.s.q(k, 0) += size_m * std::sin(x);
+        d.s.qd(k, 0) += size_m * w * std::cos(x);
+        d.s.qdd(k, 0) -= size_m * w * w * std::sin(x);
+      }
+      const double v = d.s.qd(k, 0);
+      d.tau(k, 0) = kMass_kg * d.s.qdd(k, 0) + kCoulomb_N * (v > 0 ? 1 : -1) + kViscous_Nspm * v + kOffset_N + noise_N;
+      d.used(k, 0) = std::abs(v) > model.robot().joint[0].v_min_radps;
+      noise_N = keeps * noise_N + std::sqrt(1 - keeps * keeps) * normal(random);
+    }
+    d.moving = d.used;
+    return d;
+  }
+};
+
+// Four columns take four of some 20 squares away. Without them in the count, the variance would be 0.8 of the true one.
+TEST(WeightedFit, AFewRows_StillTellTheNoise) {
+  Car car;
+  constexpr int kLogs = 400;
+  double variance = 0;
+  for (int k = 0; k < kLogs; ++k) {
+    const Dataset d = car.Run(20, 0.25, 0);
+    const Fit fit = WeightedFit(car.model, {&d});
+    variance += fit.sigma[0] * fit.sigma[0] / kLogs;
+  }
+  // The mean has a deviation of sqrt(2 / 16 / 400) = 0.018. The gain's column counts, too, though it is no direction of
+  // its own: 16 / 15.
+  EXPECT_NEAR(variance / (Car::kNoise_N * Car::kNoise_N), 1, 0.13);
+}
+
+// Noise of which 0.8 stays from row to row: a sum over it varies (1 + 0.8) / (1 - 0.8) = 9 times as much as one over
+// white noise. Deviations that do not count this are three times too small.
+TEST(WeightedFit, NoiseThatLasts_IsCountedInTheDeviations) {
+  Car car;
+  constexpr int kLogs = 40;
+  double squares = 0;
+  for (int k = 0; k < kLogs; ++k) {
+    const Dataset d = car.Run(2000, 0.01, 0.8);
+    const Fit fit = WeightedFit(car.model, {&d});
+    const int mass = car.model.front();
+    squares += std::pow((fit.x[mass] - Car::kMass_kg) / fit.sd[mass], 2) / kLogs;
+  }
+  EXPECT_NEAR(std::sqrt(squares), 1, 0.45);  // 4 / sqrt(2 x 40)
 }
 
 // Prior of the standard parameters (m, m c, I about the origin, rotor), through differences of the parallel-axis rule.

@@ -1,4 +1,4 @@
-// diagnosis tests - compares chances with tables of the chi-squared distribution.
+// diagnosis tests - compares chances with tables of the chi-squared distribution, and scores with sums by hand.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -26,6 +26,34 @@ TEST(LogUpperTail, HasDigitsFarOut) {
     EXPECT_DOUBLE_EQ(LogUpperTail(2, x), -x / 2);
   }
   EXPECT_EQ(LogUpperTail(3, 0), 0);
+}
+
+// A term of one amplitude on one joint of the small arm.
+struct OneAmplitude {
+  explicit OneAmplitude(double generic_penalty) {
+    record.generic_penalty = generic_penalty;
+    found.candidate = &candidate;
+    found.gain.rank = 1;
+  }
+  codegen::EffectRecord record = codegen::ReadEffect("codegen/effects/load_friction.toml");
+  Candidate candidate{record, codegen::ReadRobot("codegen/robots/two_link.toml"), {0}};
+  Found found;
+};
+
+// The tail of two degrees is exp(-x / 2), that of four exp(-x / 2) (1 + x / 2).
+TEST(LogChance, CountsWhatWasSearchedAsAnAmplitude_AndEveryTry) {
+  OneAmplitude one(0);
+  one.found.tried = 10, one.found.searched = 1;
+  EXPECT_NEAR(LogChance(one.found, 30), std::log(10) - 15, 1e-9);
+  one.found.searched = 3;
+  EXPECT_NEAR(LogChance(one.found, 30), std::log(10) + std::log(16) - 15, 1e-9);
+}
+
+TEST(Score, PaysForParametersTriesAndForm) {
+  OneAmplitude cause(0), curve(20);
+  for (Found* f : {&cause.found, &curve.found}) f->penalty = 7, f->tried = 20;
+  EXPECT_NEAR(Score(cause.found, 40), 33 - 5.991465, 1e-6);  // 2 ln 20
+  EXPECT_NEAR(Score(curve.found, 40), 13 - 5.991465, 1e-6);
 }
 
 }  // namespace

@@ -99,5 +99,13 @@ TEST(Determined, AnAmplitudeBeyondWhatTheRecordAllows_IsMarked) {
   EXPECT_FALSE(marks.usable);
 }
 
+// A thousandth of the logarithm of a range from 4 to 800 is 0.0053: 4.02 and 795.8 are that far from its ends.
+TEST(Determined, ARangeOfLogarithms_HasTwoEnds) {
+  codegen::EffectUnknown unknown;
+  unknown.lower = 4, unknown.upper = 800, unknown.logarithmic = true;
+  for (const double value : {4.0, 4.01, 797.0, 800.0}) EXPECT_TRUE(IsAtEdge(unknown, value)) << value;
+  for (const double value : {4.05, 48.0, 790.0}) EXPECT_FALSE(IsAtEdge(unknown, value)) << value;
+}
+
 }  // namespace
 }  // namespace armcal::diagnosis

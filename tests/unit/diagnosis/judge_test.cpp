@@ -172,5 +172,32 @@ TEST(HeldOutLog, SaysThatItFollows_OnlyWhatItConfirms) {
   }
 }
 
+// The training log's offset moves the base, too. On the held-out log it explains its own joint, and yet it is refuted:
+// the declared model alone knows the other joint's torque to 0.001 N m.
+TEST(HeldOutLog, RefutesATermThatHelpsItsJoint_AndHarmsAllTogether) {
+  constexpr int kOther = 0;
+  constexpr double kLeft_Nm = 0.001;
+  tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 8);
+  Dataset train = arm.Run(20, 80), test = arm.Run(20, 81);
+  train.tau.col(kChangedJoint).array() += 0.1, test.tau.col(kChangedJoint).array() += 0.1;
+  Diagnosis diagnosis(arm.model(), tests::Records(), {&train});
+  ASSERT_EQ(diagnosis.finding().terms.size(), 1u);
+  const calibration::Fit& declared = diagnosis.finding().declared;
+  test.tau.col(kOther) = calibration::Predict(arm.model(), test, declared.x, declared.eta).col(kOther);
+  for (int k = 0; k < test.samples(); ++k) test.tau(k, kOther) += k % 2 ? kLeft_Nm : -kLeft_Nm;
+  (void)diagnosis.Judge(test);
+  const Term& t = diagnosis.finding().terms[0];
+  EXPECT_EQ(t.joints, std::vector<int>{kChangedJoint});
+  EXPECT_FALSE(t.confirmed);
+  ASSERT_TRUE(t.refuted);
+  const Refutation& why = *t.refuted;
+  EXPECT_EQ(why.joint, -1);
+  EXPECT_FALSE(why.beside_others);
+  EXPECT_LT(why.with[kChangedJoint], 0.95 * why.without[kChangedJoint]);
+  EXPECT_NEAR(why.without[kOther], kLeft_Nm, 1e-9);
+  EXPECT_GT(why.with[kOther], 2 * kLeft_Nm);
+  EXPECT_NEAR(why.factor, why.with.prod() / why.without.prod(), 1e-9 * why.factor);
+}
+
 }  // namespace
 }  // namespace armcal::diagnosis

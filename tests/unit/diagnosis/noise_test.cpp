@@ -202,5 +202,61 @@ TEST(Metric, AColumnOfTheBase_HasNoDirectionOfItsOwn) {
   EXPECT_EQ(Metric(rows, {NoiseModel{}}).Try(c).rank, 0);
 }
 
+// Weighted squares of one fold's rows, as a fit of base (with unit prior) and columns to all other rows predicts them.
+// The noise is white.
+double SquaresOfFold(const BaseRows& rows, const std::vector<NoiseModel>& noise, const Columns& c, int fold) {
+  constexpr int kRowsOfABlock = 20, kFolds = 5;
+  const int d = rows.coordinates(), k = c.count();
+  std::vector<VectorXd> fitted, judged;  // each row: base, columns, torque
+  for (int i = 0; i < d; ++i) fitted.push_back(VectorXd::Unit(d + k + 1, i));
+  for (std::size_t j = 0; j < rows.index.size(); ++j)
+    for (int row = 0; row < rows.index[j].size(); ++row) {
+      VectorXd all = VectorXd::Zero(d + k + 1);
+      all.head(d) = rows.design[j].row(row);
+      for (std::size_t r = 0; r < c.joints.size(); ++r)
+        if (c.joints[r] == static_cast<int>(j)) all.segment(d, k) = c.block[r].row(row);
+      all[d + k] = rows.target[j][row];
+      (row / kRowsOfABlock % kFolds == fold ? judged : fitted).push_back(all / noise[j].innovation);
+    }
+  MatrixXd A(fitted.size(), d + k);
+  VectorXd y(fitted.size());
+  for (std::size_t i = 0; i < fitted.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    A.row(at) = fitted[i].head(d + k), y[at] = fitted[i][d + k];
+  }
+  const VectorXd x = A.householderQr().solve(y);
+  double sum = 0;
+  for (const VectorXd& row : judged) sum += std::pow(row[d + k] - row.head(d + k).dot(x), 2);
+  return sum;
+}
+
+// The columns explain more in the first half of the rows than in the second, so no two folds are alike.
+TEST(Metric, GainOfAFold_IsThatOfAFitToTheOtherFolds) {
+  std::srand(7);
+  BaseRows rows;
+  rows.L = MatrixXd::Identity(4, 4);
+  rows.mean = VectorXd::Zero(4);
+  Columns c, none;
+  c.joints = none.joints = {1, 2};
+  std::vector<NoiseModel> noise(3);
+  for (int j = 0; j < 3; ++j) {
+    noise[j].innovation = 0.1 * (j + 1);
+    rows.index.push_back(Rows(400, 400));
+    rows.columns.push_back({0, 1, 2, 3});
+    rows.design.push_back(MatrixXd::Random(400, 4));
+    rows.target.push_back(rows.design[j] * Eigen::Vector4d(1, -2, 0.5, 3) + 0.2 * VectorXd::Random(400));
+    if (j == 0) continue;
+    c.block.push_back(MatrixXd::Random(400, 2)), none.block.emplace_back(400, 0);
+    rows.target[j].head(200) += c.block.back().topRows(200) * Eigen::Vector2d(0.3, -0.1);
+  }
+  for (int j = 0; j < 3; ++j) rows.Multiply(j);
+  const VectorXd gains = Metric(rows, noise).FoldGains(c, 20, 5, {});
+  ASSERT_EQ(gains.size(), 5);
+  for (int fold = 0; fold < 5; ++fold) {
+    const double expected = SquaresOfFold(rows, noise, none, fold) - SquaresOfFold(rows, noise, c, fold);
+    EXPECT_NEAR(gains[fold], expected, 1e-6 * gains.norm()) << fold;
+  }
+}
+
 }  // namespace
 }  // namespace armcal::diagnosis

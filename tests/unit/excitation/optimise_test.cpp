@@ -56,6 +56,36 @@ TEST(Objective, WithoutPenalties_IsCloseAboveTheLogarithmOfTheConditionNumber) {
   EXPECT_LE(value, exact + 2 * std::log(52.0) / 10);  // p = 10: each sum has at most 52 terms of its largest
 }
 
+// One slide that passes one limit only. What the limits add to the value is 100 times the sum over samples of the
+// squared excess over the share that may be used.
+TEST(Objective, BeyondEachLimit_PaysForTheSquaredExcess) {
+  for (const std::string limit : {"position", "speed", "acceleration"}) {
+    codegen::Robot robot = test::RobotFile("emps");
+    codegen::Joint& car = robot.joint[0];
+    const double half = limit == "position" ? 0.3 : 1e3, speed = limit == "speed" ? 0.2 : 1e3;
+    const double acceleration = limit == "acceleration" ? 0.5 : 1e3;
+    car.position_limit_rad = {0.2 - half, 0.2 + half};
+    car.speed_limit_radps = speed, car.acceleration_limit_radps2 = acceleration;
+    const codegen::Model model = test::Arm(robot);
+    const Observation observation(model);
+    const double share = 0.8;
+    Objective bounded(observation, {}, {}, share), free(observation, {}, {}, 1e6);
+    const VectorXd u = 3 * VectorXd::LinSpaced(bounded.size(), 0.1, 20).array().sin();
+    const codegen::Signals s = bounded.Series(u).At(test::OnePeriod(80));
+    double expected = 0;
+    const auto pay = [&](double used) { expected += 100 * std::pow(std::max(0.0, used / share - 1), 2); };
+    for (Eigen::Index k = 0; k < 80; ++k) {
+      pay(std::abs(s.q(k, 0) - 0.2) / half);
+      pay(std::abs(s.qd(k, 0)) / speed);
+      pay(std::abs(s.qdd(k, 0)) / acceleration);
+    }
+    EXPECT_GT(expected, 100) << limit;
+    EXPECT_NEAR(bounded(u) - free(u), expected, 1e-9 * expected) << limit;
+    VectorXd gradient;
+    EXPECT_NEAR(bounded(u, gradient) - free(u, gradient), expected, 1e-9 * expected) << limit;
+  }
+}
+
 TEST(ScaleToLimits, OfASeriesThatBreaksThem_MeetsTheTightestOne) {
   const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
   const Observation observation(model);

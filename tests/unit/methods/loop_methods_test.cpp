@@ -4,6 +4,7 @@
 #include "host_sim/identify/methods/prefilter.hpp"
 #include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/methods/better_arm.hpp"
+#include "tests/unit/methods/classic_arm.hpp"
 
 namespace armcal::calibration {
 namespace {
@@ -46,6 +47,33 @@ TEST(InstrumentalVariable, WithThePrior_SolvesForStandardParametersToo) {
   EXPECT_TRUE(iv.converged) << iv.remark;
   EXPECT_LT(tests::TorqueError(arm, reference, iv.z), 0.25);
   EXPECT_LT(tests::TorqueError(arm, reference, iv.z), tests::TorqueError(arm, reference, tests::LeastSquares(p).z));
+}
+
+// The minimum of |(tau - K z) / sigma|^2 + (z - z0)' P^-1 (z - z0) over the measured rows.
+VectorXd BayesByHand(const SyntheticArm& arm, const Problem& p, const MatrixXd& P, MatrixXd& covariance) {
+  const tests::Stacked rows = tests::StackByHand(arm.model(), *p.train[0]);
+  VectorXd weight(rows.tau.size());
+  for (Eigen::Index r = 0; r < weight.size(); ++r)
+    weight[r] = std::pow(p.sigma_Nm[rows.joint[static_cast<std::size_t>(r)]], -2);
+  covariance = (rows.K.transpose() * weight.asDiagonal() * rows.K + P.inverse()).inverse();
+  return covariance * (rows.K.transpose() * weight.cwiseProduct(rows.tau) + P.inverse() * p.start);
+}
+
+TEST(InstrumentalVariable, OfAShortLogWithoutNoiseInPosition_IsTheBayesUpdateOfTheMeasuredRows) {
+  SyntheticArm arm(tests::TwoLinkWithControl(), 3);
+  const Dataset reference = arm.Run(2, 4);
+  const Dataset d = tests::Measured(arm, reference, 0, 1, 5);
+  Problem p = tests::ProblemOf(arm, {&d});
+  p.closed_loop = MakeClosedLoop(arm.model(), {{"loop", reference.s.q}});
+  const Solution iv = InstrumentalVariable(p);
+  EXPECT_TRUE(iv.converged) << iv.remark;
+  MatrixXd covariance, ignored;
+  const VectorXd once = BayesByHand(arm, p, p.covariance, covariance);
+  const VectorXd twice = BayesByHand(arm, p, 0.5 * p.covariance, ignored);
+  const VectorXd sd = covariance.diagonal().cwiseSqrt();
+  const double apart = (iv.z - once).cwiseQuotient(sd).norm(), planted = (twice - once).cwiseQuotient(sd).norm();
+  EXPECT_LT(apart, 0.05);   // instruments that are a little off the measured motion
+  EXPECT_GT(planted, 0.2);  // so a prior that counts twice would show
 }
 
 TEST(Didim, FindsTheParametersWithoutMeasuredPositions) {

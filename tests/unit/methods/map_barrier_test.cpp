@@ -47,6 +47,30 @@ TEST(MapBarrier, InStandardAndInBaseCoordinates_IsTheSameArm) {
         << k;
 }
 
+TEST(MapBarrier, OfManySamples_GivesFrictionTheDeviationsOfABayesUpdate) {
+  SyntheticArm arm(tests::PlainRobot("two_link", tests::Columns::kBase), 6);
+  const Dataset d = arm.Run(8, 7);
+  Problem p = tests::ProblemOf(arm, {&d});
+  p.sigma_Nm = Eigen::Vector2d(0.02, 0.3);  // far from 1 and from each other, so that a wrong power of them shows
+  const Solution s = MapBarrier(p);
+  // (K' W K + P^-1)^-1 with W = 1 / sigma^2. Its prior of the bodies is only nearly that of the table, but they share
+  // little with friction, and here the data say far more than both.
+  const tests::Stacked rows = tests::StackByHand(arm.model(), d);
+  VectorXd weight(rows.tau.size());
+  for (Eigen::Index r = 0; r < weight.size(); ++r)
+    weight[r] = std::pow(p.sigma_Nm[rows.joint[static_cast<std::size_t>(r)]], -2);
+  const Eigen::MatrixXd posterior =
+      (rows.K.transpose() * weight.asDiagonal() * rows.K + p.covariance.inverse()).inverse();
+  int friction = 0;
+  for (int c = 0; c < arm.model().columns(); ++c) {
+    const std::string name = arm.model().column_name(c);
+    if (name[0] != 'F') continue;
+    EXPECT_NEAR(std::sqrt(s.covariance(c, c)), std::sqrt(posterior(c, c)), 0.05 * std::sqrt(posterior(c, c))) << name;
+    ++friction;
+  }
+  EXPECT_EQ(friction, 4);  // Coulomb and viscous, twice
+}
+
 TEST(MapBarrier, WithAStribeckLaw_FindsItAndTheBodies) {
   SyntheticArm arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), 2);
   const Dataset d = arm.Run(20, 3, tests::Stribeck(arm));

@@ -143,6 +143,40 @@ TEST(Motion, AveragedLikeAnEstimatorSample_FitsTheNoiseFreeReading) {
   }
 }
 
+// One joint about +y of the base, which turns its mass of 3 kg at 0.2 m of its x axis from +x down to -z.
+JointText LyingAxis() {
+  return {.alpha_deg = -90,
+          .link = "mass_kg = 3.0, center_m = [0.2, 0, 0], inertia_kgm2 = [0.05, 0, 0, 0.06, 0, 0.04]"};
+}
+
+TEST(Dynamics, TheOffsetOfADhRow_IsInDegrees) {
+  std::string text = RobotText({LyingAxis()});
+  text.insert(text.find("d_m = "), "offset_deg = 60.0\n");
+  const RobotFile robot = ReadRobotFile(WriteText("offset.toml", text));
+  EXPECT_NEAR(robot.joint[0].theta_rad, std::numbers::pi / 3, 1e-12);
+  Dynamics dynamics(robot, {robot.joint[0].body}, robot.gravity_mps2);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(1), down = Eigen::VectorXd::Constant(1, std::numbers::pi / 6);
+  EXPECT_NEAR(dynamics.Torque(zero, zero, zero)[0], -3 * 9.81 * 0.2 * 0.5, 1e-12);  // cos 60 degrees
+  EXPECT_NEAR(dynamics.Torque(down, zero, zero)[0], 0, 1e-12);                      // 30 more: it hangs
+}
+
+TEST(Dynamics, ThePayloadOfTheRobotFile_IsCarriedAtTheFlange) {
+  // The flange is 0.5 m out and turned a quarter about z: the payload's centre at its -y is at the link's +x.
+  const RobotFile robot =
+      ReadRobotFile(WriteText("loaded.toml", RobotText({LyingAxis()},
+                                                       "dh = \"modified\"\n"
+                                                       "tool_frame = { xyz_m = [0.5, 0, 0], rpy_deg = [0, 0, 90] }\n"
+                                                       "payload = { mass_kg = 2.0, center_m = [0, -0.1, 0], "
+                                                       "inertia_kgm2 = [0.01, 0, 0, 0.02, 0, 0.03] }\n")));
+  EXPECT_NEAR(robot.joint[0].body.mass_kg, 5, 1e-12);
+  Dynamics dynamics(robot, {robot.joint[0].body}, robot.gravity_mps2);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(1), one = Eigen::VectorXd::Ones(1);
+  const double weight = dynamics.Torque(zero, zero, zero)[0];
+  EXPECT_NEAR(weight, -9.81 * (3 * 0.2 + 2 * 0.6), 1e-12);
+  const double inertia = 0.04 + 3 * 0.2 * 0.2 + 0.03 + 2 * 0.6 * 0.6;  // about the axis, by Steiner
+  EXPECT_NEAR(dynamics.Torque(zero, zero, one)[0] - weight, inertia, 1e-12);
+}
+
 TEST(Dynamics, StandardDh_IsTheModifiedArmWithShiftedRows) {
   // Standard row i: (a_i, alpha_i) after the joint; modified row i+1 has them before its joint.
   const auto standard = ReadRobotFile(WriteText("standard.toml", RobotText({{.alpha_deg = -90, .a_m = 0.2, .d_m = 0.3},

@@ -74,6 +74,17 @@ TEST(TorqueOffset, IsAGasCounterweightsResidual) {
   EXPECT_LT(gas->Torque({.q_rad = -1}), 3);
 }
 
+TEST(TorqueOffset, InTheArm_PushesAFreeJointBack) {
+  // A turn about the vertical: what the motor must give more accelerates the joint the other way when it gives nothing.
+  Arm arm(MakeScenario("[[effect]]\nkind = \"torque_offset\"\njoint = 1\ntorque_Nm = 7.0\n"),
+          WriteText("one.toml", RobotText({JointText{}})));
+  const double inertia = 0.04 + 3 * (0.2 * 0.2 + 0.05 * 0.05) + 100 * 100 * 2e-5;  // body about the axis, and rotor
+  EXPECT_NEAR(arm.qdd()[0], -7 / inertia, 1e-9);
+  Sensors sensors;
+  for (int k = 0; k < 100; ++k) arm.Step(std::vector<double>{0.0}, sensors);
+  EXPECT_NEAR(arm.qd()[0], -0.1 * 7 / inertia, 1e-9);
+}
+
 TEST(Lubricant, ThinsByVogelsLaw) {
   const auto effect = Make("temp_viscous", "vogel_b_K = 600.0\nvogel_degC = -95.0\nreference_degC = 25.0");
   EXPECT_NEAR(effect->Drag({.temperature_degC = 25, .viscous_Nm = 8}), 0, 1e-12);
@@ -85,6 +96,15 @@ TEST(Ripple, RepeatsInMotorAngleWithASecondHarmonic) {
   for (const double angle : {0.0, 0.4, 1.7})
     EXPECT_NEAR(effect->Torque({.motor_angle_rad = angle}),
                 2 * std::cos(6 * angle + 0.3) + 0.5 * std::sin(2 * (6 * angle + 0.3)), 1e-12);
+}
+
+TEST(Ripple, InTheArm_RepeatsWithTheMotorAndNotWithTheJoint) {
+  for (const double gear : {100.0, -80.0}) {
+    Arm arm(MakeScenario("start_rad = [0.123]\n[[effect]]\nkind = \"torque_ripple\"\njoint = 1\nper_motor_turn = 2\n"
+                         "first_Nm = 3.0\nphase_rad = 0.4\n"),
+            WriteText("one.toml", RobotText({{.coulomb = 20, .gear = gear}})));
+    EXPECT_NEAR(arm.undeclared_torque_Nm()[0], 3 * std::cos(2 * gear * 0.123 + 0.4), 1e-9) << gear;
+  }
 }
 
 TEST(CablePack, StiffensAwayFromItsNeutralAngle) {

@@ -107,6 +107,27 @@ TEST(Truth, OfOneSeed_IsAlwaysTheSameArm) {
   EXPECT_EQ(a.body[0].mass_kg, 58.0 * (0.8 + (1.2 - 0.8) * static_cast<double>(bits() >> 11) * 0x1.0p-53));
 }
 
+TEST(Truth, OfAJointWithoutAMotor_MeasuresTorqueExactly) {
+  std::string text = RobotText({JointText{}, {.a_m = 0.4}});
+  const auto motor = text.rfind("motor = ");  // of the second joint
+  text.erase(motor, text.find('\n', motor) - motor + 1);
+  const std::string path = WriteText("no_motor.toml", text);
+  const RobotFile robot = ReadRobotFile(path);
+  bool other = false;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Truth truth = DrawTruth(robot, {.torque_constant = 0.03}, seed);
+    EXPECT_EQ(truth.torque_constant_NmpA[1], 1.0) << seed;
+    other = other || std::abs(truth.torque_constant_NmpA[0] / 0.5 - 1) > 0.01;
+  }
+  EXPECT_TRUE(other);  // a motor's constant differs from the file's
+  // What is commanded is the joint's torque then, with a gear of 1.
+  Arm arm(MakeScenario("[truth]\ntorque_constant_spread = 0.03\n"), path);
+  Sensors sensors;
+  arm.SetBrakes(true);
+  for (int k = 0; k < 40; ++k) arm.Step(std::vector<double>{0.0, 12.0}, sensors);
+  EXPECT_NEAR(arm.torque_Nm()[1], 12, 1e-9);
+}
+
 TEST(Truth, AroundAnImpossibleBody_IsRefused) {
   JointText needle;
   needle.link = "mass_kg = 1.0, center_m = [0, 0, 0], inertia_kgm2 = [0.01, 0, 0, 0.01, 0, 0.1]";

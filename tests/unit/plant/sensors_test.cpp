@@ -49,6 +49,19 @@ TEST(CurrentLoop, AfterAStep_FollowsWithItsTimeConstant) {
   }
 }
 
+TEST(CurrentLoop, UnderARamp_LagsByItsTimeConstant) {
+  Arm arm(MakeScenario("command = \"ramp\"\ncurrent_time_constant_s = 0.002\n"),
+          WriteText("one.toml", RobotText({JointText{}})));
+  Sensors sensors;
+  arm.SetBrakes(true);
+  for (int k = 1; k <= 20; ++k) {
+    arm.Step(std::vector<double>{0.1 * k}, sensors);  // 100 A/s from zero on
+    // 2 ms i' = 100 t - i: the ramp less 0.2 A, and what is left of the start.
+    const double current = 0.1 * k - 0.2 * (1 - std::exp(-k / 2.0));
+    EXPECT_NEAR(arm.measured_torque_truth_Nm()[0], 100 * 0.5 * current, 1e-9) << k;
+  }
+}
+
 TEST(CurrentLoop, AskedForMoreThanTheLimit_GivesTheLimitAndSaysSo) {
   Arm arm(MakeScenario(), WriteText("one.toml", RobotText({{.gear = -100}})));
   Sensors sensors;
@@ -74,6 +87,22 @@ TEST(CurrentSensor, HasTheFilesNoiseInJointTorque) {
   EXPECT_NEAR(std::sqrt(square / kReadings), 4.0, 0.08);  // 4 standard deviations of the estimate
   EXPECT_NEAR(sum / kReadings, 0.0, 0.12);
   EXPECT_NEAR(neighbours / square, 0.0, 0.03);  // white
+}
+
+TEST(CurrentSensor, WithAnotherSeed_HasOtherNoise) {
+  const std::string robot = WriteText("one.toml", RobotText({{.noise = 8}}));
+  const auto noise = [&](std::uint64_t seed) {
+    Scenario scenario = MakeScenario();
+    scenario.noise_seed = seed;
+    Arm arm(scenario, robot);
+    std::vector<int> read;
+    Sensors sensors;
+    for (int k = 0; k < 50; ++k) arm.Read(sensors), read.push_back(sensors.current_lsb[0]);
+    return read;
+  };
+  // 8 N m are 160 steps, so two streams agree at a reading once in 600 times.
+  EXPECT_EQ(noise(6), noise(6));
+  for (const std::uint64_t other : {1, 2, 7}) EXPECT_NE(noise(6), noise(other)) << other;
 }
 
 TEST(CurrentSensor, BeyondSixteenBits_StandsAtItsEnd) {

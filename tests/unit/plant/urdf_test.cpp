@@ -58,8 +58,8 @@ std::string RobotOf(const std::string& head) {
   return WriteText("urdf_robot.toml", text);
 }
 
-TEST(UrdfPlant, MovesAsKdlsOwnReaderSays) {
-  const RobotFile robot = ReadRobotFile(RobotOf("fixed = { finger = 0.03 }\n"));
+// The arm of the robot file against KDL's own tree of the URDF, whose first finger stands at `finger`.
+void ExpectToMoveAsKdlSays(const RobotFile& robot, double finger) {
   ASSERT_EQ(robot.joints(), 3);
   EXPECT_EQ(robot.joint[1].name, "j2");
   std::vector<Body> bodies;
@@ -74,7 +74,7 @@ TEST(UrdfPlant, MovesAsKdlsOwnReaderSays) {
   std::uniform_real_distribution<double> uniform(-2, 2);
   for (int k = 0; k < 50; ++k) {
     KDL::JntArray q(tree.getNrOfJoints()), v(q.rows()), a(q.rows()), tau(q.rows());
-    q(place.at("finger")) = 0.03, q(place.at("other")) = -20 * 0.03 + 0.1;
+    q(place.at("finger")) = finger, q(place.at("other")) = -20 * finger + 0.1;
     Eigen::Vector3d own[3];
     for (int j = 0; j < 3; ++j) {
       const unsigned at = place.at(robot.joint[static_cast<std::size_t>(j)].name);
@@ -85,6 +85,14 @@ TEST(UrdfPlant, MovesAsKdlsOwnReaderSays) {
     for (int j = 0; j < 3; ++j)  // round-off of torques to 100 N m
       EXPECT_NEAR(torque[j], tau(place.at(robot.joint[static_cast<std::size_t>(j)].name)), 1e-10);
   }
+}
+
+TEST(UrdfPlant, MovesAsKdlsOwnReaderSays) {
+  ExpectToMoveAsKdlSays(ReadRobotFile(RobotOf("fixed = { finger = 0.03 }\n")), 0.03);
+}
+
+TEST(UrdfPlant, HoldsAJointAtTheLimitNextToZero) {
+  ExpectToMoveAsKdlSays(ReadRobotFile(RobotOf("")), 0.01);  // 0.01 to 0.04 m
 }
 
 TEST(UrdfPlant, TakesLimitsAndFrictionOfTheFileBeforeThoseOfTheUrdf) {

@@ -1,0 +1,49 @@
+// calibration tests - a torque that is read late: the motion that belongs to it lies before it.
+#include "host_sim/identify/calibration/dataset.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace armcal::calibration {
+namespace {
+
+// One joint on a cubic, which cubic interpolation gives exactly. Steps of 10 ms.
+Dataset CubicMotion(int samples) {
+  Dataset d;
+  d.s.t = Eigen::VectorXd::LinSpaced(samples, 0, 0.01 * (samples - 1));
+  d.s.q = d.s.t.array().cube(), d.s.qd = 3 * d.s.t.array().square(), d.s.qdd = 6 * d.s.t;
+  d.tau.setOnes(samples, 1);
+  d.used.setOnes(samples, 1), d.moving = d.used, d.sound = d.used;
+  return d;
+}
+
+TEST(Delayed, Motion_IsThatOfBeforeTheTorque) {
+  const Dataset d = CubicMotion(30);
+  for (const double delay_s : {0.015, 0.004, 0.05}) {
+    const Dataset late = Delayed(d, delay_s);
+    for (int k = 0; k < 30; ++k) {
+      const double t = std::max(0.0, d.s.t[k] - delay_s);  // held before the log begins
+      EXPECT_NEAR(late.s.q(k, 0), t * t * t, 1e-13) << delay_s << ", row " << k;
+      EXPECT_NEAR(late.s.qd(k, 0), 3 * t * t, 1e-13) << delay_s << ", row " << k;
+      EXPECT_NEAR(late.s.qdd(k, 0), 6 * t, 1e-13) << delay_s << ", row " << k;
+    }
+    EXPECT_EQ(late.tau, d.tau);
+    EXPECT_EQ(late.s.t, d.s.t);
+  }
+}
+
+// One and a half steps late: rows 11 and 12 read the motion beside row 10.
+TEST(Delayed, RowsThatReadAnUnusedOne_AreNotUsed) {
+  Dataset d = CubicMotion(30);
+  d.used(10, 0) = 0, d.sound(20, 0) = 0;
+  const Dataset late = Delayed(d, 0.015);
+  for (int k = 0; k < 30; ++k) {
+    EXPECT_EQ(late.used(k, 0), k < 10 || k > 12) << k;
+    EXPECT_EQ(late.sound(k, 0), k < 20 || k > 22) << k;
+  }
+}
+
+}  // namespace
+}  // namespace armcal::calibration

@@ -37,10 +37,6 @@ constexpr double kTurnShare = 0.03;     // of a joint's rows
 constexpr double kTurnsBack = 0.2;      // of what a state of a run spans: less is no turn
 constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
 
-}  // namespace
-
-namespace {
-
 // Neither noise nor one term too many explains the gain.
 bool IsRare(const Found& f) { return f.log_chance < kLogRare && f.score > 0; }
 

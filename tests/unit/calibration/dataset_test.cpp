@@ -1,10 +1,12 @@
-// calibration tests - a torque that is read late: the motion that belongs to it lies before it.
+// calibration tests - motion that belongs to a torque that is read late, and the mass matrix without gravity.
 #include "host_sim/identify/calibration/dataset.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "tests/unit/calibration/synthetic_arm.hpp"
 
 namespace armcal::calibration {
 namespace {
@@ -43,6 +45,18 @@ TEST(Delayed, RowsThatReadAnUnusedOne_AreNotUsed) {
     EXPECT_EQ(late.used(k, 0), k < 10 || k > 12) << k;
     EXPECT_EQ(late.sound(k, 0), k < 20 || k > 22) << k;
   }
+}
+
+// A mass matrix knows no gravity.
+TEST(TypicalMass, OfAnArmWithoutGravity_IsTheSame) {
+  const codegen::Model arm(codegen::ReadRobot("codegen/robots/two_link.toml"), tests::Records());
+  codegen::Robot robot = arm.robot();
+  robot.gravity_mps2 = {};
+  const codegen::Model weightless(robot, tests::Records());
+  const Eigen::VectorXd bodies = BodyMean(arm);
+  const Eigen::MatrixXd mass = TypicalMass(arm, arm.base_map() * bodies);
+  EXPECT_LT((mass - TypicalMass(weightless, weightless.base_map() * bodies)).norm(), 1e-9 * mass.norm());
+  EXPECT_GT(mass.minCoeff(), 0);
 }
 
 }  // namespace

@@ -74,9 +74,10 @@ void PrintChoice(const choice::Choice& choice, ordered_json& json) {
                               {"errors", errors}});
   }
   fmt::print("on stretches of the training logs that the fit has not seen\n{}\n", report::Text(t));
-  for (std::size_t l = 0; l < choice.laws.size(); ++l)
-    if (!choice.joint[0].law[l].failed.empty())
-      fmt::print("{} was not fitted: {}\n", choice.laws[l].name, choice.joint[0].law[l].failed);
+  for (std::size_t j = 0; j < choice.joint.size(); ++j)
+    for (std::size_t l = 0; l < choice.laws.size(); ++l)
+      if (const std::string& why = choice.joint[j].law[l].failed; !why.empty())
+        fmt::print("joint {}: {} was not fitted: {}\n", j + 1, choice.laws[l].name, why);
   for (std::size_t j = 0; j < choice.joint.size(); ++j) fmt::print("{}\n", Sentence(choice, j));
 }
 
@@ -92,7 +93,7 @@ void PrintEffects(const choice::Choice& choice) {
   if (!text.empty()) fmt::print("\nin the robot file:\n{}", text);
 }
 
-void PrintTests(const std::vector<std::vector<choice::HeldOut>>& tests, const std::vector<std::string>& names,
+void PrintTests(const std::vector<std::vector<choice::HeldOut>>& tests, const std::vector<calibration::Dataset>& logs,
                 ordered_json& json) {
   json["tests"] = ordered_json::array();
   for (std::size_t log = 0; log < tests.size(); ++log) {
@@ -108,8 +109,8 @@ void PrintTests(const std::vector<std::vector<choice::HeldOut>>& tests, const st
                         {"chosen_Nm", e.chosen_Nm},
                         {"over_coulomb_viscous", ToJson(e.over_plain)}});
     }
-    fmt::print("\nheld out: {}\n{}", names[log], report::Text(t));
-    json["tests"].push_back({{"log", names[log]}, {"joints", joints}});
+    fmt::print("\nheld out: {}\n{}", logs[log].source, report::Text(t));
+    json["tests"].push_back({{"log", logs[log].source}, {"joints", joints}});
   }
 }
 
@@ -126,7 +127,10 @@ int RunChoose(const ChooseOptions& o) {
   ordered_json json{{"robot", o.robot}, {"train", o.train}};
   PrintChoice(choice, json);
   PrintEffects(choice);
-  if (!o.test.empty()) PrintTests(choice::Judge(choice, robot, records, train, read.All(o.test)), o.test, json);
+  if (!o.test.empty()) {
+    const std::vector<calibration::Dataset> tests = read.All(o.test);
+    PrintTests(choice::Judge(choice, robot, records, train, tests), tests, json);
+  }
   WriteJson(o.json, json);
   return kOk;
 }

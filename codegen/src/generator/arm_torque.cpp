@@ -21,11 +21,12 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
     tilted.gravity_mps2[axis] = 1;
     add(BodyRegressor(graph_, tilted, false), [axis](int i) { return InputId{Quantity::kGravitySlope, i, 0, axis}; });
   }
-  const BodyRows gravity = BodyRegressor(graph_, robot, false);
   for (int j = 0; j < joints_; ++j)
-    for (int i = 0; i < joints_; ++i)
+    for (int i = 0; i < joints_; ++i) {
+      const Expr gravity = part_[static_cast<std::size_t>(joints_ + i)].value;
       part_.push_back(
-          {{Quantity::kGravityStiffness, i, j}, GravityStiffness(graph_, gravity, model.base_columns(), i, j)});
+          {{Quantity::kGravityStiffness, i, j}, Derivative(gravity, graph_.Input({Quantity::kPosition, j}))});
+    }
 }
 
 std::set<InputId> ArmTorque::parts() const {

@@ -31,10 +31,6 @@ Expr BaseTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_col
   return sum;
 }
 
-Expr GravityStiffness(Graph& g, const BodyRows& rows, const std::vector<int>& base_columns, int i, int j) {
-  return Derivative(BaseTorque(g, rows, base_columns, i), g.Input({Quantity::kPosition, j}));
-}
-
 BodyRows AccelerationRows(Graph& g, const Robot& robot, int joint) {
   return At(g, At(g, BodyRegressor(g, Weightless(robot)), Quantity::kSpeed, -1), Quantity::kAcceleration, joint);
 }

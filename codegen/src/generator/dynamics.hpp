@@ -17,9 +17,6 @@ Dynamics MakeDynamics(Graph& graph, const Robot& robot, const std::vector<int>& 
 // Torque of joint i: its row times the base parameters.
 Expr BaseTorque(Graph& graph, const BodyRows& rows, const std::vector<int>& base_columns, int i);
 
-// What the torque of joint i changes by per unit of joint j's position. rows: without motion.
-Expr GravityStiffness(Graph& graph, const BodyRows& rows, const std::vector<int>& base_columns, int i, int j);
-
 // Body rows of an arm without weight that stands still and accelerates by one at a joint: times parameters, a column of
 // M.
 BodyRows AccelerationRows(Graph& graph, const Robot& robot, int joint);

@@ -92,8 +92,7 @@ Expr Model::QuantityOf(const InputId& id) {
     case Quantity::kGravitySlope:
       return CommittedTorque(TiltedRows(id.parameter), id.row);
     case Quantity::kGravityStiffness:
-      depends_on_estimate_ = true;
-      return GravityStiffness(*graph_, gravity_rows_, base_.column, id.row, id.body);
+      return Derivative(CommittedTorque(gravity_rows_, id.row), graph_->Input({Quantity::kPosition, id.body}));
     case Quantity::kModelTorque:
     case Quantity::kDelayedTorque:
       throw io::InputError(robot_.path + ": effect: a sensor record acts on the measurement, not on the torque");

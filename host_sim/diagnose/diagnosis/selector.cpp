@@ -54,11 +54,10 @@ bool GoesToAndFro(const Candidate& c, const VectorXd& amplitude) {
   int turns = 0, way = 0;
   for (double furthest = value[0]; const double now : value) {
     const double step = now - furthest;
-    if (way == 0 ? std::abs(step) < least : way * step < 0 && std::abs(step) < least) continue;
+    if (way * step <= 0 && std::abs(step) < least) continue;
     const int next = step > 0 ? 1 : -1;
-    turns += way != 0 && step != 0 && next != way;
-    if (step != 0) way = next;
-    furthest = now;
+    turns += way != 0 && next != way;
+    way = next, furthest = now;
   }
   return turns > 1;
 }

@@ -6,7 +6,6 @@
 #include <random>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/calibration/band.hpp"
 
 namespace armcal::choice {
 
@@ -38,8 +37,7 @@ calibration::Dataset Without(const calibration::Dataset& log, int remainder, int
   calibration::Dataset out = log;
   for (Index k = 0; k < log.used.rows(); ++k)
     if (stretches.Of(k) % folds == remainder) out.used.row(k).setZero();
-  for (int j = 0; j < log.joints(); ++j)
-    if (log.averaged(j)) out.average[static_cast<std::size_t>(j)] = calibration::AverageRows(out, j);
+  out.average.clear();
   return out;
 }
 

@@ -14,7 +14,8 @@ struct Stretches {
   Eigen::Index samples = 0;  // of one
 };
 
-// The log without the rows of some stretches: those whose number gives this remainder by `folds`.
+// The log without the rows of some stretches: those whose number gives this remainder by `folds`. It is for methods that
+// fit samples, so it holds no averages.
 calibration::Dataset Without(const calibration::Dataset& log, int remainder, int folds);
 
 // [stretches x joints] sum of the squares of a residual's rows [N x n]: averages where the band is limited, else the

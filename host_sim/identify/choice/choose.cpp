@@ -29,7 +29,6 @@ MatrixXd Residual(const codegen::Model& model, const Dataset& log, const VectorX
 // Squares of one law's errors on one joint, stretch by stretch, over all training logs; `why`: it was not fitted.
 struct OutOfFold {
   VectorXd squares;
-  double rows = 0;  // in all of them
   std::string why;
 };
 
@@ -66,12 +65,17 @@ OutOfFold JudgeLaw(const codegen::Model& model, int j, const std::vector<Dataset
     const Eigen::Index before = out.squares.size();
     out.squares.conservativeResize(before + each[l].size());
     out.squares.tail(each[l].size()) = each[l];
-    out.rows += SquaresByStretch(train[l], MatrixXd::Ones(train[l].samples(), train[l].joints())).col(j).sum();
   }
   return out;
 }
 
-JointChoice Compared(const std::vector<OutOfFold>& judged) {
+// [joints] how many rows of a log its errors are taken over.
+VectorXd CountRows(const Dataset& log) {
+  return SquaresByStretch(log, MatrixXd::Ones(log.samples(), log.joints())).colwise().sum();
+}
+
+// rows: of this joint, in all training logs.
+JointChoice Compared(const std::vector<OutOfFold>& judged, double rows) {
   JointChoice out;
   double least = INFINITY;
   for (std::size_t l = 0; l < judged.size(); ++l) {
@@ -79,7 +83,7 @@ JointChoice Compared(const std::vector<OutOfFold>& judged) {
     error.failed = judged[l].why;
     if (error.failed.empty()) {
       const double sum = judged[l].squares.sum();
-      error.rms_Nm = std::sqrt(sum / std::max(1.0, judged[l].rows));
+      error.rms_Nm = std::sqrt(sum / std::max(1.0, rows));
       if (sum < least) least = sum, out.best = l;
     }
     out.law.push_back(error);
@@ -102,6 +106,8 @@ Choice Choose(const codegen::Robot& robot, const codegen::Catalogue& records, co
               const ChooseSettings& settings) {
   Choice out;
   out.laws = FrictionLaws(records);
+  VectorXd rows = VectorXd::Zero(robot.joints());
+  for (const Dataset& log : train) rows += CountRows(log);
   for (int j = 0; j < robot.joints(); ++j) {
     std::vector<std::vector<Dataset>> folds(kFolds);
     for (int fold = 0; fold < kFolds; ++fold)
@@ -117,7 +123,7 @@ Choice Choose(const codegen::Robot& robot, const codegen::Catalogue& records, co
     if (std::none_of(judged.begin(), judged.end(), [](const OutOfFold& one) { return one.why.empty(); }))
       throw io::InputError(train[0].source + ": joint " + std::to_string(j + 1) +
                            ": no law can be fitted: " + judged[0].why);
-    out.joint.push_back(Compared(judged));
+    out.joint.push_back(Compared(judged, rows[j]));
   }
   return out;
 }
@@ -140,12 +146,12 @@ std::vector<std::vector<HeldOut>> Judge(const Choice& choice, const codegen::Rob
   for (const Dataset& test : tests) {
     const MatrixXd a = SquaresByStretch(test, Residual(with, test, z)),
                    b = SquaresByStretch(test, Residual(plain, test, plain_z)),
-                   torque = SquaresByStretch(test, test.tau),
-                   rows = SquaresByStretch(test, MatrixXd::Ones(test.samples(), robot.joints()));
+                   torque = SquaresByStretch(test, test.tau);
+    const VectorXd rows = CountRows(test);
     out.emplace_back();
     for (int j = 0; j < robot.joints(); ++j) {
       const auto rms = [&](const MatrixXd& squares) {
-        return std::sqrt(squares.col(j).sum() / std::max(1.0, rows.col(j).sum()));
+        return std::sqrt(squares.col(j).sum() / std::max(1.0, rows[j]));
       };
       out.back().push_back({rms(b), rms(a), rms(torque), Compare(a.col(j), b.col(j))});
     }

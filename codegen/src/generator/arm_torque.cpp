@@ -11,7 +11,9 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
   const auto add = [&](const BodyRows& rows, const auto& id) {
     for (int i = 0; i < joints_; ++i) part_.push_back({id(i), BaseTorque(graph_, rows, model.base_columns(), i)});
   };
-  add(BodyRegressor(graph_, robot), [](int i) { return InputId{Quantity::kRigidTorque, i}; });
+  const BodyRows moving = BodyRegressor(graph_, robot);
+  for (int i = 0; i < joints_; ++i)
+    part_.push_back({{Quantity::kRigidTorque, i}, LoadTorque(graph_, moving, model.base_columns(), robot, i)});
   add(BodyRegressor(graph_, robot, false), [](int i) { return InputId{Quantity::kGravityTorque, i}; });
   for (int j = 0; j < joints_; ++j)
     add(AccelerationRows(graph_, robot, j), [j](int i) { return InputId{Quantity::kMassMatrix, i, j}; });

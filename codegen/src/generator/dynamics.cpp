@@ -31,6 +31,16 @@ Expr BaseTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_col
   return sum;
 }
 
+Expr LoadTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_columns, const Robot& robot, int i) {
+  Expr sum = BaseTorque(g, rows, base_columns, i);
+  for (int j = 0; j < robot.joints(); ++j) {
+    const Motor& motor = robot.joint[static_cast<std::size_t>(j)].motor;
+    const double rotor_kgm2 = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2;
+    sum = sum - rotor_kgm2 * rows[i][kBodyBlock * j + kBodyBlock - 1];
+  }
+  return sum;
+}
+
 BodyRows AccelerationRows(Graph& g, const Robot& robot, int joint) {
   return At(g, At(g, BodyRegressor(g, Weightless(robot)), Quantity::kSpeed, -1), Quantity::kAcceleration, joint);
 }

@@ -76,7 +76,8 @@ Expr Model::CommittedTorque(const BodyRows& rows, int joint) {
 Expr Model::QuantityOf(const InputId& id) {
   switch (id.quantity) {
     case Quantity::kRigidTorque:
-      return CommittedTorque(body_rows_, id.row);
+      depends_on_estimate_ = true;
+      return LoadTorque(*graph_, body_rows_, base_.column, robot_, id.row);
     case Quantity::kGravityTorque:
       return CommittedTorque(gravity_rows_, id.row);
     case Quantity::kBodyColumn: {  // about the file's frame: slid parameters = S parameters, a sum of slid columns

@@ -31,10 +31,15 @@ struct MethodOptions {
   nlohmann::ordered_json exogeneity;  // the test that chose the method, for the JSON; null: it was asked for
 };
 
-// Name, value and standard deviation of every unknown.
+// An end that the logs do not bound is null in JSON.
+nlohmann::ordered_json EndOf(double end) { return std::isfinite(end) ? nlohmann::ordered_json(end) : nullptr; }
+
+// Name, value, standard deviation and 95 % interval of every unknown.
 nlohmann::ordered_json PrintUnknowns(const codegen::Model& model, const calibration::Solution& s) {
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
   report::Table t{{"parameter", "unit", "value", "sd"}, {}};
+  const bool profiled = s.interval.size() > 0;
+  if (profiled) t.header.push_back("95 % interval");
   for (Eigen::Index k = 0; k < s.z.size(); ++k) {
     const int column = static_cast<int>(k), unknown = column - model.columns();
     const std::string name = unknown < 0 ? model.column_name(column) : model.unknowns()[unknown].name;
@@ -44,6 +49,11 @@ nlohmann::ordered_json PrintUnknowns(const codegen::Model& model, const calibrat
     t.rows.push_back({name, unit, fmt::format("{:.5g}", s.z[k]), has_sd ? fmt::format("{:.3g}", sd) : "-"});
     out.push_back({{"name", name}, {"unit", unit}, {"value", s.z[k]}});
     if (has_sd) out.back()["sd"] = sd;
+    if (!profiled) continue;
+    const double low = s.interval(k, 0), high = s.interval(k, 1);
+    out.back()["interval_95"] = {EndOf(low), EndOf(high)};
+    const auto end = [](double v) { return std::isfinite(v) ? fmt::format("{:.5g}", v) : std::string("open"); };
+    t.rows.back().push_back(end(low) + " .. " + end(high));
   }
   fmt::print("{}", report::Text(t));
   return out;
@@ -89,7 +99,13 @@ int RunMethod(const MethodOptions& o) {
   const std::string ranges =
       method.needs_ranges && !model.robot().has_prior ? RangesFromLeastSquares(problem) : std::string();
   if (!ranges.empty()) fmt::print("{}\n", ranges);
-  const calibration::Solution s = calibration::Solve(method, problem);
+  calibration::Solution s = calibration::Solve(method, problem);
+  // Once more with the noise that the first fit shows. A search takes too long for that.
+  if (!method.needs_ranges && s.z.allFinite()) {
+    problem.sigma_Nm = calibration::ResidualNoise(problem, s.z);
+    problem.intervals = true;
+    s = calibration::Solve(method, problem);
+  }
   nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}, {"method", method.name}};
   json["parameters"] = PrintUnknowns(model, s);
   json["physical"] = s.physical, json["converged"] = s.converged, json["iterations"] = s.iterations;

@@ -80,9 +80,10 @@ void AddSurvey(CLI::App& app, Action& action) {
                          "reproduce the survey's Tables 5 to 12 and Figures 1 to 4, printed figures and better "
                          "methods beside\nexample: armcal survey --table 8 --draws 20 --report survey.html");
   auto o = std::make_shared<SurveyOptions>();
-  verb->add_option("--table", o->tables, "5 to 12, trajectories, priors, shipped, online, figures (default: all)")
-      ->check(CLI::IsMember(
-          {"5", "6", "7", "8", "9", "10", "11", "12", "trajectories", "priors", "shipped", "online", "figures"}));
+  verb->add_option("--table", o->tables,
+                   "5 to 12, trajectories, priors, shipped, laws, choice, online, figures (default: all)")
+      ->check(CLI::IsMember({"5", "6", "7", "8", "9", "10", "11", "12", "trajectories", "priors", "shipped", "laws",
+                             "choice", "online", "figures"}));
   verb->add_option("--draws", o->draws, "random draws of prior and noise")->check(CLI::PositiveNumber);
   verb->add_option("--slow-draws", o->slow_draws, "draws of the methods of (25), which take seconds each")
       ->check(CLI::PositiveNumber);

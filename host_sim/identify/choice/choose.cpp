@@ -128,6 +128,20 @@ Choice Choose(const codegen::Robot& robot, const codegen::Catalogue& records, co
   return out;
 }
 
+std::vector<VectorXd> TestLaws(const std::vector<FrictionLaw>& laws, const codegen::Robot& robot,
+                               const codegen::Catalogue& records, const std::vector<Dataset>& train,
+                               const Dataset& test, int joint, const std::atomic<bool>* stop) {
+  std::vector<Dataset> own;
+  for (const Dataset& log : train) own.push_back(OfJoint(log, joint));
+  std::vector<VectorXd> out;
+  for (std::size_t law = 0; law < laws.size(); ++law) {
+    const codegen::Model model(WithLaws(robot, OnJoint(robot, laws, joint, law)), records);
+    const ModelFit fit = FitModel(model, calibration::Pointers(own), stop);
+    out.push_back(fit.z.size() ? SquaresByStretch(test, Residual(model, test, fit.z)).col(joint) : VectorXd());
+  }
+  return out;
+}
+
 std::vector<std::vector<HeldOut>> Judge(const Choice& choice, const codegen::Robot& robot,
                                         const codegen::Catalogue& records, const std::vector<Dataset>& train,
                                         const std::vector<Dataset>& tests) {

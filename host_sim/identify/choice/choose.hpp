@@ -49,6 +49,13 @@ struct ChooseSettings {
 Choice Choose(const codegen::Robot& robot, const codegen::Catalogue& records,
               const std::vector<calibration::Dataset>& train, const ChooseSettings& settings = {});
 
+// [law] Squares of the errors on one joint's rows of a test, by stretches, with each law fitted to the whole training
+// logs as in Choose; empty: the law could not be fitted.
+std::vector<Eigen::VectorXd> TestLaws(const std::vector<FrictionLaw>& laws, const codegen::Robot& robot,
+                                      const codegen::Catalogue& records, const std::vector<calibration::Dataset>& train,
+                                      const calibration::Dataset& test, int joint,
+                                      const std::atomic<bool>* stop = nullptr);
+
 // [test][joint] The chosen laws together, and Coulomb and viscous friction alone, each fitted to the whole training
 // logs. InputError: they cannot be fitted.
 std::vector<std::vector<HeldOut>> Judge(const Choice& choice, const codegen::Robot& robot,

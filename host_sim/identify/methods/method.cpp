@@ -7,6 +7,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/methods/method_list.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 
 namespace armcal::calibration {
 
@@ -145,6 +146,21 @@ Rows StackRows(const Problem& problem, const VectorXd& z) {
         rows.K(static_cast<Eigen::Index>(r), c) = row[rows.joint[r]](rows.sample[r], c);
   }
   return rows;
+}
+
+VectorXd ResidualNoise(const Problem& problem, const VectorXd& z) {
+  const Rows rows = StackRows(problem, z);
+  const VectorXd residual = rows.tau - rows.K * z.head(problem.model->columns());
+  VectorXd square = VectorXd::Zero(problem.sigma_Nm.size()), count = square;
+  for (std::size_t r = 0; r < rows.joint.size(); ++r) {
+    square[rows.joint[r]] += std::pow(residual[static_cast<Eigen::Index>(r)], 2);
+    count[rows.joint[r]] += 1;
+  }
+  const double all = count.sum(), free = std::max(1.0, all - static_cast<double>(FreeCoordinates(problem).size()));
+  VectorXd sigma = problem.sigma_Nm;
+  for (Eigen::Index j = 0; j < sigma.size(); ++j)
+    if (square[j] > 0) sigma[j] = std::sqrt(square[j] / count[j] * all / free);
+  return sigma;
 }
 
 MatrixXd StackJacobian(const Problem& problem, const VectorXd& z, const Rows& rows) {

@@ -30,6 +30,7 @@ struct Problem {
   ClosedLoop closed_loop;             // empty: the control law is not known
   double forgetting = 0.998;          // mu of (22)-(24)
   std::uint64_t seed = 1;
+  bool intervals = false;                                             // asks for Solution::interval
   const std::atomic<bool>* stop = nullptr;                            // set: return the best so far
   std::function<void(double share, double objective)> progress = {};  // may be empty
 };
@@ -37,8 +38,11 @@ struct Problem {
 struct Solution {
   Eigen::VectorXd z;
   Eigen::MatrixXd covariance;  // [z x z]; 0 x 0 where the method gives none
-  Eigen::VectorXd bodies;      // [11 n] standard parameters about link origins, read out of z
-  bool physical = false;       // every body of `bodies` can exist
+  // [z x 2] ends of the 95 % intervals where they were asked for and the method has them; an end is infinite if the
+  // logs do not bound the coordinate on that side. 0 x 0: value +- 1.96 standard deviations is the method's best.
+  Eigen::MatrixXd interval;
+  Eigen::VectorXd bodies;  // [11 n] standard parameters about link origins, read out of z
+  bool physical = false;   // every body of `bodies` can exist
   bool converged = true;
   int iterations = 0;
   double seconds = 0;            // of this call, one thread's CPU time
@@ -80,6 +84,8 @@ struct Rows {
   std::vector<int> joint, log, sample;
 };
 Rows StackRows(const Problem& problem, const Eigen::VectorXd& z);
+// [n] Standard deviation of a torque sample by what z leaves of it; sigma_Nm of a joint that has no used row.
+Eigen::VectorXd ResidualNoise(const Problem& problem, const Eigen::VectorXd& z);
 // d tau / d eta at z, same rows: [rows x nonlinear].
 Eigen::MatrixXd StackJacobian(const Problem& problem, const Eigen::VectorXd& z, const Rows& rows);
 

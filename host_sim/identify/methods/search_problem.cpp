@@ -31,9 +31,9 @@ Objective::Objective(const Problem& problem, Criterion criterion)
 
 void Objective::Prepare(const Problem& problem, const Rows& rows, int j) {
   Joint joint;
-  std::vector<int> index;
+  std::vector<Eigen::Index> index;
   for (std::size_t r = 0; r < rows.joint.size(); ++r)
-    if (rows.joint[r] == j) index.push_back(static_cast<int>(r));
+    if (rows.joint[r] == j) index.push_back(static_cast<Eigen::Index>(r));
   if (index.empty()) return;
   for (int c = 0; c < model_.columns(); ++c)
     if (!model_.rows()[j][c].IsZero()) joint.column.push_back(c);
@@ -54,7 +54,7 @@ void Objective::Prepare(const Problem& problem, const Rows& rows, int j) {
     joint_.push_back(std::move(joint));
     return;
   }
-  Bind(problem, rows, index, joint);
+  joint.inputs = std::make_unique<RowInputs>(problem, rows, index);
   std::vector<codegen::Expr> columns, slopes;
   for (std::size_t i = 0; i < joint.column.size(); ++i)
     if (Varies(model_, j, joint.column[i]))
@@ -65,41 +65,6 @@ void Objective::Prepare(const Problem& problem, const Rows& rows, int j) {
   joint.column_tape = std::make_unique<codegen::Tape>(model_.graph(), columns);
   joint.slope_tape = std::make_unique<codegen::Tape>(model_.graph(), slopes);
   joint_.push_back(std::move(joint));
-}
-
-// What the graph reads, at this joint's rows alone.
-void Objective::Bind(const Problem& problem, const Rows& rows, const std::vector<int>& index, Joint& joint) const {
-  const auto count = static_cast<Eigen::Index>(index.size());
-  const auto log = [&](Eigen::Index r) -> const codegen::Signals& { return problem.train[rows.log[index[r]]]->s; };
-  const auto gather = [&](MatrixXd codegen::Signals::*signal) {
-    MatrixXd out = MatrixXd::Zero(count, model_.joints());
-    for (Eigen::Index r = 0; r < count; ++r)
-      if (const MatrixXd& whole = log(r).*signal; whole.cols() == out.cols())
-        out.row(r) = whole.row(rows.sample[index[r]]);
-    return out;
-  };
-  codegen::Signals& s = joint.signals;
-  s.q = gather(&codegen::Signals::q), s.qd = gather(&codegen::Signals::qd);
-  s.qdd = gather(&codegen::Signals::qdd), s.temp = gather(&codegen::Signals::temp);
-  s.t.setZero(count);
-  for (Eigen::Index r = 0; r < count; ++r)
-    if (log(r).t.size()) s.t[r] = log(r).t[rows.sample[index[r]]];
-  std::map<codegen::InputId, const double*> column = {{{codegen::Quantity::kTime}, s.t.data()}};
-  for (int i = 0; i < model_.joints(); ++i) {
-    column[{codegen::Quantity::kPosition, i}] = s.q.col(i).data();
-    column[{codegen::Quantity::kSpeed, i}] = s.qd.col(i).data();
-    column[{codegen::Quantity::kAcceleration, i}] = s.qdd.col(i).data();
-    column[{codegen::Quantity::kTemperature, i}] = s.temp.col(i).data();
-  }
-  std::map<codegen::InputId, int> coordinate;
-  for (int c = 0; c < model_.columns(); ++c)
-    coordinate[{.quantity = codegen::Quantity::kCoordinate, .parameter = c}] = c;
-  for (int k = 0; k < model_.nonlinear(); ++k)
-    coordinate[codegen::SymbolId(model_.unknowns()[k].name)] = model_.columns() + k;
-  for (const codegen::InputId& name : model_.graph().inputs()) {
-    if (coordinate.contains(name)) joint.unknown.push_back({static_cast<int>(joint.input.size()), coordinate[name]});
-    joint.input.push_back({column.contains(name) ? column[name] : nullptr, 0});
-  }
 }
 
 // [K tau] -> mean row and triangular factor.
@@ -141,13 +106,13 @@ double Objective::Linear(const Joint& joint, const VectorXd& z, VectorXd* gradie
 }
 
 double Objective::Direct(Joint& joint, const VectorXd& z, VectorXd* gradient) const {
-  for (const auto& [i, coordinate] : joint.unknown) joint.input[i].value = z[coordinate];
+  const std::span<const codegen::Binding> input = joint.inputs->At(z);
   std::vector<double*> column, slope;
   for (const int i : joint.varying) column.push_back(joint.K.col(i).data());
   for (Eigen::Index k = 0; k < joint.slope_value.cols(); ++k) slope.push_back(joint.slope_value.col(k).data());
   const int rows = static_cast<int>(joint.tau.size());
-  joint.column_tape->Evaluate(joint.input, rows, column);
-  if (gradient) joint.slope_tape->Evaluate(joint.input, rows, slope);
+  joint.column_tape->Evaluate(input, rows, column);
+  if (gradient) joint.slope_tape->Evaluate(input, rows, slope);
   VectorXd p(static_cast<Eigen::Index>(joint.column.size()));
   for (Eigen::Index i = 0; i < p.size(); ++i) p[i] = z[joint.column[i]];
   const VectorXd e = joint.tau - joint.K * p;
@@ -182,7 +147,8 @@ double Objective::operator()(const VectorXd& z, VectorXd& gradient) {
 std::size_t Objective::memory_bytes() const {
   std::size_t numbers = 0;
   for (const Joint& j : joint_)
-    numbers += static_cast<std::size_t>(j.K.size() + j.factor.size() + 4 * j.signals.q.size() + j.slope_value.size());
+    numbers += static_cast<std::size_t>(j.K.size() + j.factor.size() + j.slope_value.size()) +
+               (j.inputs ? j.inputs->numbers() : 0);
   return sizeof(double) * numbers;
 }
 

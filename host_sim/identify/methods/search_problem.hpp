@@ -8,6 +8,7 @@
 
 #include "codegen/src/generator/tape.hpp"
 #include "host_sim/identify/methods/method.hpp"
+#include "host_sim/identify/methods/row_inputs.hpp"
 
 namespace armcal::calibration {
 
@@ -43,12 +44,10 @@ class Objective {
     Eigen::VectorXd tau, weight;
     Eigen::RowVectorXd mean;  // [column + 1] of [K tau]; linear models
     Eigen::MatrixXd factor;   // [column + 1 x column + 1] upper: factor' factor = Gram matrix of [K tau]
-    codegen::Signals signals;
+    std::unique_ptr<RowInputs> inputs;
     std::vector<int> varying, slope;  // columns that read eta, place in `column`; eta that the torque reads
     std::unique_ptr<codegen::Tape> column_tape, slope_tape;
-    std::vector<codegen::Binding> input;       // of the graph
-    std::vector<std::pair<int, int>> unknown;  // input, coordinate of z
-    Eigen::MatrixXd slope_value;               // [rows x slope] d tau / d eta
+    Eigen::MatrixXd slope_value;  // [rows x slope] d tau / d eta
     double smoothing = 0;
   };
   struct Term {
@@ -60,7 +59,6 @@ class Objective {
   double Direct(Joint& joint, const Eigen::VectorXd& z, Eigen::VectorXd* gradient) const;
   void Condense(Joint& joint) const;
   void Prepare(const Problem& problem, const Rows& rows, int j);
-  void Bind(const Problem& problem, const Rows& rows, const std::vector<int>& index, Joint& joint) const;
 
   const codegen::Model& model_;
   Criterion criterion_;

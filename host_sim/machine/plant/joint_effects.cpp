@@ -10,17 +10,63 @@ namespace armcal::plant {
 namespace {
 
 // Mixed lubrication: the share of the load carried by asperities falls as the film builds up, ~ 1 / (1 + (v/vs)^2).
+// With an exponent: Stribeck's empirical law, exp(-(v/vs)^exponent).
 class Stribeck : public JointEffect {
  public:
   explicit Stribeck(const io::TomlReader& keys)
-      : excess_Nm_(keys.Positive("excess_Nm")), speed_(keys.Positive("speed_radps")) {}
+      : excess_Nm_(keys.Positive("excess_Nm")),
+        speed_(keys.Positive("speed_radps")),
+        exponent_(keys.Has("exponent") ? keys.Positive("exponent") : 0) {}
   double DryLevel(const JointState& s) const override {
-    const double ratio = s.qd_radps / speed_;
-    return excess_Nm_ / (1 + ratio * ratio);
+    const double ratio = std::abs(s.qd_radps / speed_);
+    return exponent_ > 0 ? excess_Nm_ * std::exp(-std::pow(ratio, exponent_)) : excess_Nm_ / (1 + ratio * ratio);
   }
 
  private:
-  double excess_Nm_, speed_;
+  double excess_Nm_, speed_, exponent_;  // exponent 0: mixed lubrication
+};
+
+// Law (5) of the survey beside Coulomb and viscous friction: one term falls with speed, one comes with it.
+class TwoExponentials : public JointEffect {
+ public:
+  explicit TwoExponentials(const io::TomlReader& keys)
+      : excess_Nm_(keys.Number("excess_Nm")),
+        falls_(keys.Positive("falls_radps")),
+        late_Nm_(keys.Number("late_Nm")),
+        comes_(keys.Positive("comes_radps")) {}
+  double DryLevel(const JointState& s) const override {
+    const double speed = std::abs(s.qd_radps);
+    return excess_Nm_ * std::exp(-speed / falls_) + (speed > 0 ? late_Nm_ * std::exp(-comes_ / speed) : 0);
+  }
+
+ private:
+  double excess_Nm_, falls_, late_Nm_, comes_;
+};
+
+// Law (6) of the survey: dry friction that is zero at rest and rises within a small speed; a part of it fades again.
+class SmoothDry : public JointEffect {
+ public:
+  explicit SmoothDry(const io::TomlReader& keys)
+      : excess_Nm_(keys.Number("excess_Nm")),
+        rises_(keys.Positive("rises_radps")),
+        falls_(keys.Positive("falls_radps")) {}
+  double DryLevel(const JointState& s) const override {
+    const double speed = std::abs(s.qd_radps), risen = std::tanh(speed / rises_);
+    return s.coulomb_Nm * (risen - 1) + excess_Nm_ * risen / std::cosh(speed / falls_);
+  }
+
+ private:
+  double excess_Nm_, rises_, falls_;
+};
+
+// Law (8) of the survey: drag by the cube root of speed. It counts as dry friction because it stops a slow joint.
+class CubeRoot : public JointEffect {
+ public:
+  explicit CubeRoot(const io::TomlReader& keys) : at_one_Nm_(keys.Number("drag_at_1radps_Nm")) {}
+  double DryLevel(const JointState& s) const override { return at_one_Nm_ * std::cbrt(std::abs(s.qd_radps)); }
+
+ private:
+  double at_one_Nm_;
 };
 
 // Tooth friction grows with the transmitted torque; preload hides the first part: mu (sqrt(load^2 + preload^2) -
@@ -162,6 +208,9 @@ Reader ReaderOf() {
 
 const std::map<std::string, Reader>& Readers() {
   static const std::map<std::string, Reader> readers = {{"stribeck", ReaderOf<Stribeck>()},
+                                                        {"friction_exponential", ReaderOf<TwoExponentials>()},
+                                                        {"friction_sech_tanh", ReaderOf<SmoothDry>()},
+                                                        {"viscous_cuberoot", ReaderOf<CubeRoot>()},
                                                         {"load_friction", ReaderOf<GearMesh>()},
                                                         {"coulomb_asymmetry", ReaderOf<Asymmetry>()},
                                                         {"torque_offset", ReaderOf<Counterweight>()},

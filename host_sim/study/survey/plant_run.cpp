@@ -109,6 +109,7 @@ logs::Log RunPlant(const codegen::Robot& robot, const excitation::Series& series
   plant::Scenario scenario;
   scenario.truth_seed = settings.truth_seed, scenario.noise_seed = settings.noise_seed;
   scenario.spread = {0, settings.friction, settings.torque_constant, 0};
+  scenario.joint_effects = settings.effects;
   plant::Arm arm(scenario, robot.path);
   Loop loop(robot, series, arm);
   const double step = arm.tick_s() * robot.sample_ticks;

@@ -7,6 +7,7 @@
 #include "codegen/src/robot/robot.hpp"
 #include "host_sim/data/logs/log.hpp"
 #include "host_sim/identify/excitation/series.hpp"
+#include "host_sim/machine/plant/scenario.hpp"
 
 namespace armcal::survey {
 
@@ -15,6 +16,7 @@ struct PlantSettings {
   // Half widths by which the true arm differs from the robot file. The true bodies are those of the file.
   double friction = 0.5, torque_constant = 0.03;
   double seconds = 10;
+  std::vector<plant::PlacedJointEffect> effects = {};  // beside Coulomb and viscous friction
 };
 
 // The plant starts at rest, reaches the series' pace within two seconds and is then recorded for `seconds`. A PD law

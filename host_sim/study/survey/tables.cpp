@@ -114,6 +114,8 @@ Findings RunSurvey(const Settings& asked) {
   ShowLoad(settings, motions, out);
   if (settings.Wants("priors")) ShowPriors(settings, motions, out);
   if (settings.Wants("shipped")) ShowShippedPrior(settings, motions, out);
+  if (settings.Wants("laws")) ShowLaws(settings, motions, out);
+  if (settings.Wants("choice")) ShowChoice(settings, motions, out);
   if (settings.Wants("online")) ShowOnline(settings, motions, out);
   out.sheets.push_back(Slips());
   return out;

@@ -29,6 +29,10 @@ void ShowErrors(const Settings& settings, const Evidence& evidence, Findings& ou
 void ShowPriors(const Settings& settings, const Motions& motions, Findings& out);
 // The prior of the robot file as it ships on logs of the plant, under errors of the CAD values that it is not told.
 void ShowShippedPrior(const Settings& settings, const Motions& motions, Findings& out);
+// Friction laws of joints found again in logs of the plant.
+void ShowLaws(const Settings& settings, const Motions& motions, Findings& out);
+// Whether `armcal choose` finds the law that a joint has.
+void ShowChoice(const Settings& settings, const Motions& motions, Findings& out);
 // The firmware's own estimator on fresh draws, and whether it reports that its deviations cannot be trusted.
 void ShowOnline(const Settings& settings, const Motions& motions, Findings& out);
 // Table 10: in the closed loop, and without one.

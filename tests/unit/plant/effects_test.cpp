@@ -28,6 +28,36 @@ TEST(Stribeck, FadesWithSpeedAndRaisesTheBreakawayLevel) {
   EXPECT_NEAR(arm.torque_Nm()[0], 42, 0.005);
 }
 
+TEST(Stribeck, WithAnExponent_IsTheEmpiricalLaw) {
+  const auto effect = Make("stribeck", "excess_Nm = 12.0\nspeed_radps = 0.1\nexponent = 2.0");
+  EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = 0}), 12);
+  EXPECT_NEAR(effect->DryLevel({.qd_radps = -0.2}), 12 * 0.01831563888873418, 1e-12);  // exp(-4)
+}
+
+TEST(TwoExponentials, FallFromTheFirstLevelToTheSecond) {
+  const auto effect =
+      Make("friction_exponential", "excess_Nm = 4.0\nfalls_radps = 0.1\nlate_Nm = -3.0\ncomes_radps = 0.5");
+  EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = 0}), 4);
+  EXPECT_NEAR(effect->DryLevel({.qd_radps = -0.1}), 4 * 0.36787944117144233 - 3 * 0.006737946999085467, 1e-12);
+  EXPECT_NEAR(effect->DryLevel({.qd_radps = 50}), -3 * 0.9900498337491681, 1e-12);
+}
+
+TEST(SmoothDry, ReplacesTheCoulombLevelAndIsZeroAtRest) {
+  const auto effect = Make("friction_sech_tanh", "excess_Nm = 4.0\nrises_radps = 0.01\nfalls_radps = 0.1");
+  EXPECT_DOUBLE_EQ(10 + effect->DryLevel({.qd_radps = 0, .coulomb_Nm = 10}), 0);
+  // tanh(1) = 0.7616, 1 / cosh(0.1) = 0.99502
+  EXPECT_NEAR(10 + effect->DryLevel({.qd_radps = -0.01, .coulomb_Nm = 10}),
+              0.761594155955765 * (10 + 4 * 0.9950207489532266), 1e-12);
+  EXPECT_NEAR(10 + effect->DryLevel({.qd_radps = 3, .coulomb_Nm = 10}), 10, 1e-9);
+}
+
+TEST(CubeRoot, GrowsWithTheRootAndOpposesMotion) {
+  const auto effect = Make("viscous_cuberoot", "drag_at_1radps_Nm = 5.0");
+  EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = 8}), 10);
+  EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = -0.027}), 1.5);
+  EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = 0}), 0);
+}
+
 TEST(LoadFriction, GrowsWithTheTransmittedTorqueBeyondThePreload) {
   const auto effect = Make("load_friction", "mu = 0.05\npreload_Nm = 30.0");
   EXPECT_DOUBLE_EQ(effect->DryLevel({.load_Nm = 0}), 0);

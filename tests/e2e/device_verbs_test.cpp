@@ -87,13 +87,9 @@ TEST_F(DeviceVerbs, WatchScanAndMap_WriteWhatTheyShow) {
 }
 
 TEST(ReadPort, MayBeReadButNotWritten) {
-  const fs::path folder = FreshFolder("read_port");
-  const TakenPort free_one(false);
-  const int port = free_one.port() + 1;
-  const RunningDrive drive(folder, "none", {"--read-port", std::to_string(port)});
-  const std::string address = "127.0.0.1:" + std::to_string(port);
-  ASSERT_EQ(Tool({"get", "generation", "--connect", address}).code, 0);
-  ExpectOneLine(Tool({"set", "scratch[0]", "1", "--connect", address}), 4, "Forbidden");
+  const RunningDrive drive(FreshFolder("read_port"), "none", {"--read-port", "0"});
+  ASSERT_EQ(Tool({"get", "generation", "--connect", drive.read_address()}).code, 0);
+  ExpectOneLine(Tool({"set", "scratch[0]", "1", "--connect", drive.read_address()}), 4, "Forbidden");
   EXPECT_EQ(Tool({"set", "scratch[0]", "1", "--connect", drive.address()}).code, 0);
 }
 

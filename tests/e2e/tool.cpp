@@ -85,6 +85,9 @@ RunningDrive::RunningDrive(const fs::path& folder, const std::string& scenario, 
   const auto colon = line.rfind(':');
   if (colon == std::string::npos) throw std::runtime_error("the drive said: " + line);
   port_ = std::stoi(line.substr(colon + 1));
+  const std::string reading = "reading alone on port ";
+  if (const auto at = line.find(reading); at != std::string::npos)
+    read_port_ = std::stoi(line.substr(at + reading.size()));
 }
 
 RunningDrive::~RunningDrive() {

@@ -45,10 +45,12 @@ class RunningDrive {
 
   int port() const { return port_; }
   std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+  // Of the port that serves reading alone, for a drive with --read-port.
+  std::string read_address() const { return "127.0.0.1:" + std::to_string(read_port_); }
 
  private:
   pid_t child_ = -1;
-  int port_ = 0;
+  int port_ = 0, read_port_ = 0;
 };
 
 // A loopback port that is taken; listening, or bound only, which refuses connections.

@@ -12,7 +12,7 @@ host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
   libgtest-dev googletest dpkg-dev file mbpoll liburdfdom-dev libkdl-parser-dev libtinyxml2-dev libpagmo-dev libboost-dev)
 cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   qemu-system-arm python3)
-fuzz_packages=(clang)
+fuzz_packages=(clang libclang-rt-dev)
 peers_packages=(python3 python3-dev python3-venv python3-pip)
 
 case "${1:-}" in

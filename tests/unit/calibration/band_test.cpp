@@ -99,6 +99,24 @@ TEST(Band, NoiseOfTheTorque_IsNoLimit) {
   EXPECT_EQ(AgreedBand_Hz(Transfer(OneJoint(motion + White(7, 1)), 0, motion)), INFINITY);
 }
 
+// Prediction and torque differ by a straight line in time, which has nothing at these frequencies. In 0.3 s of each
+// second no sample is used: a line stays a line there.
+TEST(Band, SamplesThatAreNotUsed_BreakNoStraightLine) {
+  const VectorXd motion = LowPass(White(12, 1), 10);
+  VectorXd torque = motion + 5 * OneJoint(motion).s.t;
+  Dataset d = OneJoint(torque);
+  for (Index k = 0; k < torque.size(); ++k)
+    if (k % 100 < 30) d.used(k, 0) = 0, d.tau(k, 0) = 1e6;
+  int bands = 0;
+  for (const TransferBand& band : Transfer(d, 0, motion)) {
+    if (band.lower_Hz < 3) continue;  // below, a segment shows that the line has ends
+    EXPECT_GT(band.coherence, 0.99) << band.lower_Hz << " Hz";
+    EXPECT_NEAR(band.gain, 1, 0.01) << band.lower_Hz << " Hz";
+    ++bands;
+  }
+  EXPECT_GT(bands, 8);
+}
+
 TEST(Band, Average_Takes3dBAtTheBand_AndKeepsAModelThatHoldsAtEverySample) {
   const Index samples = static_cast<Index>(kRate_Hz * kLength_s);
   VectorXd tone(samples), slow(samples);

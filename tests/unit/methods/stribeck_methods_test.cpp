@@ -111,6 +111,27 @@ TEST(LogEkf, WithoutAnIdeaOfTheAmplitude_SaysThatItMayBeWrong) {
 TEST(VariableProjection, FindsStribeckTruths) { Judge(VariableProjection, "variable_projection"); }
 TEST(StribeckBasis, FindsStribeckTruths) { Judge(StribeckBasis, "stribeck_basis"); }
 
+// The range of q_s begins at 0.01 rad/s and ends a hundred times higher. On a logarithmic scale these laws lie in its
+// lower third, where a slow motion shows them.
+TEST(StribeckBasis, FindsALawThatEndsAtALowSpeed) {
+  SyntheticArm arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), 5);
+  Law law(5);
+  for (const double speed : {0.03, 0.045}) {
+    for (int j = 0; j < 2; ++j) law.speed[j] = speed, law.extra[j] = 0.5;
+    const Dataset data = arm.Run(
+        40, 105,
+        [&](const tests::State& s) {
+          const double x = s.qd / speed;
+          return law.extra[s.joint] * arm.Friction("Fc", s.joint) * std::copysign(std::exp(-x * x), s.qd);
+        },
+        0.05);
+    Problem problem = tests::ProblemOf(arm, {&data});
+    tests::HoldDelta(problem);
+    const Solution s = StribeckBasis(problem);
+    EXPECT_LT(FrictionError(arm, law, s.z), 0.1) << speed;
+  }
+}
+
 TEST(VariableProjection, FromAFarStart_ReachesTheSameMinimum) {
   const DrawnArm draw(3);
   Problem far = draw.problem;

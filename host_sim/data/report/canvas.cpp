@@ -7,6 +7,10 @@
 
 namespace armcal::report {
 
+namespace {
+constexpr double kLargest = 1.2;  // how far a picture grows with its column
+}
+
 std::string Escape(std::string_view text) {
   std::string safe;
   for (const char c : text) {
@@ -33,13 +37,45 @@ std::string Escape(std::string_view text) {
   return safe;
 }
 
-Canvas::Canvas(const FrameText& text)
+Canvas::Canvas(const FrameText& text, const std::vector<LegendEntry>& legend)
     : text_(text),
       left_(text.y_label.empty() ? 52 : 68),
       right_(text.width_px - 20),
       top_(text.title.empty() ? 12 : 34),
       bottom_(text.height_px - (text.x_label.empty() ? 28 : 46)) {
   if (!text_.title.empty()) Add(fmt::format("<text class='title' x='{}' y='20'>{}</text>", left_, Escape(text_.title)));
+  DrawLegend(legend);
+}
+
+// Right of the title if both fit into that line, else in a line of its own above the data.
+void Canvas::DrawLegend(const std::vector<LegendEntry>& legend) {
+  constexpr double kLetter_px = 7, kSwatch_px = 30;  // about the mean width of a letter
+  const auto width = [](const LegendEntry& e) {
+    return e.name.empty() ? 0 : kSwatch_px + kLetter_px * static_cast<double>(e.name.size());
+  };
+  double all = 0;
+  for (const LegendEntry& entry : legend) all += width(entry);
+  if (all == 0) return;
+  const bool beside = left_ + 8.2 * static_cast<double>(text_.title.size()) + all < right_;
+  double x = beside ? right_ - all : std::max(8.0, std::min(left_, right_ - all)), y = 16;
+  if (!beside) y = text_.title.empty() ? 10 : 36, top_ = y + 14;
+  for (const LegendEntry& entry : legend) {
+    if (entry.name.empty()) continue;
+    Add(fmt::format(
+        "<rect class='f{}' x='{:.1f}' y='{:.1f}' width='14' height='4' rx='2'/><text class='tick' x='{:.1f}' "
+        "y='{:.1f}'>{}</text>",
+        entry.colour, x, y - 2, x + 18, y + 4, Escape(entry.name)));
+    x += width(entry);
+  }
+}
+
+void Canvas::DrawShade(double from, const std::string& text) {
+  if (!(from < 1)) return;
+  const double left = X(std::max(from, 0.0));
+  Add(fmt::format(
+      "<rect class='shade' x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}'/><text class='tick' x='{:.1f}' "
+      "y='{:.1f}' text-anchor='end'>{}</text>",
+      left, top_, right_ - left, bottom_ - top_, right_ - 4, top_ + 14, Escape(text)));
 }
 
 void Canvas::DrawXAxis(const Axis& axis) {
@@ -72,33 +108,9 @@ void Canvas::DrawCategories(const std::vector<std::string>& names) {
   }
 }
 
-void Canvas::DrawLegend(const std::vector<std::string>& names) {
-  constexpr double kLetter_px = 7.2, kSwatch_px = 30;  // about the mean width of a 12 px letter
-  double width = 0;
-  for (const std::string& name : names)
-    width += name.empty() ? 0 : kSwatch_px + kLetter_px * static_cast<double>(name.size());
-  // Right of the title if both fit into that line, else inside the plot area on a plate of its own.
-  const bool beside =
-      !text_.title.empty() && left_ + 7.5 * static_cast<double>(text_.title.size()) + width + 20 < right_;
-  double x = std::max(right_ - width - (beside ? 0 : 6), left_ + 6);
-  const double y = beside ? 15 : top_ + 13;
-  if (!beside && width > 0) {
-    Add(fmt::format("<rect class='plate' x='{:.1f}' y='{:.1f}' width='{:.1f}' height='20'/>", x - 4, y - 10,
-                    width + 4));
-  }
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    if (names[k].empty()) continue;
-    Add(fmt::format(
-        "<rect class='f{}' x='{:.1f}' y='{:.1f}' width='14' height='4' rx='2'/><text class='tick' x='{:.1f}' "
-        "y='{:.1f}'>{}</text>",
-        k % kColours, x, y - 2, x + 18, y + 4, Escape(names[k])));
-    x += kSwatch_px + kLetter_px * static_cast<double>(names[k].size());
-  }
-}
-
 std::string Canvas::Svg() const {
-  std::string svg = fmt::format("<svg viewBox='0 0 {0} {1}' style='max-width:{0}px' role='img' aria-label='{2}'>",
-                                text_.width_px, text_.height_px, Escape(text_.title));
+  std::string svg = fmt::format("<svg viewBox='0 0 {0} {1}' style='max-width:{2:.0f}px' role='img' aria-label='{3}'>",
+                                text_.width_px, text_.height_px, kLargest * text_.width_px, Escape(text_.title));
   svg += body_;
   svg += fmt::format("<path class='axis' d='M{:.1f} {:.1f}V{:.1f}H{:.1f}'/>", left_, top_, bottom_, right_);
   if (!text_.x_label.empty()) {

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "host_sim/data/report/live.hpp"
 #include "host_sim/data/report/plot.hpp"
 #include "host_sim/data/report/table.hpp"
 
@@ -27,6 +29,7 @@ class Page {
   void Text(std::string_view paragraph);
   void Box(Tone tone, std::string_view headline, std::string_view text = "");
   void List(const std::vector<std::string>& items);
+  void Box(Tone tone, std::string_view headline, const std::vector<std::string>& items);
   void Code(std::string_view text);
   void Facts(const std::vector<std::pair<std::string, std::string>>& facts);  // name and value, side by side
   void Add(const Table& table);
@@ -34,8 +37,13 @@ class Page {
   void Add(const Bars& bars, std::string_view caption = "");
   // Pictures side by side, as many as fit: one per joint, for instance.
   void AddGrid(const std::vector<Plot>& plots, std::string_view caption = "");
+  // Pictures that become charts to zoom and to read where the reader's browser runs JavaScript.
+  void Add(const Live& live, std::string_view caption = "");
+  // What `left` and `right` write, side by side where there is room.
+  void Columns(const std::function<void(Page&)>& left, const std::function<void(Page&)>& right);
   // Folded away until the reader opens it.
   void Fold(std::string_view summary, const Table& table);
+  void Fold(std::string_view summary, const std::function<void(Page&)>& content);
 
   std::string Html() const;
   void Write(const std::filesystem::path& path) const;  // atomic; io::InputError: cannot be written
@@ -43,6 +51,7 @@ class Page {
  private:
   std::string title_;
   std::string body_;
+  bool live_ = false;  // it holds charts
 };
 
 }  // namespace armcal::report

@@ -8,39 +8,27 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "host_sim/data/report/thin.hpp"
+
 namespace armcal::report {
 
 namespace {
 
+constexpr double kNumberWidth_px = 20;  // a narrower bar has no room for its number
+
 // Indices of the samples to draw.
-std::vector<std::size_t> Thin(const Series& series) {
-  const std::size_t n = series.x.size();
+std::vector<std::size_t> Drawn(const Series& series) {
+  if (series.style != Style::kPoints) return KeepExtremes({&series.y}, kMostPoints / 2);
   std::vector<std::size_t> keep;
-  if (n <= kMostPoints || series.style != Style::kLine) {
-    const std::size_t stride = (n + kMostPoints - 1) / kMostPoints;
-    for (std::size_t k = 0; k < n; k += std::max<std::size_t>(stride, 1)) keep.push_back(k);
-    return keep;
-  }
-  const std::size_t stretches = kMostPoints / 2;
-  for (std::size_t s = 0; s < stretches; ++s) {
-    const auto first = series.y.begin() + static_cast<std::ptrdiff_t>(s * n / stretches);
-    const auto last = series.y.begin() + static_cast<std::ptrdiff_t>((s + 1) * n / stretches);
-    const auto gap = std::find_if(first, last, [](double v) { return !std::isfinite(v); });
-    auto [low, high] = std::minmax_element(first, gap);
-    if (gap == first) low = high = first;
-    const auto a = static_cast<std::size_t>(std::min(low, high) - series.y.begin());
-    const auto b = gap != last ? static_cast<std::size_t>(gap - series.y.begin())
-                               : static_cast<std::size_t>(std::max(low, high) - series.y.begin());
-    keep.push_back(a);
-    if (b != a) keep.push_back(b);
-  }
+  const std::size_t stride = std::max<std::size_t>(1, (series.x.size() + kMostPoints - 1) / kMostPoints);
+  for (std::size_t k = 0; k < series.x.size(); k += stride) keep.push_back(k);
   return keep;
 }
 
-std::string Draw(const Series& series, std::size_t colour, const Axis& x, const Axis& y, const Canvas& canvas) {
+std::string Draw(const Series& series, int colour, const Axis& x, const Axis& y, const Canvas& canvas) {
   std::string path;
   bool pen_down = false;
-  for (const std::size_t k : Thin(series)) {
+  for (const std::size_t k : Drawn(series)) {
     const double px = canvas.X(x.Place(series.x[k])), py = canvas.Y(y.Place(series.y[k]));
     if (!std::isfinite(px) || !std::isfinite(py)) {
       pen_down = false;
@@ -55,27 +43,32 @@ std::string Draw(const Series& series, std::size_t colour, const Axis& x, const 
     }
     pen_down = true;
   }
-  return fmt::format("<path class='{} s{}' d='{}'/>", series.style == Style::kPoints ? "dots" : "line",
-                     colour % kColours, path);
+  const char* kind = series.style == Style::kPoints ? "dots" : series.style == Style::kDashes ? "line dash" : "line";
+  return fmt::format("<path class='{} s{}' d='{}'/>", kind, colour, path);
 }
 
 }  // namespace
 
+int Colour(const Plot& plot, std::size_t s) {
+  return plot.series[s].colour >= 0 ? plot.series[s].colour : static_cast<int>(s % kColours);
+}
+
 std::string Svg(const Plot& plot) {
   std::vector<double> all_x, all_y;
-  std::vector<std::string> names;
-  for (const Series& series : plot.series) {
+  std::vector<LegendEntry> legend;
+  for (std::size_t s = 0; s < plot.series.size(); ++s) {
+    const Series& series = plot.series[s];
     if (series.x.size() != series.y.size()) throw std::invalid_argument("series '" + series.name + "': x and y differ");
     all_x.insert(all_x.end(), series.x.begin(), series.x.end());
     all_y.insert(all_y.end(), series.y.begin(), series.y.end());
-    names.push_back(series.name);
+    legend.push_back({series.name, Colour(plot, s)});
   }
   const Axis x(all_x, plot.logarithmic_x, false), y(all_y, plot.logarithmic_y, false);
-  Canvas canvas(plot.text);
+  Canvas canvas(plot.text, legend);
+  for (const Shade& shade : plot.shades) canvas.DrawShade(x.Place(shade.from), shade.text);
   canvas.DrawXAxis(x);
   canvas.DrawYAxis(y);
-  for (std::size_t k = 0; k < plot.series.size(); ++k) canvas.Add(Draw(plot.series[k], k, x, y, canvas));
-  canvas.DrawLegend(names);
+  for (std::size_t s = 0; s < plot.series.size(); ++s) canvas.Add(Draw(plot.series[s], Colour(plot, s), x, y, canvas));
   return canvas.Svg();
 }
 
@@ -86,13 +79,17 @@ std::string Svg(const Bars& bars) {
     if (values.size() != bars.categories.size()) throw std::invalid_argument("bars: one value per category");
     all.insert(all.end(), values.begin(), values.end());
   }
+  std::vector<LegendEntry> legend;
+  for (std::size_t s = 0; s < bars.series.size(); ++s)
+    legend.push_back({bars.series[s], s < bars.colours.size() ? bars.colours[s] : static_cast<int>(s % kColours)});
   const Axis y(all, false, true);
-  Canvas canvas(bars.text);
+  Canvas canvas(bars.text, legend);
   canvas.DrawYAxis(y);
   canvas.DrawCategories(bars.categories);
   const double slot = 1.0 / static_cast<double>(std::max<std::size_t>(bars.categories.size(), 1));
   const double width = 0.76 * slot / static_cast<double>(std::max<std::size_t>(bars.series.size(), 1));
   for (std::size_t s = 0; s < bars.series.size(); ++s) {
+    const int colour = legend[s].colour;
     for (std::size_t c = 0; c < bars.categories.size(); ++c) {
       const double value = bars.value[s][c];
       if (!std::isfinite(value)) continue;
@@ -102,11 +99,13 @@ std::string Svg(const Bars& bars) {
       canvas.Add(
           fmt::format("<rect class='f{}' x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}'><title>{} {}: {}"
                       "</title></rect>",
-                      s % kColours, left, top, right - left, std::max(bottom - top, 0.5), Escape(bars.categories[c]),
+                      colour, left, top, right - left, std::max(bottom - top, 0.5), Escape(bars.categories[c]),
                       Escape(bars.series[s]), Number(value, 4)));
+      if (right - left < kNumberWidth_px) continue;
+      canvas.Add(fmt::format("<text class='number' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>",
+                             (left + right) / 2, (value < 0 ? bottom + 12 : top - 4), Number(value, 2)));
     }
   }
-  canvas.DrawLegend(bars.series);
   return canvas.Svg();
 }
 

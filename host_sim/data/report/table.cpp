@@ -19,7 +19,8 @@ bool LooksNumeric(const std::string& cell) {
   char* end = nullptr;
   std::strtod(cell.c_str(), &end);
   const std::string_view rest = end;
-  if (end != cell.c_str() && (rest.starts_with(" ±") || rest.starts_with(" ["))) return true;
+  if (end != cell.c_str() && (rest.starts_with(" ±") || rest.starts_with(" [") || rest.starts_with(" to ")))
+    return true;
   return *end == '\0' || (*end == '%' && end[1] == '\0') || (*end == ' ' && end[1] == '%' && end[2] == '\0');
 }
 

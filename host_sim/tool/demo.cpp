@@ -12,6 +12,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/axis.hpp"
+#include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/machine/plant/scenario.hpp"
@@ -186,7 +187,7 @@ std::string DemoText(const nlohmann::ordered_json& r) {
   return out;
 }
 
-void WriteDemoPage(const std::string& path, const nlohmann::ordered_json& r, const verdict::DiagnosisView& view) {
+void WriteDemoPage(const std::string& path, const nlohmann::ordered_json& r) {
   const bool closed = r["closed"].get<bool>();
   report::Page page((closed ? "The loop, closed: " : "The loop did not close: ") + r["title"].get<std::string>(),
                     "A simulated six-axis drive whose arm has an effect that its model does not declare: measured, "
@@ -213,7 +214,7 @@ void WriteDemoPage(const std::string& path, const nlohmann::ordered_json& r, con
            "through its trace. The floor is what a perfect model leaves: sensor noise.");
   page.Add(TrackingTable(r));
   page.Text("How it came to the drive: " + r["path"].get<std::string>() + ".");
-  verdict::AddDiagnosis(page, view);
+  verdict::AddDiagnosis(page, r);
   page.Section("Stages");
   std::vector<std::string> stages;
   for (const auto& s : r["stages"]) stages.push_back(s);
@@ -324,7 +325,7 @@ class Demo {
     result["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     AddOutcome(result);
     WriteJson(File("result.json"), result);
-    WriteDemoPage(File("report.html"), result, run->view);
+    WriteDemoPage(File("report.html"), result);
     fmt::print("{}\nresult: {}\nreport: {}\n", DemoText(result), File("result.json"), File("report.html"));
     return result["closed"].get<bool>() ? kOk : kPartial;
   }

@@ -6,6 +6,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
+#include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
@@ -69,7 +70,7 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
   if (!o.model_out.empty() && after_test != before_test)
     files::WriteWholeFile(o.model_out, after_test);  // what was not confirmed is taken out
   nlohmann::ordered_json& json = run->json;
-  json["provenance"] = provenance;
+  json["provenance"] = provenance, json["test"] = o.test;
   if (!o.model_out.empty()) {
     // The same schema: a table can switch the terms on. Another one: the model must be generated and the drive built.
     const codegen::Model next(codegen::ReadRobot(o.model_out), run->catalogue);
@@ -90,15 +91,7 @@ int RunOneDiagnosis(const DiagnoseOptions& o) {
     throw io::InputError("expected --robot, --train and --test, or --batch, or --splits, or --summary");
   const auto run = RunDiagnosis(o);
   if (!o.report.empty()) {
-    report::Page page("What the model of " + run->model->robot().name + " lacks",
-                      "Declared model fitted to the training logs, terms chosen there, error on a held-out log.");
-    verdict::AddDiagnosis(page, run->view);
-    page.Section("Provenance");
-    page.Facts({{"robot", run->model->robot().title},
-                {"training", run->json["provenance"]},
-                {"held out", o.test},
-                {"search", fmt::format("{:.1f} s", run->view.seconds)}});
-    page.Write(o.report);
+    verdict::WriteDiagnosisPage(o.report, run->json);
     fmt::print("report: {}\n", o.report);
   }
   return kOk;

@@ -11,6 +11,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/diagnose/diagnosis/determined.hpp"
+#include "host_sim/diagnose/verdict/curves.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
 
@@ -90,6 +91,34 @@ nlohmann::ordered_json PayloadJson(const DiagnosisView& v) {
   return out;
 }
 
+// What a page says of a term besides its sentence.
+nlohmann::ordered_json WordsJson(const DiagnosisView& v, std::size_t term) {
+  const Term& t = v.finding->terms[term];
+  return {{"name", fmt::format("{}, joint {}", t.record->kind, JointName(t))},
+          {"remark", Remark(t)},
+          {"what_it_is", t.record->title + ". " + t.record->source + "."},
+          {"cause", CauseText(v, term)},
+          {"to_do", WhatToDo(t)},
+          {"new_model", InTheModel(t, v.model->robot())},
+          {"score", ScoreText(t)},
+          {"folds", FoldText(t)},
+          {"runner_up", RunnerUp(t)},
+          {"fits_equally", AlsoFits(t)}};
+}
+
+// The parameters that the training logs determine, as the declared model has them.
+nlohmann::ordered_json DeclaredJson(const DiagnosisView& v) {
+  const calibration::Fit& fit = v.finding->declared;
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (const int c : fit.active)
+    if (c < v.model->columns())
+      out.push_back({{"name", v.model->column_name(c)},
+                     {"unit", v.model->column_unit(c)},
+                     {"value", fit.x[c]},
+                     {"sd", fit.sd[c]}});
+  return out;
+}
+
 }  // namespace
 
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
@@ -97,6 +126,12 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   nlohmann::ordered_json j;
   j["verdict"] = AnyConfirmed(f) ? "effect" : "none";
   j["joint_base"] = 1;
+  j["headline"] = Headline(f);
+  j["robot"] = v.model->robot().name, j["robot_title"] = v.model->robot().title;
+  for (const codegen::Joint& joint : v.model->robot().joint) {
+    j["joint_names"].push_back(joint.name);
+    j["torque_units"].push_back(joint.kinematics.type == codegen::JointType::kPrismatic ? "N" : "N m");
+  }
   j["terms"] = nlohmann::ordered_json::array();
   for (std::size_t n = 0; n < f.terms.size(); ++n) {
     const Term& t = f.terms[n];
@@ -109,16 +144,19 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     for (const int joint : use.joints) term["joints"].push_back(joint + 1);
     term["unknowns"] = use.nonlinear;
     term["signals"] = Signals(t);
-    nlohmann::ordered_json parameters, deviations;
+    nlohmann::ordered_json parameters, deviations, units;
     for (std::size_t k = 0; k < t.eta.size(); ++k) {
-      parameters[t.unknowns[k].name] = t.eta[k];
+      parameters[t.unknowns[k].name] = t.eta[k], units[t.unknowns[k].name] = t.unknowns[k].unit;
       if (t.eta_sd[static_cast<Eigen::Index>(k)] > 0)
         deviations[t.unknowns[k].name] = t.eta_sd[static_cast<Eigen::Index>(k)];
     }
-    for (std::size_t c = 0; c < t.columns.size(); ++c)
-      parameters[t.columns[c].name] = t.amplitude[c], deviations[t.columns[c].name] = t.sd[c];
+    for (std::size_t c = 0; c < t.columns.size(); ++c) {
+      const std::string& name = t.columns[c].name;
+      parameters[name] = t.amplitude[c], deviations[name] = t.sd[c], units[name] = t.columns[c].unit;
+    }
     term["parameters"] = parameters;
     term["parameter_sd"] = deviations;
+    term["parameter_unit"] = units;
     term["eta"] = t.eta, term["amplitude"] = ToList(t.amplitude), term["covariance"] = ToJson(t.covariance);
     term["also_fits"] = t.also_fits;
     term["confirmed"] = t.confirmed;
@@ -126,12 +164,14 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     if (!t.unconfirmed.empty()) term["unconfirmed"] = t.unconfirmed;
     term["marks"] = MarksJson(t);
     term["sentence"] = Sentence(v, n);
+    term["words"] = WordsJson(v, n);
     if (t.in_fit && !t.training_only) {
       const Dependence d = DependenceOf(v, n);
       term["without_moving"] = ToList(calibration::Rms(*v.test, v.held_out->after + v.term_torque[n], true)),
       term["without_in_band"] = ToList(calibration::RmsInBand(*v.test, v.held_out->after + v.term_torque[n]));
-      term["dependence"] = {
-          {"over", d.signal}, {"torque", d.torque}, {"x", d.term.x}, {"without", d.without.y}, {"term", d.term.y}};
+      term["dependence"] = {{"over", d.signal},       {"torque", d.torque}, {"x", d.term.x},
+                            {"without", d.without.y}, {"term", d.term.y},   {"remains", d.remains.y},
+                            {"of_joint", d.joint + 1}};
     }
     term["score"] = t.score;
     term["log10_chance"] = t.log_chance / std::numbers::ln10;
@@ -174,6 +214,10 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["held_out_motion"] = ToJson(v.motion);
   j["not_looked_at"] = NotLookedAt(v);
   j["exogeneity"] = ToJson(v.exogeneity);
+  j["held_out_text"] = MotionText(v.motion);
+  j["exogeneity_text"] = ExogeneityText(v.exogeneity, kLacksMore);
+  j["declared_parameters"] = DeclaredJson(v);
+  j["curves"] = CurvesJson(v);
   j["seconds"] = v.seconds;
   return j;
 }

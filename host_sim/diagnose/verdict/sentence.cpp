@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_sim/diagnose/verdict/curves.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
 
@@ -49,6 +50,8 @@ std::string InPhase(const Term& t, const calibration::HeldOutMotion& motion) {
   return out;
 }
 
+}  // namespace
+
 std::string WhatToDo(const Term& t) {
   if (t.training_only || (!t.record->on_target && t.confirmed)) return t.record->remedy;
   if (!t.confirmed && t.in_fit) return "hold out a log of another trajectory to confirm it";
@@ -58,9 +61,7 @@ std::string WhatToDo(const Term& t) {
                      fmt::join(t.also_fits, " or "));
 }
 
-}  // namespace
-
-std::string Sentence(const DiagnosisView& v, std::size_t term) {
+std::string CauseText(const DiagnosisView& v, std::size_t term) {
   const Term& t = v.finding->terms[term];
   const VectorXd torque = calibration::Rms(*v.test, v.term_torque[term], true);
   std::string out = fmt::format("{} on {}", t.record->kind, Where(t, torque));
@@ -80,7 +81,11 @@ std::string Sentence(const DiagnosisView& v, std::size_t term) {
   } else if (!t.confirmed) {
     out += t.refuted ? ": the held-out log refutes it" : ": the training logs do not determine it";
   }
-  return out + "; " + WhatToDo(t) + ".";
+  return out;
+}
+
+std::string Sentence(const DiagnosisView& v, std::size_t term) {
+  return CauseText(v, term) + "; " + WhatToDo(v.finding->terms[term]) + ".";
 }
 
 namespace {
@@ -125,22 +130,18 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   if (!v.train || v.train->empty()) return out;
   const int n = v.model->joints();
   std::string band, left_out;
-  double slowest = 0, fastest = 0, saved_Hz = INFINITY;
+  const VectorXd reach_Hz = LookedAtTo_Hz(v);
+  double saved_Hz = INFINITY;
   std::vector<int> standing;
   for (int j = 0; j < n; ++j) {
-    double lowest = 0, used = 0, samples = 0, moving = 0;
+    double used = 0, samples = 0, moving = 0;
     for (const calibration::Dataset& d : *v.train) {
-      if (j < d.cutoff_Hz.size()) {
-        const double reach_Hz = j < d.band_Hz.size() ? std::min(d.cutoff_Hz[j], d.band_Hz[j]) : d.cutoff_Hz[j];
-        if (j < d.saved_Hz.size()) saved_Hz = std::min(saved_Hz, d.saved_Hz[j]);
-        lowest = lowest > 0 ? std::min(lowest, reach_Hz) : reach_Hz;
-      }
+      if (j < d.saved_Hz.size()) saved_Hz = std::min(saved_Hz, d.saved_Hz[j]);
       const auto& turned = v.finding->at_turns;
       const bool all = std::find(turned.begin(), turned.end(), j) != turned.end();
       used += (all ? d.sound : d.used).col(j).sum(), moving += d.moving.col(j).sum(), samples += d.samples();
     }
-    slowest = j == 0 ? lowest : std::min(slowest, lowest), fastest = std::max(fastest, lowest);
-    band += fmt::format("{}{:.3g}", j == 0 ? "" : ", ", lowest);
+    band += fmt::format("{}{:.3g}", j == 0 ? "" : ", ", reach_Hz[j]);
     left_out += fmt::format("{}{:.0f}", j == 0 ? "" : ", ", 100 * (1 - used / std::max(samples, 1.0)));
     if (moving < kStands * samples) standing.push_back(j);
   }
@@ -168,8 +169,9 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
     out.push_back(
         fmt::format("joint{} {}: at rest in the training logs", standing.size() > 1 ? "s" : "", JointGroup(standing)));
   if (const auto& few = v.finding->too_short; !few.empty())
-    out.push_back(fmt::format("effects on joint{} {}: too few rows of the training logs are left; longer logs show more",
-                              few.size() > 1 ? "s" : "", JointGroup(few)));
+    out.push_back(
+        fmt::format("effects on joint{} {}: too few rows of the training logs are left; longer logs show more",
+                    few.size() > 1 ? "s" : "", JointGroup(few)));
   if (v.finding->most_terms > 0)
     out.push_back(fmt::format("further terms: the search ended at {}; another diagnosis of the new model would go on",
                               v.finding->most_terms));

@@ -1,10 +1,10 @@
-// verdict - holds one diagnosis with all that shows it, and shows it in the terminal and on a page.
+// verdict - holds one diagnosis with all that shows it, and shows it in the terminal.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "host_sim/data/report/page.hpp"
+#include "host_sim/data/report/plot.hpp"
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
 #include "host_sim/identify/calibration/held_out.hpp"
 #include "host_sim/identify/methods/exogeneity.hpp"
@@ -39,9 +39,6 @@ struct Dependence {
   report::Series without, term, remains;
 };
 Dependence DependenceOf(const DiagnosisView& v, std::size_t term);
-
-// Verdict, table before / after, and for each term the residual over time and over the signal that gave it away.
-void AddDiagnosis(report::Page& page, const DiagnosisView& v);
 
 // Short lines for the terminal.
 std::string DiagnosisText(const DiagnosisView& v);

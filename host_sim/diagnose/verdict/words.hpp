@@ -57,7 +57,13 @@ inline constexpr const char* kNoMotion = "armcal excite cannot search a motion f
 // "joint 3 is predicted worse with it than by the declared model: 0.412 instead of 0.398 N m"; of one not confirmed.
 std::string WhyNotConfirmed(const diagnosis::Term& t, const codegen::Robot& robot);
 
-// One sentence: what, on which joint, over which other one, how much of the held-out error, and what to do.
+// What, on which joint, over which other one, and how much of the held-out error.
+std::string CauseText(const DiagnosisView& v, std::size_t term);
+
+// What to do about a term.
+std::string WhatToDo(const diagnosis::Term& t);
+
+// Both in one sentence.
 std::string Sentence(const DiagnosisView& v, std::size_t term);
 
 // What the held-out log carries and the training logs do not, a line each; empty if nothing is named.

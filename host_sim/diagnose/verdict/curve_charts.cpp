@@ -1,0 +1,83 @@
+// verdict - makes charts of the curves that a JSON holds.
+#include "host_sim/diagnose/verdict/curve_charts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace armcal::verdict {
+
+using nlohmann::ordered_json;
+
+namespace {
+
+constexpr int kMeasuredColour = 6;
+
+std::string UnitOf(const ordered_json& json, int joint) {
+  return json.at("torque_units").at(static_cast<std::size_t>(joint) - 1);
+}
+
+// One panel a joint. fill: gives it its labels and series.
+template <class Fill>
+report::Live PanelsOf(const ordered_json& json, const std::vector<int>& shown, const Fill& fill) {
+  report::Live live;
+  for (const ordered_json& curves : json.at("curves")) {
+    const int joint = curves.at("joint");
+    report::Panel panel{fmt::format("joint {}", joint)};
+    panel.plot.text.title = JointTitle(json, joint);
+    panel.shown = std::find(shown.begin(), shown.end(), joint) != shown.end();
+    fill(panel.plot, curves, UnitOf(json, joint));
+    live.panels.push_back(panel);
+  }
+  return live;
+}
+
+}  // namespace
+
+double NumberOf(const ordered_json& value) {
+  const double number = value.is_number() ? value.get<double>() : std::nan("");
+  return std::isfinite(number) ? number : std::nan("");
+}
+
+std::vector<double> Numbers(const ordered_json& array) {
+  std::vector<double> out;
+  for (const ordered_json& value : array) out.push_back(NumberOf(value));
+  return out;
+}
+
+std::string JointTitle(const ordered_json& json, int joint) {
+  const std::string own = json.at("joint_names").at(static_cast<std::size_t>(joint) - 1);
+  const std::string plain = fmt::format("joint {}", joint);
+  return own.empty() || own == plain || own == fmt::format("axis {}", joint) ? plain : plain + ", " + own;
+}
+
+report::Live TorqueCharts(const ordered_json& json, const std::vector<ShownPrediction>& predictions,
+                          const std::vector<int>& shown) {
+  report::Live live = PanelsOf(json, shown, [&](report::Plot& plot, const ordered_json& curves, const auto& unit) {
+    plot.text.x_label = "time / s", plot.text.y_label = (unit == "N" ? "force / " : "torque / ") + unit;
+    const std::vector<double> t = Numbers(curves.at("t"));
+    plot.series.push_back({"measured", t, Numbers(curves.at("measured")), report::Style::kLine, kMeasuredColour});
+    for (const ShownPrediction& p : predictions)
+      plot.series.push_back({p.name, t, Numbers(curves.at(p.key)), p.style, p.colour});
+  });
+  live.difference = "measured minus predicted";
+  return live;
+}
+
+report::Live SpectrumCharts(const ordered_json& json, const std::vector<ShownPrediction>& predictions,
+                            const std::vector<int>& shown) {
+  return PanelsOf(json, shown, [&](report::Plot& plot, const ordered_json& curves, const auto& unit) {
+    plot.text.x_label = "frequency / Hz", plot.text.y_label = "amplitude density / " + unit + "/√Hz";
+    plot.logarithmic_x = plot.logarithmic_y = true;
+    const ordered_json& spectrum = curves.at("spectrum");
+    const std::vector<double> f_Hz = Numbers(spectrum.at("Hz"));
+    plot.series.push_back({"measured", f_Hz, Numbers(spectrum.at("measured")), report::Style::kLine, kMeasuredColour});
+    for (const ShownPrediction& p : predictions)
+      plot.series.push_back({"left " + p.name, f_Hz, Numbers(spectrum.at(p.key)), p.style, p.colour});
+    if (curves.at("looked_at_to_Hz").is_number())
+      plot.shades.push_back({curves.at("looked_at_to_Hz").get<double>(), "not looked at"});
+  });
+}
+
+}  // namespace armcal::verdict

@@ -11,11 +11,10 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
-#include "host_sim/data/report/axis.hpp"
-#include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/machine/plant/scenario.hpp"
+#include "host_sim/tool/demo_result.hpp"
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/process.hpp"
@@ -76,42 +75,6 @@ VectorXd PlantFloor(const std::string& truth, const calibration::Dataset& log, s
   return calibration::Rms(log, residual, true);
 }
 
-std::string Cell(const nlohmann::ordered_json& r, const char* key, int j, double factor = 1) {
-  return r.contains(key) ? report::Number(factor * r[key][j].get<double>()) : "-";
-}
-
-report::Table ErrorTable(const nlohmann::ordered_json& r) {
-  report::Table t{{"joint", "held-out log before", "after", "floor of the plant", "on the drive: CAD table",
-                   "identified", "with the effect"},
-                  {},
-                  "RMS of measured minus model torque where the joint moves, N m"};
-  for (int j = 0; j < static_cast<int>(r["before"].size()); ++j)
-    t.rows.push_back({std::to_string(j + 1), Cell(r, "before_moving", j), Cell(r, "after_moving", j),
-                      Cell(r, "plant_floor", j), Cell(r, "drive_cad", j), Cell(r, "drive_before", j),
-                      Cell(r, "drive_after", j)});
-  return t;
-}
-
-report::Table TrackingTable(const nlohmann::ordered_json& r) {
-  report::Table t{
-      {"joint", "CAD table", "identified", "with the effect"}, {}, "tracking error rms of the held-out motion, mrad"};
-  for (int j = 0; j < static_cast<int>(r["before"].size()); ++j)
-    t.rows.push_back({std::to_string(j + 1), Cell(r, "tracking_cad_rad", j, 1e3),
-                      Cell(r, "tracking_before_rad", j, 1e3), Cell(r, "tracking_after_rad", j, 1e3)});
-  return t;
-}
-
-std::string Joint(const nlohmann::ordered_json& joint) {
-  return joint.is_string() ? joint.get<std::string>() : joint.dump();
-}
-
-std::string Truth(const nlohmann::ordered_json& r) {
-  std::string out;
-  for (const auto& u : r["undeclared"])
-    out += fmt::format("{}{} on joint {}", out.empty() ? "" : ", ", u["kind"].get<std::string>(), Joint(u["joint"]));
-  return out.empty() ? "nothing" : out;
-}
-
 // A joint's error on the drive is at the floor of the plant up to this factor.
 constexpr double kAtTheFloor = 1.1;
 
@@ -152,74 +115,6 @@ void AddOutcome(ordered_json& r) {
     r["joints"].push_back({{"joint", j + 1}, {"error_over_floor", ratio}, {"closed", ratio <= kAtTheFloor}});
   }
   r["closed"] = closed;
-}
-
-std::string Outcome(const ordered_json& r) {
-  std::string out = r["closed"].get<bool>() ? "the loop is closed" : "the loop is NOT closed";
-  for (const auto& e : r["effects"])
-    out += fmt::format("; {} on joint {}: {}", e["kind"].get<std::string>(), Joint(e["joint"]),
-                       e["became"].get<std::string>());
-  for (const auto& j : r["joints"])
-    if (!j["closed"].get<bool>())
-      out += fmt::format("; joint {}: error {:.2f} times the floor", j["joint"].get<int>(),
-                         j["error_over_floor"].get<double>());
-  return out;
-}
-
-std::string Verdict(const nlohmann::ordered_json& r) {
-  std::string out;
-  for (const auto& t : r["terms"]) {
-    out += fmt::format("{}{} on joint {}", out.empty() ? "" : ", ", t["kind"].get<std::string>(), Joint(t["joint"]));
-    if (!t["also_fits"].empty()) out += fmt::format(" (or {})", t["also_fits"][0].get<std::string>());
-    if (!t["confirmed"].get<bool>()) out += " (not confirmed)";
-  }
-  return out.empty() ? "nothing is missing" : out;
-}
-
-// The last screen. r: the demo's JSON.
-std::string DemoText(const nlohmann::ordered_json& r) {
-  std::string out = fmt::format(
-      "\nfound by armcal:    {}\nin the simulation:  {}  (read after the verdict was written)\n", Verdict(r), Truth(r));
-  out += fmt::format("outcome:             {}\n", Outcome(r));
-  out += fmt::format("brought to the drive: {}; table CRC {}, read back {}\n\n", r["path"].get<std::string>(),
-                     r["table_crc"].get<std::string>(), r["readback_ok"].get<bool>() ? "equal" : "DIFFERENT");
-  out += report::Text(ErrorTable(r)) + "\n" + report::Text(TrackingTable(r));
-  return out;
-}
-
-void WriteDemoPage(const std::string& path, const nlohmann::ordered_json& r) {
-  const bool closed = r["closed"].get<bool>();
-  report::Page page((closed ? "The loop, closed: " : "The loop did not close: ") + r["title"].get<std::string>(),
-                    "A simulated six-axis drive whose arm has an effect that its model does not declare: measured, "
-                    "found, added, flashed, measured again.");
-  page.Box(closed ? report::Tone::kGood : report::Tone::kWarning, "armcal found: " + Verdict(r),
-           Outcome(r) + ". In the simulation there was: " + Truth(r) +
-               ". No program but the drive read that before the verdict was written.");
-  page.Section("Error before and after");
-  page.Add(ErrorTable(r));
-  report::Bars bars;
-  bars.text.title = "on the drive, held-out motion: torque error over the floor of the plant";
-  bars.text.x_label = "joint";
-  bars.text.y_label = "times the floor";
-  bars.series = {"CAD table", "identified", "with the effect"};
-  bars.value.resize(bars.series.size());
-  const char* const keys[] = {"drive_cad", "drive_before", "drive_after"};
-  for (int j = 0; j < static_cast<int>(r["before"].size()); ++j) {
-    bars.categories.push_back(std::to_string(j + 1));
-    for (int k = 0; k < 3; ++k)
-      bars.value[k].push_back(r[keys[k]][j].get<double>() / r["plant_floor"][j].get<double>());
-  }
-  page.Add(bars,
-           "Measured torque minus the committed model's torque at the measured state, computed on the drive and read "
-           "through its trace. The floor is what a perfect model leaves: sensor noise.");
-  page.Add(TrackingTable(r));
-  page.Text("How it came to the drive: " + r["path"].get<std::string>() + ".");
-  verdict::AddDiagnosis(page, r);
-  page.Section("Stages");
-  std::vector<std::string> stages;
-  for (const auto& s : r["stages"]) stages.push_back(s);
-  page.List(stages);
-  page.Write(path);
 }
 
 class Demo {

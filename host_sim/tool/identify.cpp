@@ -7,7 +7,10 @@
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/analysis/identified.hpp"
+#include "host_sim/diagnose/verdict/curves.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/diagnose/verdict/identification_page.hpp"
+#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 #include "host_sim/identify/calibration/payload.hpp"
 #include "host_sim/identify/calibration/table_ceilings.hpp"
@@ -85,6 +88,7 @@ std::string RangesFromLeastSquares(calibration::Problem& problem) {
 void AddMotion(const calibration::HeldOutMotion& motion, nlohmann::ordered_json& json) {
   for (const std::string& line : verdict::MotionText(motion)) fmt::print("{}\n", line);
   json["held_out_motion"] = verdict::ToJson(motion);
+  json["held_out_text"] = verdict::MotionText(motion);
 }
 
 // kOk, or kPartial where the method says that it did not converge. Throws io::InputError: unknown method, or a log that
@@ -281,12 +285,21 @@ int RunPayload(const PayloadOptions& o) {
 
 // Else: the weighted fit with the prior.
 struct IdentifyOptions {
-  std::string robot, channels, table, json, test, method;
+  std::string robot, channels, table, json, report, test, method;
   std::vector<std::string> train;
   bool force = false;
   double band_Hz = 0, cutoff_Hz = 0;
   PayloadOptions payload;
 };
+
+const char* const kLacksTerm = "the model lacks a term: armcal diagnose";
+
+// Measured and predicted torque of a log, for a page.
+void AddCurves(const calibration::Dataset& log, const Eigen::MatrixXd& predicted, nlohmann::ordered_json& json) {
+  json["curves_of"] = log.source;
+  for (int j = 0; j < log.joints(); ++j)
+    json["curves"].push_back(verdict::CurvesOf(log, j, {{"predicted", predicted.col(j)}}));
+}
 
 std::string Significant(double v) { return fmt::format("{:.5g}", v); }
 
@@ -306,12 +319,16 @@ int RunIdentify(const IdentifyOptions& o) {
   if (o.payload.asked()) {
     if (!o.train.empty() || !o.test.empty() || !o.method.empty())
       throw io::InputError("--with, --without: expected no --train, --test or --method beside them");
+    if (!o.report.empty())
+      throw io::InputError("--report: expected no --with or --without; a page shows a fit of --train");
     PayloadOptions payload = o.payload;
     payload.robot = o.robot, payload.channels = o.channels, payload.table = o.table, payload.json = o.json;
     payload.cutoff_Hz = o.cutoff_Hz;
     return RunPayload(payload);
   }
   if (o.train.empty()) throw io::InputError("--train: expected log(s) to fit");
+  if (!o.method.empty() && !o.report.empty())
+    throw io::InputError("--report: expected no --method; a page shows the weighted fit");
   if (!o.method.empty() && !o.table.empty())
     throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
   MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, o.cutoff_Hz, {}};
@@ -323,7 +340,7 @@ int RunIdentify(const IdentifyOptions& o) {
   analysis::Identified found(model, train);
   PrintColumns(model, found.all);
   const calibration::Exogeneity& exogeneity = found.exogeneity;
-  fmt::print("{}", verdict::ExogeneityText(exogeneity, "the model lacks a term: armcal diagnose"));
+  fmt::print("{}", verdict::ExogeneityText(exogeneity, kLacksTerm));
   if (o.method == "auto" && !exogeneity.passed() && exogeneity.instruments == calibration::kSimulatedLoop) {
     method.method = "instrumental_variable", method.exogeneity = verdict::ToJson(exogeneity);
     return RunMethod(method);
@@ -340,16 +357,28 @@ int RunIdentify(const IdentifyOptions& o) {
   }
   nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}};
   json.update(found.ToJson());
+  verdict::AddRobot(json, model.robot());
+  json["exogeneity_text"] = verdict::ExogeneityText(exogeneity, kLacksTerm);
+  if (!o.table.empty()) json["table_file"] = o.table;
   if (!o.test.empty()) {
     const calibration::Dataset test = read.One(o.test);
-    const verdict::HeldOutError e =
-        verdict::CompareHeldOut(test, calibration::Predict(model, test, found.x(), found.eta()), o.band_Hz);
+    const Eigen::MatrixXd predicted = calibration::Predict(model, test, found.x(), found.eta());
+    const verdict::HeldOutError e = verdict::CompareHeldOut(test, predicted, o.band_Hz);
     verdict::PrintHeldOut(e, o.test);
     json["test"] = o.test;
     json["held_out"] = verdict::ToJson(e);
     AddMotion(calibration::CompareMotion(model, found.all, calibration::Pointers(train), test), json);
+    AddCurves(test, predicted, json);
+  } else {
+    const Eigen::MatrixXd predicted = calibration::Predict(model, train[0], found.x(), found.eta());
+    json["on_training"] = verdict::ToJson(verdict::CompareHeldOut(train[0], predicted, 0));
+    AddCurves(train[0], predicted, json);
   }
   WriteJson(o.json, json);
+  if (!o.report.empty()) {
+    verdict::WriteIdentificationPage(o.report, json);
+    fmt::print("report: {}\n", o.report);
+  }
   return kOk;
 }
 
@@ -378,6 +407,7 @@ void AddIdentify(CLI::App& app, Action& action) {
   AddCutoff(*verb, o->cutoff_Hz);
   verb->add_flag("--force", o->force, "let parameters move that the data hardly determine");
   verb->add_option("--json", o->json, "write everything here");
+  verb->add_option("--report", o->report, "write a self-contained page here; of the weighted fit");
   AddPayloadOptions(*verb, o->payload);
   verb->callback([o, &action] { action = [o] { return RunIdentify(*o); }; });
 }

@@ -26,6 +26,7 @@ int Main(int argc, char** argv) {
   AddReplay(app, action);
   AddChoose(app, action);
   AddDiagnose(app, action);
+  AddReport(app, action);
   AddImport(app, action);
   AddGenerate(app, action);
   AddExport(app, action);

@@ -1,10 +1,12 @@
-// verdict - makes charts of the curves that a JSON holds.
+// verdict - shows what a JSON holds: its numbers, and charts of its curves.
 #include "host_sim/diagnose/verdict/curve_charts.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "host_sim/data/report/axis.hpp"
 
 namespace armcal::verdict {
 
@@ -46,6 +48,12 @@ std::vector<double> Numbers(const ordered_json& array) {
   return out;
 }
 
+std::string Interval95(double value, double sd) {
+  constexpr double kTwoSided = 1.96;
+  if (!(sd > 0)) return "-";
+  return report::Number(value - kTwoSided * sd, 4) + " to " + report::Number(value + kTwoSided * sd, 4);
+}
+
 std::string JointTitle(const ordered_json& json, int joint) {
   const std::string own = json.at("joint_names").at(static_cast<std::size_t>(joint) - 1);
   const std::string plain = fmt::format("joint {}", joint);
@@ -59,7 +67,7 @@ report::Live TorqueCharts(const ordered_json& json, const std::vector<ShownPredi
     const std::vector<double> t = Numbers(curves.at("t"));
     plot.series.push_back({"measured", t, Numbers(curves.at("measured")), report::Style::kLine, kMeasuredColour});
     for (const ShownPrediction& p : predictions)
-      plot.series.push_back({p.name, t, Numbers(curves.at(p.key)), p.style, p.colour});
+      plot.series.push_back({p.predicted, t, Numbers(curves.at(p.key)), p.style, p.colour});
   });
   live.difference = "measured minus predicted";
   return live;
@@ -74,9 +82,9 @@ report::Live SpectrumCharts(const ordered_json& json, const std::vector<ShownPre
     const std::vector<double> f_Hz = Numbers(spectrum.at("Hz"));
     plot.series.push_back({"measured", f_Hz, Numbers(spectrum.at("measured")), report::Style::kLine, kMeasuredColour});
     for (const ShownPrediction& p : predictions)
-      plot.series.push_back({"left " + p.name, f_Hz, Numbers(spectrum.at(p.key)), p.style, p.colour});
-    if (curves.at("looked_at_to_Hz").is_number())
-      plot.shades.push_back({curves.at("looked_at_to_Hz").get<double>(), "not looked at"});
+      plot.series.push_back({p.left, f_Hz, Numbers(spectrum.at(p.key)), p.style, p.colour});
+    if (curves.contains("looked_at_to_Hz") && curves["looked_at_to_Hz"].is_number())
+      plot.shades.push_back({curves["looked_at_to_Hz"].get<double>(), "not looked at"});
   });
 }
 

@@ -1,4 +1,4 @@
-// verdict - makes charts of the curves that a JSON holds.
+// verdict - shows what a JSON holds: its numbers, and charts of its curves.
 #pragma once
 
 #include <string>
@@ -14,9 +14,12 @@ namespace armcal::verdict {
 double NumberOf(const nlohmann::ordered_json& value);
 std::vector<double> Numbers(const nlohmann::ordered_json& array);
 
+// "0.812 to 0.934": a value with a standard deviation, normally distributed; "-" without a deviation.
+std::string Interval95(double value, double sd);
+
 // A prediction as CurvesOf has it, and how a chart shows it.
 struct ShownPrediction {
-  std::string key, name;
+  std::string key, predicted, left;  // predicted, left: what a legend calls it and what it leaves
   report::Style style = report::Style::kLine;
   int colour = 0;
 };

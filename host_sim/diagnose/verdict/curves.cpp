@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "host_sim/data/logs/spectrum.hpp"
@@ -46,7 +47,7 @@ ordered_json SpectrumJson(const calibration::Dataset& log, const VectorXd& measu
       f_Hz.push_back(Rounded(s.f_Hz[k], 5)), density.push_back(Rounded(s.density[k], 4));
     out["Hz"] = f_Hz, out[name] = density;
   };
-  add("measured", predicted.empty() ? measured : VectorXd(measured + 0 * predicted[0].torque));
+  add("measured", measured + 0 * predicted[0].torque);  // the same samples
   for (const JointPrediction& p : predicted) add(p.name, measured - p.torque);
   return out;
 }
@@ -62,7 +63,9 @@ VectorXd LookedAtTo_Hz(const DiagnosisView& v) {
   return out;
 }
 
-ordered_json CurvesOf(const calibration::Dataset& log, int joint, const std::vector<JointPrediction>& predicted) {
+ordered_json CurvesOf(const calibration::Dataset& log, int joint, std::vector<JointPrediction> predicted) {
+  for (JointPrediction& p : predicted)
+    p.torque = (log.used.col(joint).array() != 0).select(p.torque, std::numeric_limits<double>::quiet_NaN());
   const VectorXd measured = log.tau.col(joint);
   std::vector<std::vector<double>> values{ToVector(measured)};
   for (const JointPrediction& p : predicted) values.push_back(ToVector(p.torque));
@@ -72,7 +75,8 @@ ordered_json CurvesOf(const calibration::Dataset& log, int joint, const std::vec
   const std::size_t most = kRows / static_cast<std::size_t>(log.joints());
   const std::vector<std::size_t> rows = report::KeepExtremes(columns, most / (2 * columns.size()));
 
-  ordered_json out{{"t", List(ToVector(log.s.t), rows, 7)}, {"measured", List(values[0], rows, 5)}};
+  ordered_json out{
+      {"joint", joint + 1}, {"t", List(ToVector(log.s.t), rows, 7)}, {"measured", List(values[0], rows, 5)}};
   for (std::size_t p = 0; p < predicted.size(); ++p) out[predicted[p].name] = List(values[p + 1], rows, 5);
   out["spectrum"] = SpectrumJson(log, measured, predicted);
   return out;
@@ -83,13 +87,10 @@ ordered_json CurvesJson(const DiagnosisView& v) {
   const VectorXd reach_Hz = LookedAtTo_Hz(v);
   ordered_json out = ordered_json::array();
   for (int j = 0; j < log.joints(); ++j) {
-    std::vector<JointPrediction> predicted{{"before", log.tau.col(j) - v.held_out->before.col(j)},
-                                           {"after", log.tau.col(j) - v.held_out->after.col(j)}};
-    for (JointPrediction& p : predicted)
-      p.torque = (log.used.col(j).array() != 0).select(p.torque, std::numeric_limits<double>::quiet_NaN());
-    ordered_json curves{{"joint", j + 1}, {"looked_at_to_Hz", Rounded(reach_Hz[j], 4)}};
-    curves.update(CurvesOf(log, j, predicted));
-    out.push_back(curves);
+    const std::vector<JointPrediction> predicted{{"before", log.tau.col(j) - v.held_out->before.col(j)},
+                                                 {"after", log.tau.col(j) - v.held_out->after.col(j)}};
+    out.push_back(CurvesOf(log, j, predicted));
+    out.back()["looked_at_to_Hz"] = Rounded(reach_Hz[j], 4);
   }
   return out;
 }

@@ -19,7 +19,6 @@ using nlohmann::ordered_json;
 namespace {
 
 constexpr int kAfterColour = 0, kBeforeColour = 1, kRemainsColour = 6;
-constexpr double kTwoSided95 = 1.96;         // standard deviations
 constexpr std::size_t kMostJointsFirst = 3;  // panels that a reader sees before any click
 
 std::vector<std::string> Lines(const ordered_json& array) { return array.get<std::vector<std::string>>(); }
@@ -161,12 +160,6 @@ void AddTerm(report::Page& page, const ordered_json& json, const ordered_json& t
               {"fits equally", Words(term, "fits_equally")}});
 }
 
-// "0.812 to 0.934"; "-" without a deviation.
-std::string Interval(double value, double sd) {
-  if (!(sd > 0)) return "-";
-  return report::Number(value - kTwoSided95 * sd, 4) + " to " + report::Number(value + kTwoSided95 * sd, 4);
-}
-
 void AddParameters(report::Page& page, const ordered_json& json) {
   page.Section("Parameters");
   report::Table found{{"cause", "parameter", "unit", "value", "95 % interval", ""}, {}};
@@ -175,7 +168,7 @@ void AddParameters(report::Page& page, const ordered_json& json) {
     for (const auto& [parameter, value] : term.at("parameters").items()) {
       const double sd = term.at("parameter_sd").contains(parameter) ? NumberOf(term["parameter_sd"][parameter]) : 0;
       found.rows.push_back({name, parameter, term.at("parameter_unit").at(parameter),
-                            report::Number(NumberOf(value), 4), Interval(NumberOf(value), sd),
+                            report::Number(NumberOf(value), 4), Interval95(NumberOf(value), sd),
                             term.at("marks").value(parameter, "")});
       name.clear();
     }
@@ -189,7 +182,7 @@ void AddParameters(report::Page& page, const ordered_json& json) {
   for (const ordered_json& row : json.at("declared_parameters")) {
     const double value = NumberOf(row.at("value"));
     declared.rows.push_back(
-        {row.at("name"), row.at("unit"), report::Number(value, 4), Interval(value, NumberOf(row.at("sd")))});
+        {row.at("name"), row.at("unit"), report::Number(value, 4), Interval95(value, NumberOf(row.at("sd")))});
   }
   page.Fold(fmt::format("{} parameters of the declared model, fitted to the training logs", declared.rows.size()),
             declared);
@@ -210,11 +203,10 @@ void AddDiagnosis(report::Page& page, const ordered_json& json) {
       });
 
   const bool terms = !json.at("terms").empty();
-  std::vector<ShownPrediction> shown{{"after", terms ? "after" : "predicted", report::Style::kLine, kAfterColour}};
-  if (terms) shown.insert(shown.begin(), {"before", "before", report::Style::kDashes, kBeforeColour});
-  std::vector<ShownPrediction> predicted = shown;
-  if (terms)
-    for (ShownPrediction& p : predicted) p.name = "predicted " + p.name;
+  std::vector<ShownPrediction> predicted;
+  if (terms) predicted.push_back({"before", "predicted before", "left before", report::Style::kDashes, kBeforeColour});
+  predicted.push_back({"after", terms ? "predicted after" : "predicted", terms ? "left after" : "left",
+                       report::Style::kLine, kAfterColour});
   const std::vector<int> joints = JointsToShow(json);
   page.Section("Measured against predicted torque");
   page.Add(
@@ -226,7 +218,7 @@ void AddDiagnosis(report::Page& page, const ordered_json& json) {
     for (const ordered_json& term : json["terms"]) AddTerm(page, json, term);
   }
   page.Section("Spectrum of what is left");
-  page.Add(SpectrumCharts(json, shown, joints),
+  page.Add(SpectrumCharts(json, predicted, joints),
            "Held-out log; samples without a prediction count as zero. In the grey part no effect was looked for: there "
            "the derived speeds and accelerations are filtered or mostly noise.");
   AddErrorTable(page, json);

@@ -121,17 +121,21 @@ nlohmann::ordered_json DeclaredJson(const DiagnosisView& v) {
 
 }  // namespace
 
+void AddRobot(ordered_json& json, const codegen::Robot& robot) {
+  json["robot"] = robot.name, json["robot_title"] = robot.title;
+  for (const codegen::Joint& joint : robot.joint) {
+    json["joint_names"].push_back(joint.name);
+    json["torque_units"].push_back(joint.kinematics.type == codegen::JointType::kPrismatic ? "N" : "N m");
+  }
+}
+
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   const auto& f = *v.finding;
   nlohmann::ordered_json j;
   j["verdict"] = AnyConfirmed(f) ? "effect" : "none";
   j["joint_base"] = 1;
   j["headline"] = Headline(f);
-  j["robot"] = v.model->robot().name, j["robot_title"] = v.model->robot().title;
-  for (const codegen::Joint& joint : v.model->robot().joint) {
-    j["joint_names"].push_back(joint.name);
-    j["torque_units"].push_back(joint.kinematics.type == codegen::JointType::kPrismatic ? "N" : "N m");
-  }
+  AddRobot(j, v.model->robot());
   j["terms"] = nlohmann::ordered_json::array();
   for (std::size_t n = 0; n < f.terms.size(); ++n) {
     const Term& t = f.terms[n];

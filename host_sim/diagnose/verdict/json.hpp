@@ -14,6 +14,9 @@
 
 namespace armcal::verdict {
 
+// {"robot", "robot_title", "joint_names", "torque_units"}: what a page calls the arm and its joints.
+void AddRobot(nlohmann::ordered_json& json, const codegen::Robot& robot);
+
 // The verdict, its terms with their evidence, and the errors.
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v);
 

@@ -120,6 +120,7 @@ void WriteDemoPage(const std::filesystem::path& path, const ordered_json& r) {
   page.Add(ErrorTable(r));
   page.Add(TrackingTable(r));
   page.Section("The diagnosis");
+  page.Text("What armcal diagnose said before the new model went to the drive.");
   verdict::AddDiagnosis(page, r);
   page.Section("Stages");
   std::vector<std::string> stages;

@@ -1,12 +1,11 @@
-// verdict - shows what a JSON holds: its numbers, and charts of its curves.
+// verdict - makes charts of the curves that a JSON holds.
 #include "host_sim/diagnose/verdict/curve_charts.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
-#include "host_sim/data/report/axis.hpp"
+#include "host_sim/diagnose/verdict/json_values.hpp"
 
 namespace armcal::verdict {
 
@@ -36,29 +35,6 @@ report::Live PanelsOf(const ordered_json& json, const std::vector<int>& shown, c
 }
 
 }  // namespace
-
-double NumberOf(const ordered_json& value) {
-  const double number = value.is_number() ? value.get<double>() : std::nan("");
-  return std::isfinite(number) ? number : std::nan("");
-}
-
-std::vector<double> Numbers(const ordered_json& array) {
-  std::vector<double> out;
-  for (const ordered_json& value : array) out.push_back(NumberOf(value));
-  return out;
-}
-
-std::string Interval95(double value, double sd) {
-  constexpr double kTwoSided = 1.96;
-  if (!(sd > 0)) return "-";
-  return report::Number(value - kTwoSided * sd, 4) + " to " + report::Number(value + kTwoSided * sd, 4);
-}
-
-std::string JointTitle(const ordered_json& json, int joint) {
-  const std::string own = json.at("joint_names").at(static_cast<std::size_t>(joint) - 1);
-  const std::string plain = fmt::format("joint {}", joint);
-  return own.empty() || own == plain || own == fmt::format("axis {}", joint) ? plain : plain + ", " + own;
-}
 
 report::Live TorqueCharts(const ordered_json& json, const std::vector<ShownPrediction>& predictions,
                           const std::vector<int>& shown) {

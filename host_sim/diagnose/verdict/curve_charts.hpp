@@ -1,4 +1,4 @@
-// verdict - shows what a JSON holds: its numbers, and charts of its curves.
+// verdict - makes charts of the curves that a JSON holds.
 #pragma once
 
 #include <string>
@@ -9,13 +9,6 @@
 #include "host_sim/data/report/live.hpp"
 
 namespace armcal::verdict {
-
-// A number of a JSON, and those of an array; NaN for null and for what is not finite.
-double NumberOf(const nlohmann::ordered_json& value);
-std::vector<double> Numbers(const nlohmann::ordered_json& array);
-
-// "0.812 to 0.934": a value with a standard deviation, normally distributed; "-" without a deviation.
-std::string Interval95(double value, double sd);
 
 // A prediction as CurvesOf has it, and how a chart shows it.
 struct ShownPrediction {
@@ -30,8 +23,5 @@ report::Live TorqueCharts(const nlohmann::ordered_json& json, const std::vector<
                           const std::vector<int>& shown);
 report::Live SpectrumCharts(const nlohmann::ordered_json& json, const std::vector<ShownPrediction>& predictions,
                             const std::vector<int>& shown);
-
-// "joint 2", or "joint 2, elbow" where the robot file has a name of its own. joint: from 1.
-std::string JointTitle(const nlohmann::ordered_json& json, int joint);
 
 }  // namespace armcal::verdict

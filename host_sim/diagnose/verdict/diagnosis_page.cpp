@@ -2,6 +2,7 @@
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,7 @@
 
 #include "host_sim/data/report/axis.hpp"
 #include "host_sim/diagnose/verdict/curve_charts.hpp"
+#include "host_sim/diagnose/verdict/json_values.hpp"
 
 namespace armcal::verdict {
 
@@ -64,12 +66,12 @@ void AddVerdict(report::Page& page, const ordered_json& json) {
     const auto sure = std::count_if(json["terms"].begin(), json["terms"].end(),
                                     [](const ordered_json& term) { return Holds(term, "confirmed", true); });
     page.Box(report::Tone::kWarning, fmt::format("The model lacks {} effect{}", sure, sure == 1 ? "" : "s"), causes);
-  } else if (causes.empty() && headline.starts_with("none. Nothing is missing")) {
+  } else if (causes.empty() && json.at("too_short").empty()) {
     page.Box(report::Tone::kGood, "Nothing is missing",
              "No effect of the catalogue improves the declared model by more than chance would. What these logs would "
              "have shown is in the table of errors: smallest effect seen.");
   } else {
-    page.Box(report::Tone::kNeutral, headline, causes);
+    page.Box(report::Tone::kNeutral, "Verdict: " + headline, causes);
   }
   if (json.at("payload").is_object())
     page.Box(report::Tone::kNeutral, "A payload of the held-out log", Lines(json["payload"].at("sentences")));
@@ -92,7 +94,10 @@ void AddNextSteps(report::Page& page, const ordered_json& json) {
       if (apart.at("command") != "") commands.push_back(apart["command"]);
     }
   }
-  if (json.at("terms").empty())
+  if (!json.at("too_short").empty())
+    steps.push_back(fmt::format("Record longer training logs: too few rows are left to search effects on joint {}.",
+                                fmt::join(json["too_short"].get<std::vector<int>>(), ", ")));
+  else if (json.at("terms").empty())
     steps.push_back("Keep the declared model. armcal identify --table-out makes the table that a drive takes.");
   if (!json.at("held_out_text").empty())
     steps.push_back("Record another held-out log: what this one cannot tell is listed below.");
@@ -106,6 +111,8 @@ report::Bars BarsOfErrors(const ordered_json& json) {
   report::Bars bars{{"error over torque, held-out log", "joint", "%", 460, 300}, {}, {"before", "after"}, {}, {}};
   bars.value = {Relative(json, "before_moving"), Relative(json, "after_moving")};
   bars.colours = {kBeforeColour, kAfterColour};
+  if (json.at("terms").empty())
+    bars.series = {""}, bars.value.resize(1), bars.colours = {kAfterColour};  // both are one
   for (std::size_t j = 0; j < bars.value[0].size(); ++j) bars.categories.push_back(std::to_string(j + 1));
   return bars;
 }
@@ -167,7 +174,7 @@ void AddParameters(report::Page& page, const ordered_json& json) {
     std::string name = Words(term, "name");
     for (const auto& [parameter, value] : term.at("parameters").items()) {
       const double sd = term.at("parameter_sd").contains(parameter) ? NumberOf(term["parameter_sd"][parameter]) : 0;
-      found.rows.push_back({name, parameter, term.at("parameter_unit").at(parameter),
+      found.rows.push_back({name, parameter, UnitOn(json, term.at("joints"), term.at("parameter_unit").at(parameter)),
                             report::Number(NumberOf(value), 4), Interval95(NumberOf(value), sd),
                             term.at("marks").value(parameter, "")});
       name.clear();
@@ -181,8 +188,8 @@ void AddParameters(report::Page& page, const ordered_json& json) {
   report::Table declared{{"parameter", "unit", "value", "95 % interval"}, {}};
   for (const ordered_json& row : json.at("declared_parameters")) {
     const double value = NumberOf(row.at("value"));
-    declared.rows.push_back(
-        {row.at("name"), row.at("unit"), report::Number(value, 4), Interval95(value, NumberOf(row.at("sd")))});
+    declared.rows.push_back({row.at("name"), ColumnUnit(json, row.at("name"), row.at("unit")), report::Number(value, 4),
+                             Interval95(value, NumberOf(row.at("sd")))});
   }
   page.Fold(fmt::format("{} parameters of the declared model, fitted to the training logs", declared.rows.size()),
             declared);
@@ -191,6 +198,7 @@ void AddParameters(report::Page& page, const ordered_json& json) {
 }  // namespace
 
 void AddDiagnosis(report::Page& page, const ordered_json& json) {
+  const bool terms = !json.at("terms").empty();
   page.Columns(
       [&](report::Page& left) {
         AddVerdict(left, json);
@@ -198,11 +206,10 @@ void AddDiagnosis(report::Page& page, const ordered_json& json) {
       },
       [&](report::Page& right) {
         right.Add(BarsOfErrors(json),
-                  "RMS of measured minus predicted torque over RMS of the torque, where the joint moves. Before: the "
-                  "declared model; after: with the terms.");
+                  std::string("RMS of measured minus predicted torque over RMS of the torque, where the joint moves.") +
+                      (terms ? " Before: the declared model; after: with the terms." : ""));
       });
 
-  const bool terms = !json.at("terms").empty();
   std::vector<ShownPrediction> predicted;
   if (terms) predicted.push_back({"before", "predicted before", "left before", report::Style::kDashes, kBeforeColour});
   predicted.push_back({"after", terms ? "predicted after" : "predicted", terms ? "left after" : "left",

@@ -12,6 +12,7 @@
 #include "host_sim/data/report/axis.hpp"
 #include "host_sim/data/report/page.hpp"
 #include "host_sim/diagnose/verdict/curve_charts.hpp"
+#include "host_sim/diagnose/verdict/json_values.hpp"
 
 namespace armcal::verdict {
 
@@ -80,8 +81,8 @@ void AddColumns(report::Page& page, const ordered_json& json) {
     if (!(sd > 0)) continue;
     const double ratio = row.contains("posterior_over_prior") ? NumberOf(row["posterior_over_prior"]) : std::nan("");
     (ratio > kMostlyPrior ? prior : told)
-        .rows.push_back(
-            {row.at("name"), row.at("unit"), report::Number(value, 4), Interval95(value, sd), report::Number(ratio)});
+        .rows.push_back({row.at("name"), ColumnUnit(json, row.at("name"), row.at("unit")), report::Number(value, 4),
+                         Interval95(value, sd), report::Number(ratio)});
   }
   page.Section("Parameters");
   page.Add(told);

@@ -218,6 +218,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["held_out_motion"] = ToJson(v.motion);
   j["not_looked_at"] = NotLookedAt(v);
   j["exogeneity"] = ToJson(v.exogeneity);
+  j["too_short"] = nlohmann::ordered_json::array();
+  for (const int joint : f.too_short) j["too_short"].push_back(joint + 1);
   j["held_out_text"] = MotionText(v.motion);
   j["exogeneity_text"] = ExogeneityText(v.exogeneity, kLacksMore);
   j["declared_parameters"] = DeclaredJson(v);

@@ -76,7 +76,7 @@
           panel.button = button(tools, panel.name, panel.shown, () => { panel.shown = !panel.shown; this.draw(); });
         button(tools, 'all', null, () => { for (const panel of this.panels) panel.shown = true; this.draw(); });
       }
-      for (const series of this.panels.length > 1 ? this.panels[0].series : []) {
+      for (const series of this.panels.length > 1 || this.difference ? this.panels[0].series : []) {
         const b = button(tools, series.name, true, () => {
           if (!this.hidden.delete(series.name)) this.hidden.add(series.name);
           this.draw();
@@ -152,7 +152,7 @@
 
     shade(panel, canvas, area, g) {
       for (const shade of panel.shades) {
-        const left = Math.max(g.toDomXCoord(shade.from), area.x), right = area.x + area.w;
+        const right = area.x + area.w, left = area.x + area.w * Math.max(g.toPercentXCoord(shade.from), 0);
         if (left >= right) continue;
         canvas.save();
         canvas.globalAlpha = 0.14;

@@ -4,7 +4,7 @@
 #   tests/run.sh [all]    + end-to-end tests, planted faults, firmware and wire tests under sanitizers, both Cortex-M images and their
 #                         tests under QEMU
 #   tests/run.sh long     + the long tests, all fast tests under sanitizers, fuzzing
-#   tests/run.sh peers  alone: comparisons with other people's programs, which pip installs into build/peers
+#   tests/run.sh peers  alone: comparisons with other people's programs, which pip installs into build/peers; the report in a browser
 # The last line is "N passed, M failed"; a CTest test, a build and a check count one each.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -81,6 +81,7 @@ if [[ $scope == peers ]]; then
   step "exports in MuJoCo and Pinocchio" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
   step "the Python package" build/peers/venv/bin/pip install -q --disable-pip-version-check ./host_sim/python || finish
   step "its regressor and Pinocchio" build/peers/venv/bin/python tests/peers/python_test.py build/host/armcal build/peers/python
+  step "the report in a browser" build/peers/venv/bin/python tests/peers/report_test.py build/host/armcal build/peers/report
   finish
 fi
 
@@ -126,5 +127,5 @@ fi
 if [[ $scope == long ]]; then
   if step "fuzz packages" toolchains/install.sh fuzz; then step "fuzz targets, 60 s each" tests/fuzz/fuzz.sh 60; fi
 fi
-[[ $scope == fast ]] || say "not run: tests/run.sh peers (comparisons with other people's programs)"
+[[ $scope == fast ]] || say "not run: tests/run.sh peers (comparisons with other people's programs, the report in a browser)"
 finish

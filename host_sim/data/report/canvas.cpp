@@ -62,9 +62,8 @@ void Canvas::DrawLegend(const std::vector<LegendEntry>& legend) {
   for (const LegendEntry& entry : legend) {
     if (entry.name.empty()) continue;
     Add(fmt::format(
-        "<rect class='f{}' x='{:.1f}' y='{:.1f}' width='14' height='4' rx='2'/><text class='tick' x='{:.1f}' "
-        "y='{:.1f}'>{}</text>",
-        entry.colour, x, y - 2, x + 18, y + 4, Escape(entry.name)));
+        "<path class='swatch{} s{}' d='M{:.1f} {:.1f}h16'/><text class='tick' x='{:.1f}' y='{:.1f}'>{}</text>",
+        entry.dashed ? " dash" : "", entry.colour, x, y, x + 20, y + 4, Escape(entry.name)));
     x += width(entry);
   }
 }

@@ -22,6 +22,7 @@ struct FrameText {
 struct LegendEntry {
   std::string name;
   int colour = 0;
+  bool dashed = false;
 };
 
 class Canvas {

@@ -61,7 +61,7 @@ std::string Svg(const Plot& plot) {
     if (series.x.size() != series.y.size()) throw std::invalid_argument("series '" + series.name + "': x and y differ");
     all_x.insert(all_x.end(), series.x.begin(), series.x.end());
     all_y.insert(all_y.end(), series.y.begin(), series.y.end());
-    legend.push_back({series.name, Colour(plot, s)});
+    legend.push_back({series.name, Colour(plot, s), series.style == Style::kDashes});
   }
   const Axis x(all_x, plot.logarithmic_x, false), y(all_y, plot.logarithmic_y, false);
   Canvas canvas(plot.text, legend);

@@ -13,7 +13,7 @@ constexpr std::string_view kRules =
     R"css(svg .title{font-size:13.5px;font-weight:600;fill:var(--ink)}svg .tick{fill:var(--soft)}svg .label{fill:var(--soft)}svg .number{fill:var(--soft);font-size:9.5px}
 svg .grid{stroke:var(--rule);stroke-width:.6;fill:none}svg .zero{stroke:var(--soft);stroke-width:.8;fill:none}
 svg .axis{stroke:var(--soft);stroke-width:1;fill:none}svg .shade{fill:var(--soft);fill-opacity:.14}
-svg .line{fill:none;stroke-width:1.3;stroke-linejoin:round}svg .dash{stroke-dasharray:5 3}
+svg .line{fill:none;stroke-width:1.3;stroke-linejoin:round}svg .swatch{stroke-width:3}svg .dash{stroke-dasharray:5 3}
 svg .dots{fill:none;stroke-width:3.4;stroke-linecap:round;stroke-opacity:.55}
 )css";
 

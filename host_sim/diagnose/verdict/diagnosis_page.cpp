@@ -61,7 +61,7 @@ void AddVerdict(report::Page& page, const ordered_json& json) {
   const std::string& headline = json.at("headline").get_ref<const std::string&>();
   std::vector<std::string> causes;
   for (const ordered_json& term : json.at("terms"))
-    causes.push_back(Words(term, "cause") + Words(term, "remark") + ".");
+    causes.push_back(Words(term, "cause") + Words(term, "remark") + ". " + Words(term, "title") + ".");
   if (json.at("verdict") == "effect") {
     const auto sure = std::count_if(json["terms"].begin(), json["terms"].end(),
                                     [](const ordered_json& term) { return Holds(term, "confirmed", true); });

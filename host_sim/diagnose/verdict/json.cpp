@@ -96,6 +96,7 @@ nlohmann::ordered_json WordsJson(const DiagnosisView& v, std::size_t term) {
   const Term& t = v.finding->terms[term];
   return {{"name", fmt::format("{}, joint {}", t.record->kind, JointName(t))},
           {"remark", Remark(t)},
+          {"title", t.record->title},
           {"what_it_is", t.record->title + ". " + t.record->source + "."},
           {"cause", CauseText(v, term)},
           {"to_do", WhatToDo(t)},

@@ -8,13 +8,14 @@
     return parent.appendChild(Object.assign(document.createElement(tag), properties));
   }
 
-  // A number with four digits that a person can read.
-  function text(value) {
+  // A number that a person can read.
+  function number(value, digits) {
     if (value === null || value === undefined || Number.isNaN(value)) return '-';
     const size = Math.abs(value);
     if (size !== 0 && (size >= 1e6 || size < 1e-4)) return value.toExponential(2);
-    return String(Number(value.toPrecision(4)));
+    return String(Number(value.toPrecision(digits)));
   }
+  const text = value => number(value, 4);
 
   // "torque / N m" -> ["torque", "N m"].
   function label(words) {
@@ -116,7 +117,7 @@
         swatch(add(panel.head, 'span', {className: 'value', textContent: series.name + value}), series);
       });
       const what = (this.asDifference ? this.difference : y) + (yUnit ? ' in ' + yUnit : '');
-      const at = values ? ', at ' + x + ' ' + text(values[0]) + ' ' + xUnit : ' over ' + x + (xUnit ? ' in ' + xUnit : '');
+      const at = values ? ', at ' + x + ' ' + number(values[0], 6) + ' ' + xUnit : ' over ' + x + (xUnit ? ' in ' + xUnit : '');
       add(panel.head, 'span', {className: 'unit', textContent: what + at});
     }
 

@@ -65,6 +65,7 @@ nb::object ToDict(const ordered_json& json) { return nb::module_::import_("json"
 void AddMotion(const calibration::HeldOutMotion& motion, ordered_json& json, Notes& notes) {
   for (const std::string& line : verdict::MotionText(motion)) notes.push_back(line);
   json["held_out_motion"] = verdict::ToJson(motion);
+  json["held_out_text"] = verdict::MotionText(motion);
 }
 
 nb::object Identify(const codegen::Model& model, nb::handle train, nb::handle test, double cutoff_Hz, double band_Hz,
@@ -84,9 +85,10 @@ nb::object Identify(const codegen::Model& model, nb::handle train, nb::handle te
     json.update(found.ToJson());
     if (!held_out.empty()) {
       const calibration::Dataset judged = analysis::CheckedLogs(model, held_out, cutoff_Hz, Into(notes))[0];
-      json["held_out"] = verdict::ToJson(
-          verdict::CompareHeldOut(judged, calibration::Predict(model, judged, found.x(), found.eta()), band_Hz));
+      json.update(found.Compare(judged, true, band_Hz).json);
       AddMotion(calibration::CompareMotion(model, found.all, calibration::Pointers(data), judged), json, notes);
+    } else {
+      json.update(found.Compare(data[0], false, 0).json);
     }
   }
   Warn(notes);

@@ -7,10 +7,8 @@
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/analysis/identified.hpp"
-#include "host_sim/diagnose/verdict/curves.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/identification_page.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 #include "host_sim/identify/calibration/payload.hpp"
 #include "host_sim/identify/calibration/table_ceilings.hpp"
@@ -292,15 +290,6 @@ struct IdentifyOptions {
   PayloadOptions payload;
 };
 
-const char* const kLacksTerm = "the model lacks a term: armcal diagnose";
-
-// Measured and predicted torque of a log, for a page.
-void AddCurves(const calibration::Dataset& log, const Eigen::MatrixXd& predicted, nlohmann::ordered_json& json) {
-  json["curves_of"] = log.source;
-  for (int j = 0; j < log.joints(); ++j)
-    json["curves"].push_back(verdict::CurvesOf(log, j, {{"predicted", predicted.col(j)}}));
-}
-
 std::string Significant(double v) { return fmt::format("{:.5g}", v); }
 
 void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
@@ -340,7 +329,7 @@ int RunIdentify(const IdentifyOptions& o) {
   analysis::Identified found(model, train);
   PrintColumns(model, found.all);
   const calibration::Exogeneity& exogeneity = found.exogeneity;
-  fmt::print("{}", verdict::ExogeneityText(exogeneity, kLacksTerm));
+  fmt::print("{}", verdict::ExogeneityText(exogeneity, analysis::kLacksTerm));
   if (o.method == "auto" && !exogeneity.passed() && exogeneity.instruments == calibration::kSimulatedLoop) {
     method.method = "instrumental_variable", method.exogeneity = verdict::ToJson(exogeneity);
     return RunMethod(method);
@@ -357,22 +346,16 @@ int RunIdentify(const IdentifyOptions& o) {
   }
   nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}};
   json.update(found.ToJson());
-  verdict::AddRobot(json, model.robot());
-  json["exogeneity_text"] = verdict::ExogeneityText(exogeneity, kLacksTerm);
   if (!o.table.empty()) json["table_file"] = o.table;
   if (!o.test.empty()) {
     const calibration::Dataset test = read.One(o.test);
-    const Eigen::MatrixXd predicted = calibration::Predict(model, test, found.x(), found.eta());
-    const verdict::HeldOutError e = verdict::CompareHeldOut(test, predicted, o.band_Hz);
-    verdict::PrintHeldOut(e, o.test);
+    const analysis::Identified::OnLog held_out = found.Compare(test, true, o.band_Hz);
+    verdict::PrintHeldOut(held_out.error, o.test);
     json["test"] = o.test;
-    json["held_out"] = verdict::ToJson(e);
+    json.update(held_out.json);
     AddMotion(calibration::CompareMotion(model, found.all, calibration::Pointers(train), test), json);
-    AddCurves(test, predicted, json);
   } else {
-    const Eigen::MatrixXd predicted = calibration::Predict(model, train[0], found.x(), found.eta());
-    json["on_training"] = verdict::ToJson(verdict::CompareHeldOut(train[0], predicted, 0));
-    AddCurves(train[0], predicted, json);
+    json.update(found.Compare(train[0], false, 0).json);
   }
   WriteJson(o.json, json);
   if (!o.report.empty()) {

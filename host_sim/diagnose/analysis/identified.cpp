@@ -1,7 +1,8 @@
 // analysis - identifies the declared model.
 #include "host_sim/diagnose/analysis/identified.hpp"
 
-#include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/diagnose/verdict/curves.hpp"
+#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 
 namespace armcal::analysis {
@@ -76,14 +77,26 @@ void Identified::ReadOut(const std::vector<calibration::Dataset>& train, bool fo
   has_bodies = true;
 }
 
+Identified::OnLog Identified::Compare(const calibration::Dataset& log, bool held_out, double band_Hz) const {
+  const Eigen::MatrixXd predicted = calibration::Predict(model, log, x(), eta());
+  OnLog out{verdict::CompareHeldOut(log, predicted, band_Hz), {}};
+  out.json[held_out ? "held_out" : "on_training"] = verdict::ToJson(out.error);
+  for (int j = 0; j < log.joints(); ++j)
+    out.json["curves"].push_back(verdict::CurvesOf(log, j, {{"predicted", predicted.col(j)}}));
+  return out;
+}
+
 ordered_json Identified::ToJson() const {
-  ordered_json json{{"columns", Columns(model, all)}};
+  ordered_json json;
+  verdict::AddRobot(json, model.robot());
+  json["columns"] = Columns(model, all);
   for (int j = 0; j < model.joints(); ++j) {
     json["sigma_Nm"].push_back(all.sigma[j]);
     json["torque_gain"].push_back(1 + all.x[model.columns() + j]);
   }
   if (model.nonlinear() > 0) json["nonlinear"] = Nonlinear(model, all.eta);
   json["exogeneity"] = verdict::ToJson(exogeneity);
+  json["exogeneity_text"] = verdict::ExogeneityText(exogeneity, kLacksTerm);
   if (!has_bodies) return json;
   json["link_widths"] = {{"relative", std::vector<double>(read.widths.relative.begin(), read.widths.relative.end())},
                          {"center_m", read.widths.center_m},

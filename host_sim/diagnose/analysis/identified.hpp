@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/identify/calibration/barrier_fit.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
@@ -12,6 +13,8 @@
 #include "host_sim/identify/methods/link_widths.hpp"
 
 namespace armcal::analysis {
+
+inline constexpr const char* kLacksTerm = "the model lacks a term: armcal diagnose";
 
 // Bodies read out with the widths that the logs themselves show, and the table that follows. A link's parameter rests
 // on the prior where the logs narrow these widths little.
@@ -35,6 +38,13 @@ struct Identified {
   const Eigen::VectorXd& x() const { return has_bodies ? read.bodies.x : all.x; }
   const std::vector<double>& eta() const { return used.eta; }
   nlohmann::ordered_json ToJson() const;
+  // The error on a log, and what the JSON says of it: the error as "held_out" or, of a training log, as "on_training";
+  // and measured and predicted torque for a page.
+  struct OnLog {
+    verdict::HeldOutError error;
+    nlohmann::ordered_json json;
+  };
+  OnLog Compare(const calibration::Dataset& log, bool held_out, double band_Hz) const;
 
   const codegen::Model& model;
   calibration::Fit all, used;

@@ -104,7 +104,7 @@ void WriteIdentificationPage(const std::filesystem::path& path, const ordered_js
                });
   const std::vector<double> percent = Percent(json);
   const int worst = static_cast<int>(std::max_element(percent.begin(), percent.end()) - percent.begin()) + 1;
-  const std::string log = json.at("curves_of");
+  const std::string log = IsHeldOut(json) ? json["test"] : json.at("train").at(0);
   const std::vector<ShownPrediction> predicted{
       {"predicted", "predicted", "left", report::Style::kLine, kPredictedColour}};
   page.Section("Measured against predicted torque");

@@ -36,8 +36,6 @@ std::string Draw(const Series& series, int colour, const Axis& x, const Axis& y,
     }
     if (series.style == Style::kPoints) {
       fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h0", px, py);  // a round cap makes a dot of it
-    } else if (series.style == Style::kSteps && pen_down) {
-      fmt::format_to(std::back_inserter(path), "H{:.1f}V{:.1f}", px, py);
     } else {
       fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', px, py);
     }

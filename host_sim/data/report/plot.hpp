@@ -8,7 +8,7 @@
 
 namespace armcal::report {
 
-enum class Style { kLine, kDashes, kPoints, kSteps };
+enum class Style { kLine, kDashes, kPoints };
 
 // y over x, same length. NaN breaks a line. A long line is thinned to its lowest and highest sample per stretch, so
 // that no peak is lost; points are thinned evenly.

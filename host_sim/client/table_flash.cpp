@@ -174,7 +174,9 @@ FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words,
 }
 
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive) {
-  return drive.Read(SpanOf(reg::kActiveTable, drive.ReadIdentity().table_words));
+  const Identity id = drive.ReadIdentity();
+  const int words = id.map_minor < kMinorOfLayout2 ? id.table_words : drive.ReadValue<reg::kActiveWords>();
+  return drive.Read(SpanOf(reg::kActiveTable, words));
 }
 
 }  // namespace armcal::client

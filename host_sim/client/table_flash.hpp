@@ -10,6 +10,9 @@
 
 namespace armcal::client {
 
+// The first minor version of the register map whose drives take tables of layout version 2.
+inline constexpr int kMinorOfLayout2 = 5;
+
 struct FlashReport {
   std::uint32_t crc = 0;             // of the table, as the drive reads it back
   std::uint32_t generation = 0;      // of the adoption
@@ -20,9 +23,9 @@ struct FlashReport {
 using FlashProgress = std::function<void(double share)>;
 
 // Unlocks, opens, stages the words, checks, saves, waits and reads back. If another client is writing, it waits for the
-// seat. If the connection breaks or a word is damaged on the way, it begins anew. `words`: the layout of model/parameters.hpp,
-// whose first two words are the schema. Throws RefusedError (the table before it stays in force and stored),
-// VerifyError (the drive says that the table is active, but it reads back otherwise) and LinkError.
+// seat. If the connection breaks or a word is damaged on the way, it begins anew. `words`: the layout of
+// model/parameters.hpp, whose first two words are the schema. Throws RefusedError (the table before it stays in force
+// and stored), VerifyError (the drive says that the table is active, but it reads back otherwise) and LinkError.
 FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress = {});
 
 // The table in force.

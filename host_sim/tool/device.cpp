@@ -130,19 +130,22 @@ ordered_json ValueOf(const Register& r, const std::uint16_t* w) {
 }
 
 // How many elements the drive has of a register.
-int Elements(const client::Identity& id, const Register& r) {
+int Elements(client::DriveClient& drive, const Register& r) {
+  const client::Identity id = drive.ReadIdentity();
   const std::string name = r.name;
   if (name == "residual_rms" || name == "consistency") return id.axes;
   if (name.rfind("estimate_", 0) == 0 || name.rfind("deviation_", 0) == 0) return id.columns;
-  if (name == "active_table" || name == "staged_table") return id.table_words;
-  return r.count;
+  const bool active = name == "active_table";
+  if (!active && name != "staged_table") return r.count;
+  if (id.map_minor < client::kMinorOfLayout2) return id.table_words;
+  return active ? drive.ReadValue<reg::kActiveWords>() : drive.ReadValue<reg::kTableRoom>();
 }
 
 ordered_json ReadRegister(client::DriveClient& drive, const Named& named) {
   const Register& r = *named.r;
   const int size = link::WordsOf(r.type);
   const int first = named.element < 0 ? 0 : named.element;
-  const int count = named.element < 0 ? Elements(drive.ReadIdentity(), r) : 1;
+  const int count = named.element < 0 ? Elements(drive, r) : 1;
   const auto words = r.kind == RegisterKind::kInput ? drive.ReadInput(r + first * size, count * size)
                                                     : drive.ReadHolding(r + first * size, count * size);
   ordered_json values = ordered_json::array();

@@ -39,7 +39,13 @@ std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptio
     if (!row.from_prior || static_cast<int>(k) < model.body_parameters()) continue;  // bodies are one physical set
     row.mean = o.force ? row.free_mean : active.row[k].mean;
   }
-  return calibration::EncodeTable(sent);
+  std::vector<std::uint16_t> words = calibration::EncodeTable(sent);
+  if (words[2] > 1 && drive.ReadIdentity().map_minor < client::kMinorOfLayout2)
+    throw io::InputError(
+        fmt::format("{}: gate_sigma: {} does not know it; expected a drive of map 1.{} or newer, or a "
+                    "table without this key",
+                    o.table, drive.name(), client::kMinorOfLayout2));
+  return words;
 }
 
 int Flash(const FlashOptions& o) {
@@ -90,7 +96,7 @@ int Verify(const FlashOptions& o) {
       fmt::print("{}: drive {:.9g} {}, file {:.9g} {}\n", is.row[k].name, is.row[k].mean, is.row[k].state,
                  wanted.row[k].mean, wanted.row[k].state);
     }
-  const bool same = active == words;
+  const bool same = calibration::EncodeTable(is) == words;
   fmt::print("{}: {}\n", drive.name(),
              same ? "the table in force is this file's"
                   : fmt::format("differs in {} parameters{}", differ, differ ? "" : " (joint settings or flags)"));
@@ -128,9 +134,8 @@ void AddVerify(CLI::App& app, Action& action) {
                          "compare the table in force with a file\nexample: armcal verify --connect 127.0.0.1:1502 "
                          "--robot er20_like --table build/table.toml",
                          o);
-  verb->callback([o, &action] {
-    action = [o] { return Reported(o->json, [&] { return Verify(*o); }, {{"same", false}}); };
-  });
+  verb->callback(
+      [o, &action] { action = [o] { return Reported(o->json, [&] { return Verify(*o); }, {{"same", false}}); }; });
 }
 
 }  // namespace armcal::tool

@@ -181,7 +181,8 @@ void Table(const std::uint8_t* bytes, std::size_t count) {
   std::vector<std::uint16_t> words(estimator::Table<Model>::kWords);
   model::Encode(estimator::DefaultTable<Model>(), words.data());
   for (Source in{bytes, count}; in.left > 0;) words[in.Word() % words.size()] = in.Word();
-  const bool head = core::IsOk(model::CheckHeading<Model::kJoints, Model::kParameters>(words.data(), Model::kSchema));
+  const bool head = core::IsOk(model::CheckHeading<Model::kJoints, Model::kParameters>(
+      words.data(), static_cast<int>(words.size()), Model::kSchema));
   if (!head || !core::IsOk(model::CheckWords(model::View(Model::kCeilings), true, words.data()).status)) return;
   estimator::Table<Model> table;
   if (!core::IsOk(model::Decode(words.data(), Model::kSchema, table))) return;

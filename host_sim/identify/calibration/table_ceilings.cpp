@@ -103,7 +103,10 @@ core::Refusal JudgeGrid(const codegen::Model& m, const Ceilings& c, const model:
 
 std::string WordName(const TableFile& t, int word) {
   const int joints = static_cast<int>(t.joint.size()), parameters = static_cast<int>(t.row.size());
-  if (word >= model::WordOfParameter(joints, parameters)) return fmt::format("word {}", word);
+  if (word >= model::WordOfGate(joints, parameters, joints)) return fmt::format("word {}", word);
+  if (word >= model::WordOfGate(joints, parameters, 0))
+    return fmt::format("joint {}: gate_sigma",
+                       (word - model::WordOfGate(joints, parameters, 0)) / model::kGateWords + 1);
   if (word >= model::WordOfParameter(joints, 0)) {
     const int k = word - model::WordOfParameter(joints, 0);
     const char* const part[] = {"mean", "mean", "sd", "sd", "process_noise", "process_noise", "state and group", "end"};

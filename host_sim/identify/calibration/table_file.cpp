@@ -22,6 +22,12 @@ int StateNumber(const std::string& s) {
   throw io::InputError("state " + s + ": expected estimated, considered, fixed or standby");
 }
 
+std::size_t WordsOfLayout(const TableFile& t, int version) {
+  using namespace model;
+  const std::size_t first = kHeaderWords + t.joint.size() * kJointWords + t.row.size() * kParameterWords;
+  return version == kFirstLayout ? first : first + t.joint.size() * kGateWords + kSealWords;
+}
+
 }  // namespace
 
 TableFile DefaultTable(const codegen::Model& model) {
@@ -78,10 +84,11 @@ TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const Fit
 
 std::vector<std::uint16_t> EncodeTable(const TableFile& t) {
   using namespace model;
-  std::vector<std::uint16_t> out(kHeaderWords + t.joint.size() * kJointWords + t.row.size() * kParameterWords, 0);
+  const bool gated = std::any_of(t.joint.begin(), t.joint.end(), [](const TableJoint& j) { return j.gate_sigma != 0; });
+  std::vector<std::uint16_t> out(WordsOfLayout(t, gated ? kLayoutVersion : kFirstLayout), 0);
   std::uint16_t* w = out.data();
   core::PutU32(w, t.schema);
-  w[2] = kLayoutVersion;
+  w[2] = gated ? kLayoutVersion : kFirstLayout;
   w[3] = static_cast<std::uint16_t>(t.joint.size());
   w[4] = static_cast<std::uint16_t>(t.row.size());
   w[5] = t.bumpless ? kFlagBumpless : 0;
@@ -100,16 +107,22 @@ std::vector<std::uint16_t> EncodeTable(const TableFile& t) {
     w[6] = static_cast<std::uint16_t>(StateNumber(r.state) << 8 | r.group);
     w += kParameterWords;
   }
+  for (std::size_t j = 0; gated && j < t.joint.size(); ++j, w += kGateWords)
+    core::PutF32(w, static_cast<float>(t.joint[j].gate_sigma));
   return out;
 }
 
 TableFile DecodeTable(const std::vector<std::uint16_t>& words, const TableFile& like) {
   using namespace model;
   TableFile t = like;
-  const std::size_t expected = kHeaderWords + t.joint.size() * kJointWords + t.row.size() * kParameterWords;
-  if (words.size() != expected || core::GetU32(words.data()) != like.schema)
-    throw io::InputError("table: " + std::to_string(words.size()) + " words, expected " + std::to_string(expected) +
-                         " of schema " + fmt::format("{:08X}", like.schema));
+  const int version = words.size() < kHeaderWords ? 0 : words[2];
+  if (version < kFirstLayout || version > kLayoutVersion || words.size() != WordsOfLayout(like, version) ||
+      core::GetU32(words.data()) != like.schema)
+    throw io::InputError(
+        fmt::format("table: {} words of layout version {}, expected {} of version {} or {} of version "
+                    "{}, and schema {:08X}",
+                    words.size(), version, WordsOfLayout(like, kFirstLayout), kFirstLayout,
+                    WordsOfLayout(like, kLayoutVersion), kLayoutVersion, like.schema));
   const std::uint16_t* w = words.data();
   t.bumpless = w[5] & kFlagBumpless;
   t.blend_ms = core::GetU32(w + 6);
@@ -127,6 +140,8 @@ TableFile DecodeTable(const std::vector<std::uint16_t>& words, const TableFile& 
     r.group = w[6] & 0xFF;
     w += kParameterWords;
   }
+  for (std::size_t j = 0; j < t.joint.size(); ++j)
+    t.joint[j].gate_sigma = version == kFirstLayout ? 0.0 : double{core::GetF32(w + j * kGateWords)};
   return t;
 }
 
@@ -156,9 +171,11 @@ void WriteTable(const std::filesystem::path& path, const TableFile& t) {
       "robot = \"{}\"\nnote = \"{}\"\nschema = {}\nbumpless = {}\nblend_ms = {}\nforgetting = [{}, {}, {}, {}]\n",
       t.robot, t.note, t.schema, t.bumpless, t.blend_ms, number(t.forgetting[0]), number(t.forgetting[1]),
       number(t.forgetting[2]), number(t.forgetting[3]));
-  for (const TableJoint& j : t.joint)
+  for (const TableJoint& j : t.joint) {
     o += fmt::format("\n[[joint]]\nsigma_Nm = {}\nv_min_radps = {}\ntorque_limit_Nm = {}\ntorque_scale = {}\n",
                      number(j.sigma_Nm), number(j.v_min_radps), number(j.torque_limit_Nm), number(j.torque_scale));
+    if (j.gate_sigma != 0) o += fmt::format("gate_sigma = {}\n", number(j.gate_sigma));
+  }
   for (const TableRow& r : t.row) {
     o += fmt::format(
         "\n[[parameter]]\nname = \"{}\"\nunit = \"{}\"\nmean = {}\nsd = {}\nprocess_noise = {}\nstate = \"{}\"\ngroup "
@@ -191,9 +208,9 @@ TableFile ReadTable(const std::filesystem::path& path) {
   const auto forgetting = in.Numbers("forgetting", 4);
   std::copy(forgetting.begin(), forgetting.end(), t.forgetting);
   for (const auto& j : in.Tables("joint")) {
-    j.AllowOnly({"sigma_Nm", "v_min_radps", "torque_limit_Nm", "torque_scale"});
-    t.joint.push_back(
-        {j.Positive("sigma_Nm"), j.Positive("v_min_radps"), j.Positive("torque_limit_Nm"), j.Positive("torque_scale")});
+    j.AllowOnly({"sigma_Nm", "v_min_radps", "torque_limit_Nm", "torque_scale", "gate_sigma"});
+    t.joint.push_back({j.Positive("sigma_Nm"), j.Positive("v_min_radps"), j.Positive("torque_limit_Nm"),
+                       j.Positive("torque_scale"), j.Has("gate_sigma") ? j.Positive("gate_sigma") : 0.0});
   }
   for (const auto& p : in.Tables("parameter")) {
     p.AllowOnly(

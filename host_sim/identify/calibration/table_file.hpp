@@ -21,6 +21,7 @@ struct TableRow {
 
 struct TableJoint {
   double sigma_Nm = 0, v_min_radps = 0, torque_limit_Nm = 0, torque_scale = 1;
+  double gate_sigma = 0;  // of the drive's row gate, in standard deviations; 0: the firmware's own
 };
 
 struct TableFile {
@@ -50,7 +51,8 @@ std::vector<int> HardlyDetermined(const codegen::Model& model, const Fit& fit);
 TableFile ReadTable(const std::filesystem::path& path);
 void WriteTable(const std::filesystem::path& path, const TableFile& table);
 
-// The byte layout of armcal/model/parameters.hpp as 16-bit words, and back (names, units come from `like`).
+// The layout of armcal/model/parameters.hpp as 16-bit words, and back (names, units come from `like`). A table that
+// gives no joint a gate is encoded as version 1, which every drive reads.
 std::vector<std::uint16_t> EncodeTable(const TableFile& table);
 TableFile DecodeTable(const std::vector<std::uint16_t>& words, const TableFile& like);
 

@@ -34,8 +34,10 @@ using BodyReadOut = physical::MapReadOut<Model, double>;
 class HostPort {
  public:
   explicit HostPort(const std::vector<std::uint16_t>& words) {
-    if (words.size() != static_cast<std::size_t>(estimator::Table<Model>::kWords))
-      throw io::InputError("table: not of this model's size");
+    const int count = static_cast<int>(words.size());
+    if (count < model::kHeaderWords ||
+        !core::IsOk(model::CheckHeading<n, Model::kParameters>(words.data(), count, Model::kSchema)))
+      throw io::InputError("table: not of this model's schema and size");
     const core::Status decoded = model::Decode(words.data(), Model::kSchema, table_);
     if (!core::IsOk(decoded))
       throw io::InputError("table: refused as on the drive, status " + std::to_string(static_cast<int>(decoded)));

@@ -41,7 +41,8 @@ class Controller {
  public:
   static constexpr int n = Model::kJoints;
   static constexpr int kFilters = sizeof...(Filters);
-  static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
+  static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords,
+                                 kFirstWords = estimator::Table<Model>::kFirstWords;  // of layout version 1
   using Ceilings = model::Ceilings<n, Model::kParameters>;
 
   // `identity`: versions, texts and further capabilities, which are the integrator's. This class fills in the rest from
@@ -51,11 +52,11 @@ class Controller {
       : clock_(clock),
         rules_(rules),
         ceilings_(model::View(ceilings)),
-        store_(storage, Model::kSchema, kWords),
+        store_(storage, Model::kSchema, kWords, kFirstWords),
         transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords, rules.saves),
         device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals}),
         estimators_(Shared<Filters>()...) {
-    model::Encode(estimator::DefaultTable<Model>(), active_);
+    model::Encode(estimator::DefaultTable<Model>(), active_, model::kFirstLayout);  // as clients of any age read it
     estimator<0>().SetResiduals(&residuals_);
   }
   Controller(const Controller&) = delete;
@@ -253,11 +254,12 @@ class Controller {
   // The calls of link::TableApplication, which link::TableTransaction makes when a table is flashed. Check decodes and
   // builds the table, once and in slices. What it has built waits in the spare until it is adopted or until another
   // table is checked. Context: background.
-  static core::Refusal Check(void* self, const std::uint16_t* words, bool first) {
+  static core::Refusal Check(void* self, const std::uint16_t* words, std::uint16_t count, bool first) {
     auto& c = *static_cast<Controller*>(self);
     c.table_slice_ = true;
     c.spare_is_checked_ = false;
-    if (first) c.check_.Begin(words, c.ceilings_, c.rules_.adopt_while_enabled, c.generation_ + 1, &Suits, c.Spare());
+    if (first)
+      c.check_.Begin(words, count, c.ceilings_, c.rules_.adopt_while_enabled, c.generation_ + 1, &Suits, c.Spare());
     const core::Refusal refusal = c.check_.Step();
     c.spare_is_checked_ = core::IsOk(refusal.status);
     return refusal;

@@ -13,13 +13,14 @@ class TableCheck {
  public:
   static constexpr int n = Model::kJoints;
 
-  // `words`: a table in its layout. It must not change until the end. ceilings, bumpless_allowed: see
+  // `words` [count]: a table in its layout. It must not change until the end. ceilings, bumpless_allowed: see
   // model::CheckWords. generation: the number of the coming adoption. suits: says whether the filters can hold what the
   // table asks for. `spare`: the check fills it in; nobody else may use it until the end.
-  void Begin(const std::uint16_t* words, const model::CeilingView& ceilings, bool bumpless_allowed,
+  void Begin(const std::uint16_t* words, int count, const model::CeilingView& ceilings, bool bumpless_allowed,
              std::uint32_t generation, bool (*suits)(const estimator::AdoptedTable<Model>&),
              estimator::AdoptedTable<Model>& spare) {
     words_ = words;
+    count_ = count;
     ceilings_ = ceilings;
     bumpless_allowed_ = bumpless_allowed;
     generation_ = generation;
@@ -36,7 +37,7 @@ class TableCheck {
     core::Refusal refusal;
     switch (stage_) {
       case Stage::kWords:
-        refusal.status = model::CheckHeading<n, Model::kParameters>(words_, Model::kSchema);
+        refusal.status = model::CheckHeading<n, Model::kParameters>(words_, count_, Model::kSchema);
         if (core::IsOk(refusal.status)) refusal = model::CheckWords(ceilings_, bumpless_allowed_, words_);
         return Next(Stage::kDecode, refusal);
       case Stage::kDecode:
@@ -93,7 +94,7 @@ class TableCheck {
   model::Memory<Model> memory_;
   model::Rows<Model> rows_;
   std::uint32_t generation_ = 0;
-  int point_ = 0;
+  int count_ = 0, point_ = 0;
   bool bumpless_allowed_ = false;
   Stage stage_ = Stage::kWords;
 };

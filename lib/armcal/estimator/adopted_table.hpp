@@ -240,7 +240,8 @@ class TableBuild {
       c.v_min_radps[i] = table_->joint[i].v_min_radps;
       c.torque_scale[i] = table_->joint[i].torque_scale;
       adopted_->sigma_Nm[i] = table_->joint[i].sigma_Nm;
-      adopted_->gate_sigma[i] = kGateSigma;
+      const float gate = table_->joint[i].gate_sigma;
+      adopted_->gate_sigma[i] = gate > 0.0f ? gate : kGateSigma;
     }
   }
 

@@ -5,8 +5,8 @@
 
 namespace armcal::estimator {
 
-// A row is refused if it differs from the expected value by more than this many standard deviations. The gate learns
-// the standard deviation from the earlier rows of the joint.
+// A row is refused if it differs from the expected value by more than this many standard deviations, unless the table
+// gives the joint another number. The gate learns the standard deviation from the earlier rows of the joint.
 inline constexpr float kGateSigma = 5.0f;
 
 // The same gate for every filter. For each joint it compares two numbers of a row with their mean squares over earlier

@@ -21,6 +21,7 @@ Status Device::ServeOwn() {
       FilledBlock<reg::kStatusBlock, &Device::FillStatus>(this),
       FilledBlock<reg::kDoubtBlock, &Device::FillDoubt>(this),
       FilledBlock<reg::kWritingBlock, &Device::FillWriting>(this),
+      FilledBlock<reg::kTableBlock, &Device::FillTable>(this),
       DirectBlock<&Device::ReadOverview>(SpanOf(reg::kOverview), this),
       FilledBlock<reg::kResidualHeaderBlock, &Device::FillResidualHeader>(this),
       DirectBlock<&FloatList::Read>(reg::kResidualValuesBlock, &residual_values_),
@@ -70,7 +71,7 @@ void Device::FillIdentity(Words<reg::kIdentityBlock>& w) {
   w.Set<reg::kAxes>(identity_.axes);
   w.Set<reg::kParameters>(identity_.parameters);
   w.Set<reg::kColumns>(identity_.columns);
-  w.Set<reg::kTableWords>(transaction_.words());
+  w.Set<reg::kTableWords>(static_cast<std::uint16_t>(transaction_.store().shortest()));
   w.Set<reg::kCapabilities>(identity_.capabilities);
   w.Set<reg::kTickRate>(identity_.tick_rate_Hz);
   w.Set<reg::kSampleTicks>(identity_.sample_ticks);
@@ -125,6 +126,11 @@ void Device::FillWriting(Words<reg::kWritingBlock>& w) {
   const bool there = writer != Sessions::kNobody && map_.sessions().IsPresent(writer);
   w.Set<reg::kWriterSeat>(static_cast<std::uint16_t>(Seated() ? 1 : there ? 2 : 0));
   w.Set<reg::kSaveWait>(static_cast<std::uint16_t>((transaction_.save_wait_ms() + 999) / 1000));
+}
+
+void Device::FillTable(Words<reg::kTableBlock>& w) {
+  w.Set<reg::kTableRoom>(transaction_.words());
+  w.Set<reg::kActiveWords>(transaction_.active_words());
 }
 
 Status Device::ReadOverview(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {

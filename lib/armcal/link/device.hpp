@@ -111,6 +111,7 @@ class Device {
   void FillIdentity(Words<reg::kIdentityBlock>& w);
   void FillWriting(Words<reg::kWritingBlock>& w);
   void FillStatus(Words<reg::kStatusBlock>& w);
+  void FillTable(Words<reg::kTableBlock>& w);
   void FillDoubt(Words<reg::kDoubtBlock>& w);
   void FillUnlock(Words<reg::kUnlock>& w);
   core::Status TakeUnlock(const Words<reg::kUnlock>& w);

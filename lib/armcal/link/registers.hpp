@@ -119,7 +119,7 @@ inline constexpr std::uint16_t kVendor = 0x8000;
 
 // Values that never change.
 inline constexpr std::uint32_t kMagicValue = 0x41524D43;  // "ARMC"
-inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 4;
+inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 5;
 inline constexpr float kProbeFloatValue = 123456.789f;  // reads 123456.79 only with the right word order
 inline constexpr std::uint32_t kProbeU32Value = 0x12345678;
 
@@ -150,7 +150,7 @@ inline constexpr Register kProbeU32 = In(0x000E, 1, kU32, "probe_u32", "", "0x12
 inline constexpr Register kAxes = In(0x0010, 1, kU16, "axes", "", "joints of the model");
 inline constexpr Register kParameters = In(0x0011, 1, kU16, "parameters", "", "entries of the parameter table");
 inline constexpr Register kColumns = In(0x0012, 1, kU16, "columns", "", "filter coordinates: estimates served");
-inline constexpr Register kTableWords = In(0x0013, 1, kU16, "table_words", "", "registers of the staged and the active table");
+inline constexpr Register kTableWords = In(0x0013, 1, kU16, "table_words", "", "registers of a table of layout version 1");
 inline constexpr Register kCapabilities = In(0x0014, 1, kU32, "capabilities", "", "bits: 1 filter A, 2 filter B, 4 raw trace, 8 sample trace, 16 feed-forward, 32 monitor, 64 residual statistics, 128 learning, 256 packed raw records");
 inline constexpr Register kTickRate = In(0x0016, 1, kU32, "tick_rate", "Hz", "control ticks a second");
 inline constexpr Register kSampleTicks = In(0x0018, 1, kU16, "sample_ticks", "", "control ticks of one estimator sample");
@@ -197,6 +197,9 @@ inline constexpr Register kRefusedBound = In(0x0074, 1, kF32, "refused_bound", "
 inline constexpr Register kWriterSeat = In(0x0076, 1, kU16, "writer_seat", "", "0 free, 1 this connection writes, 2 another one does");
 inline constexpr Register kSaveWait = In(0x0077, 1, kU16, "save_wait", "s", "until the board allows the next save, 0: now");
 inline constexpr Span kWritingBlock = Between(kRefusedStatus, kSaveWait);
+inline constexpr Register kTableRoom = In(0x0078, 1, kU16, "table_room", "", "registers of the longest table that the drive takes, of layout version 2");
+inline constexpr Register kActiveWords = In(0x0079, 1, kU16, "active_words", "", "registers of the table in force");
+inline constexpr Span kTableBlock = Between(kTableRoom, kActiveWords);
 inline constexpr Span kErrorBlock = Between(kErrorException, kErrorStatus);
 
 // Estimates: lists of floats, one a joint or one a column.
@@ -293,6 +296,7 @@ inline constexpr const Register* kDeclared[] = {
   &kErrorAddress, &kErrorStatus, &kErrorRequest, &kUnlocked, &kHealth, &kRowsUsedA, &kRowsGatedA, &kRowsUsedB, &kRowsGatedB,
   &kRowsOutsideA, &kRowsOutsideB, &kImplausibleTicks, &kTableFallbacks,
   &kRefusedStatus, &kRefusedWord, &kRefusedValue, &kRefusedBound, &kWriterSeat, &kSaveWait,
+  &kTableRoom, &kActiveWords,
   &kResidualRms, &kConsistency, &kEstimateA, &kDeviationA, &kEstimateB, &kDeviationB,
   &kResidualJoint, &kResidualSnapshot, &kResidualGeneration, &kResidualElapsed, &kResidualSigma, &kResidualReference, &kResidualRecent,
   &kResidualHistory,
@@ -377,9 +381,10 @@ constexpr bool IsWhole(const Span& block) {
   return at == block.end();
 }
 static_assert(IsWhole(reg::kIdentityBlock) && IsWhole(reg::kStatusBlock) && IsWhole(reg::kDoubtBlock) &&
-                  IsWhole(reg::kWritingBlock) && IsWhole(reg::kErrorBlock) && IsWhole(reg::kResidualHeaderBlock) &&
-                  IsWhole(reg::kResidualValuesBlock) && IsWhole(reg::kTracePageBlock) && IsWhole(reg::kCommandBlock) &&
-                  IsWhole(reg::kWindowHeader) && IsWhole(reg::kWindowBlock) && IsWhole(reg::kTraceStartBlock),
+                  IsWhole(reg::kWritingBlock) && IsWhole(reg::kTableBlock) && IsWhole(reg::kErrorBlock) &&
+                  IsWhole(reg::kResidualHeaderBlock) && IsWhole(reg::kResidualValuesBlock) &&
+                  IsWhole(reg::kTracePageBlock) && IsWhole(reg::kCommandBlock) && IsWhole(reg::kWindowHeader) &&
+                  IsWhole(reg::kWindowBlock) && IsWhole(reg::kTraceStartBlock),
               "a block has a gap, or a register of it is not listed in kDeclared");
 
 constexpr std::uint32_t LayoutCrc() {

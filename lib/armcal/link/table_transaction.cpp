@@ -27,9 +27,10 @@ TableTransaction::TableTransaction(const TableApplication& application, table::T
       staged_(staged),
       active_(active),
       words_(words),
+      active_words_(static_cast<std::uint16_t>(store.shortest())),
       rate_(rate),
       saves_left_(rate.burst) {
-  active_crc_ = core::Crc32Words(active_, words_);
+  active_crc_ = core::Crc32Words(active_, active_words_);
 }
 
 Status TableTransaction::Boot() {
@@ -37,9 +38,10 @@ Status TableTransaction::Boot() {
   if (!core::IsOk(table_status_)) return table_status_;
   // A record that the application refuses is as good as none: the older one has its turn.
   const auto check = [this] {
+    staged_words_ = static_cast<std::uint16_t>(store_.words_in_force());
     bool first = true;
     do {
-      why_ = application_.check(application_.context, staged_, first);
+      why_ = application_.check(application_.context, staged_, staged_words_, first);
       first = false;
     } while (why_.status == Status::kBusy);
   };
@@ -48,7 +50,7 @@ Status TableTransaction::Boot() {
     if (!core::IsOk(store_.LoadOlder(staged_))) break;
     check();
   }
-  checked_crc_ = core::Crc32Words(staged_, words_);
+  checked_crc_ = core::Crc32Words(staged_, staged_words_);
   table_status_ = why_.status;
   if (!core::IsOk(table_status_)) return table_status_;
   state_ = TransactionState::kCommitting;
@@ -97,12 +99,13 @@ Status TableTransaction::Apply(const TableCommand& command) {
   if (command.command != reg::kOpen && command.command != reg::kCheck && command.command != reg::kSave)
     return Status::kOutOfRange;
   if (command.schema != schema_) return Status::kWrongSchema;
-  if (command.words != words_) return Status::kWrongSize;
-  if (command.command == reg::kOpen) return Open();
+  if (!store_.Takes(command.words)) return Status::kWrongSize;
+  if (command.command == reg::kOpen) return Open(command);
   return command.command == reg::kCheck ? Check(command) : Save(command);
 }
 
-Status TableTransaction::Open() {
+Status TableTransaction::Open(const TableCommand& command) {
+  staged_words_ = command.words;
   std::memset(staged_, 0, 2u * words_);
   state_ = TransactionState::kOpen;
   return Status::kOk;
@@ -110,6 +113,7 @@ Status TableTransaction::Open() {
 
 Status TableTransaction::Check(const TableCommand& command) {
   if (state_ != TransactionState::kLoading && state_ != TransactionState::kChecked) return Status::kWrongOrder;
+  if (command.words != staged_words_) return Status::kWrongSize;
   checking_ = command;
   summed_ = 0;
   sum_ = 0;
@@ -119,17 +123,17 @@ Status TableTransaction::Check(const TableCommand& command) {
 
 // First the checksum, then what the application does with the words.
 void TableTransaction::CheckNext() {
-  if (summed_ < words_) {
-    const auto rest = static_cast<std::uint16_t>(words_ - summed_);
+  if (summed_ < staged_words_) {
+    const auto rest = static_cast<std::uint16_t>(staged_words_ - summed_);
     const std::uint16_t count = rest < kSummedWords ? rest : kSummedWords;
     sum_ = core::Crc32Words(staged_ + summed_, count, sum_);
     summed_ = static_cast<std::uint16_t>(summed_ + count);
-    if (summed_ < words_) return;
+    if (summed_ < staged_words_) return;
     if (sum_ != checking_.crc) return Answer(Status::kBadCrc);
     first_ = true;
     return;
   }
-  const core::Refusal why = application_.check(application_.context, staged_, first_);
+  const core::Refusal why = application_.check(application_.context, staged_, staged_words_, first_);
   first_ = false;
   if (why.status == Status::kBusy) return;
   why_ = why;
@@ -151,11 +155,12 @@ void TableTransaction::Answer(Status status) {
 
 Status TableTransaction::Save(const TableCommand& command) {
   if (state_ != TransactionState::kChecked) return Status::kWrongOrder;
+  if (command.words != staged_words_) return Status::kWrongSize;
   if (command.crc != checked_crc_) return Status::kBadCrc;
   Status status = application_.permit(application_.context);
   if (!core::IsOk(status)) return status;
   if (rate_.interval_ms != 0 && saves_left_ == 0) return Status::kTooSoon;
-  status = store_.Save(staged_);
+  status = store_.Save(staged_, staged_words_);
   if (!core::IsOk(status)) return status;
   if (saves_left_ > 0) --saves_left_;
   state_ = TransactionState::kCommitting;
@@ -166,6 +171,7 @@ Status TableTransaction::Save(const TableCommand& command) {
 Status TableTransaction::WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words) {
   if (phase_ != Phase::kNone) return Status::kBusy;
   if (!staging()) return Status::kWrongOrder;
+  if (offset + count > staged_words_) return Status::kWrongSize;
   std::memcpy(staged_ + offset, words, 2u * count);
   answered_ = false;
   state_ = TransactionState::kLoading;  // the staged words are no longer those that were checked
@@ -229,7 +235,9 @@ void TableTransaction::Adopt() {
 }
 
 void TableTransaction::Activate() {
-  std::memcpy(active_, staged_, 2u * words_);
+  std::memcpy(active_, staged_, 2u * staged_words_);
+  std::memset(active_ + staged_words_, 0, 2u * (words_ - staged_words_));
+  active_words_ = staged_words_;
   active_crc_ = checked_crc_;
   table_status_ = Status::kOk;
 }

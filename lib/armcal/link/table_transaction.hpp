@@ -13,10 +13,10 @@ namespace armcal::link {
 // Context: background.
 struct TableApplication {
   void* context;
-  // Decodes `words`, judges them and builds what adopt() will put in force, in slices. kBusy: call again with the same
-  // words. Else kOk, or the reason of refusal. What was built stays ready until the next check; nothing is in force
-  // yet. `first`: a new check begins, whatever became of the one before.
-  core::Refusal (*check)(void* context, const std::uint16_t* words, bool first);
+  // Decodes `words` [count], judges them and builds what adopt() will put in force, in slices. kBusy: call again with
+  // the same words. Else kOk, or the reason of refusal. What was built stays ready until the next check; nothing is in
+  // force yet. `first`: a new check begins, whatever became of the one before.
+  core::Refusal (*check)(void* context, const std::uint16_t* words, std::uint16_t count, bool first);
   // Says whether adopt() would succeed now: kOk, kAxisEnabled, or kWrongOrder (no checked table is ready). It has no
   // effect. The transaction calls it before it stores anything.
   core::Status (*permit)(void* context);
@@ -53,7 +53,8 @@ class TableTransaction {
   // is given up.
   static constexpr std::uint32_t kStageTimeout_ms = 30000;
 
-  // `staged`, `active`: buffers [words] that outlive this. `active` may hold defaults, which Boot() replaces.
+  // `staged`, `active`: buffers [words] that outlive this; words: the longest table that `store` takes. `active` may
+  // hold defaults of the shortest length, which Boot() replaces.
   TableTransaction(const TableApplication& application, table::TableStore& store, std::uint32_t schema,
                    std::uint16_t* staged, std::uint16_t* active, std::uint16_t words, const SaveRate& rate = {});
 
@@ -64,17 +65,19 @@ class TableTransaction {
   core::Status Boot();
 
   // kWrongOrder: not in this state, or the sequence is 0 or was used with other content. kOutOfRange: no such command.
-  // kWrongSchema, kWrongSize: not a table of this firmware. kBadCrc: check: the staged words have another checksum;
-  // save: the checksum is not that of the last check. kBusy: committing, or another command is being checked. kTooSoon:
-  // the rate of saves. Or the application's answer. kUnfinished: it is being checked; the same command again gives the
-  // answer when Step() has done the rest. kStorageFault and kTimeout appear in status() only.
+  // kWrongSchema: not a table of this firmware. kWrongSize: it has no table of this length, or another one was opened.
+  // kBadCrc: check: the staged words have another checksum; save: the checksum is not that of the last check. kBusy:
+  // committing, or another command is being checked. kTooSoon: the rate of saves. Or the application's answer.
+  // kUnfinished: it is being checked; the same command again gives the answer when Step() has done the rest.
+  // kStorageFault and kTimeout appear in status() only.
   core::Status Command(const TableCommand& command);
   // Returns true if `command` equals the last accepted command, sequence number included. Then Command() has no effect.
   bool IsRepeat(const TableCommand& command) const;
   // Drops the staged words and a running check, because their writer is gone. A commit goes on.
   void Abandon();
 
-  // offset + count <= words(). kWrongOrder: no transaction is open. kBusy: committing or checking.
+  // offset + count <= words(). kWrongOrder: no transaction is open. kWrongSize: beyond the table that was opened.
+  // kBusy: committing or checking.
   core::Status WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
 
   // Does one bounded piece of a check or a commit. Drops the staged words after kStageTimeout_ms without a write (state
@@ -91,7 +94,8 @@ class TableTransaction {
   const TableCommand& last_command() const { return last_; }
   const std::uint16_t* staged() const { return staged_; }
   const std::uint16_t* active() const { return active_; }
-  std::uint16_t words() const { return words_; }
+  std::uint16_t words() const { return words_; }                // of the longest table
+  std::uint16_t active_words() const { return active_words_; }  // of the table in force
   const table::TableStore& store() const { return store_; }
 
  private:
@@ -102,7 +106,7 @@ class TableTransaction {
     return state_ == TransactionState::kOpen || state_ == TransactionState::kLoading ||
            state_ == TransactionState::kChecked;
   }
-  core::Status Open();
+  core::Status Open(const TableCommand& command);
   core::Status Check(const TableCommand& command);
   void CheckNext();
   void Answer(core::Status status);
@@ -117,6 +121,7 @@ class TableTransaction {
   std::uint16_t* staged_;
   std::uint16_t* active_;
   std::uint16_t words_;
+  std::uint16_t staged_words_ = 0, active_words_;
 
   TransactionState state_ = TransactionState::kIdle;
   Phase phase_ = Phase::kNone;

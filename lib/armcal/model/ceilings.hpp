@@ -13,6 +13,10 @@
 
 namespace armcal::model {
 
+// A table may set the row gate of a joint to a limit between these two, in standard deviations. A narrower gate would
+// refuse ordinary rows.
+inline constexpr float kNarrowestGate = 3.0f, kWidestGate = 1000.0f;
+
 struct JointCeiling {
   float torque_Nm;              // no torque limit is higher, so no table commands more
   float friction_Nm;            // no sum of the joint's friction columns is higher
@@ -63,6 +67,10 @@ constexpr std::uint16_t WordOfJoint(int joint) {
 }
 constexpr std::uint16_t WordOfParameter(int joints, int parameter) {
   return static_cast<std::uint16_t>(WordOfJoint(joints) + parameter * kParameterWords);
+}
+
+constexpr std::uint16_t WordOfGate(int joints, int parameters, int joint) {
+  return static_cast<std::uint16_t>(WordOfParameter(joints, parameters) + joint * kGateWords);
 }
 
 namespace internal {
@@ -134,11 +142,15 @@ inline bool HeaderIsAllowed(const TableCeiling& ceiling, bool bumpless_allowed, 
 
 }  // namespace internal
 
-// Whether it is a table of this model at all. kWrongSchema; kWrongSize (layout version or shapes). Context: any.
+// Whether it is a table of this model at all. words [count], count: at least kHeaderWords. kWrongSchema; kWrongSize
+// (layout version or shapes, or the version has another length). Context: any.
 template <int n, int p>
-core::Status CheckHeading(const std::uint16_t* words, std::uint32_t schema) {
+core::Status CheckHeading(const std::uint16_t* words, int count, std::uint32_t schema) {
+  using Table = ParameterTable<n, p>;
   if (core::GetU32(words) != schema) return core::Status::kWrongSchema;
-  return words[2] == kLayoutVersion && words[3] == n && words[4] == p ? core::Status::kOk : core::Status::kWrongSize;
+  const bool fits = (words[2] == kFirstLayout && count == Table::kFirstWords) ||
+                    (words[2] == kLayoutVersion && count == Table::kWords);
+  return fits && words[3] == n && words[4] == p ? core::Status::kOk : core::Status::kWrongSize;
 }
 
 // Judges the numbers of a table one by one. `words`: a table of this model, by schema, version and shapes.
@@ -165,6 +177,15 @@ inline core::Refusal CheckWords(const CeilingView& ceilings, bool bumpless_allow
     if (!check.Bits(word + 6, 0x0303)) return check.refusal();  // four states, four groups
     if (!check.Bits(word + 7, 0)) return check.refusal();
   }
+  if (words[2] == kFirstLayout) return check.refusal();
+  for (int j = 0; j < ceilings.joints; ++j) {
+    const int word = WordOfGate(ceilings.joints, ceilings.parameters, j);
+    if (core::GetF32(words + word) == 0.0f) continue;
+    if (!check.Positive(word, kNarrowestGate, kWidestGate)) return check.refusal();
+  }
+  const int seal = WordOfGate(ceilings.joints, ceilings.parameters, ceilings.joints);
+  for (int k = 0; k < kSealWords; ++k)
+    if (!check.Bits(seal + k, 0)) return check.refusal();
   return check.refusal();
 }
 

@@ -1,11 +1,14 @@
 // model - the parameter table as numbers, and its byte layout.
 //
 // The byte layout is the same on the wire (Modbus registers), in storage and in the files of the PC: big-endian 16-bit
-// words, and 32-bit values with the high word first. Layout version 1, in 16-bit words:
+// words, and 32-bit values with the high word first. Layout version 2, in 16-bit words:
 //   header  (16 words): schema u32, layout version u16, joints u16, parameters u16, flags u16 (bit 0: bumpless),
 //                       blend_ms u32, forgetting[4] f32 (per estimator sample, group 0..3, in (0, 1])
 //   joint   (8 words each): sigma f32, v_min f32, torque_limit f32, torque_scale f32
 //   parameter (8 words each): mean f32, sd f32, process_noise f32, state u8 << 8 | group u8, 0
+//   gate    (2 words a joint): gate_sigma f32, 0: the compiled default
+//   seal    (40 words): 0
+// Version 1 ends before the gate and is otherwise the same. A table of version 1 means what the compiled defaults say.
 #pragma once
 
 #include <cmath>
@@ -18,18 +21,21 @@
 
 namespace armcal::model {
 
-inline constexpr std::uint16_t kLayoutVersion = 1;
-inline constexpr int kForgettingGroups = 4;  // 0 bodies, 1 friction, 2 effects, 3 free
+inline constexpr std::uint16_t kFirstLayout = 1, kLayoutVersion = 2;  // both are read
+inline constexpr int kForgettingGroups = 4;                           // 0 bodies, 1 friction, 2 effects, 3 free
 inline constexpr std::uint16_t kFlagBumpless = 1;
 inline constexpr int kHeaderWords = 16;
 inline constexpr int kJointWords = 8;
 inline constexpr int kParameterWords = 8;
+inline constexpr int kGateWords = 2;
+inline constexpr int kSealWords = 40;  // the last words of every table of version 2
 
 struct JointEntry {
   float sigma_Nm;
   float v_min_radps;
   float torque_limit_Nm;
-  float torque_scale;  // measured torque = torque_scale x nominal torque constant x current
+  float torque_scale;       // measured torque = torque_scale x nominal torque constant x current
+  float gate_sigma = 0.0f;  // limit of the row gate in standard deviations; 0: the compiled default
 };
 
 struct ParameterEntry {
@@ -43,7 +49,8 @@ struct ParameterEntry {
 // Shapes: n joints, p parameters.
 template <int n, int p>
 struct ParameterTable {
-  static constexpr int kWords = kHeaderWords + n * kJointWords + p * kParameterWords;
+  static constexpr int kFirstWords = kHeaderWords + n * kJointWords + p * kParameterWords;  // of layout version 1
+  static constexpr int kWords = kFirstWords + n * kGateWords + kSealWords;
 
   std::uint32_t schema = 0;
   std::uint16_t flags = 0;
@@ -53,12 +60,12 @@ struct ParameterTable {
   ParameterEntry parameter[p] = {};
 };
 
-// w: [ParameterTable<n,p>::kWords], native 16-bit values (the wire and the store put the high byte first). Context:
-// any.
+// w: [ParameterTable<n,p>::kWords], or [kFirstWords] for kFirstLayout; native 16-bit values (the wire and the store put
+// the high byte first). Context: any.
 template <int n, int p>
-void Encode(const ParameterTable<n, p>& t, std::uint16_t* w) {
+void Encode(const ParameterTable<n, p>& t, std::uint16_t* w, std::uint16_t layout = kLayoutVersion) {
   core::PutU32(w, t.schema);
-  w[2] = kLayoutVersion;
+  w[2] = layout;
   w[3] = n;
   w[4] = p;
   w[5] = t.flags;
@@ -78,19 +85,24 @@ void Encode(const ParameterTable<n, p>& t, std::uint16_t* w) {
     w[6] = static_cast<std::uint16_t>((static_cast<unsigned>(t.parameter[k].state) << 8) | t.parameter[k].group);
     w[7] = 0;
   }
+  if (layout == kFirstLayout) return;
+  for (int j = 0; j < n; ++j, w += kGateWords) core::PutF32(w, t.joint[j].gate_sigma);
+  for (int k = 0; k < kSealWords; ++k) w[k] = 0;
 }
 
-// w: [ParameterTable<n,p>::kWords]. kWrongSchema; kWrongSize (layout version, joints or parameters differ); kNotFinite;
-// kOutOfRange (sigma, v_min, limit, scale or forgetting is not positive, forgetting is above 1, sd or noise is
-// negative, state or group is unknown). On refusal `t` is unchanged. This does not check the reserved bits and words
-// (see CheckWords), nor whether bodies can exist (see physical::IsPhysical). Context: background.
+// w: as many words as a table of its layout version has. kWrongSchema; kWrongSize (layout version, joints or parameters
+// differ); kNotFinite; kOutOfRange (sigma, v_min, limit, scale or forgetting is not positive, forgetting is above 1,
+// sd, noise or gate is negative, state or group is unknown). On refusal `t` is unchanged. This does not check the
+// reserved bits and words (see CheckWords), nor whether bodies can exist (see physical::IsPhysical). Context:
+// background.
 template <int n, int p>
 core::Status Decode(const std::uint16_t* w, std::uint32_t schema, ParameterTable<n, p>& t) {
   using core::Status;
   if (core::GetU32(w) != schema) return Status::kWrongSchema;
-  if (w[2] != kLayoutVersion || w[3] != n || w[4] != p) return Status::kWrongSize;
+  if (w[2] < kFirstLayout || w[2] > kLayoutVersion || w[3] != n || w[4] != p) return Status::kWrongSize;
   const std::uint16_t* jw = w + kHeaderWords;
   const std::uint16_t* pw = jw + n * kJointWords;
+  const std::uint16_t* gates = w[2] == kFirstLayout ? nullptr : pw + p * kParameterWords;
   for (int g = 0; g < kForgettingGroups; ++g) {
     const float f = core::GetF32(w + 8 + 2 * g);
     if (!std::isfinite(f)) return Status::kNotFinite;
@@ -107,12 +119,18 @@ core::Status Decode(const std::uint16_t* w, std::uint32_t schema, ParameterTable
     if (!std::isfinite(mean) || !std::isfinite(sd) || !std::isfinite(noise)) return Status::kNotFinite;
     if (sd < 0.0f || noise < 0.0f || (e[6] >> 8) > 3 || (e[6] & 0xFF) >= kForgettingGroups) return Status::kOutOfRange;
   }
+  for (int j = 0; j < n && gates != nullptr; ++j) {
+    const float gate = core::GetF32(gates + j * kGateWords);
+    if (!std::isfinite(gate)) return Status::kNotFinite;
+    if (gate < 0.0f) return Status::kOutOfRange;
+  }
   t.schema = schema;
   t.flags = w[5];
   t.blend_ms = core::GetU32(w + 6);
   for (int g = 0; g < kForgettingGroups; ++g) t.forgetting[g] = core::GetF32(w + 8 + 2 * g);
   for (int j = 0; j < n; ++j, jw += kJointWords)
-    t.joint[j] = {core::GetF32(jw), core::GetF32(jw + 2), core::GetF32(jw + 4), core::GetF32(jw + 6)};
+    t.joint[j] = {core::GetF32(jw), core::GetF32(jw + 2), core::GetF32(jw + 4), core::GetF32(jw + 6),
+                  gates == nullptr ? 0.0f : core::GetF32(gates + j * kGateWords)};
   for (int k = 0; k < p; ++k, pw += kParameterWords)
     t.parameter[k] = {core::GetF32(pw), core::GetF32(pw + 2), core::GetF32(pw + 4),
                       static_cast<ParameterState>(pw[6] >> 8), static_cast<std::uint8_t>(pw[6] & 0xFF)};

@@ -36,8 +36,9 @@ Header GetHeader(const std::uint8_t* b) {
 
 }  // namespace
 
-TableStore::TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words)
-    : storage_(storage), schema_(schema), words_(words) {}
+TableStore::TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words,
+                       std::uint32_t shorter)
+    : storage_(storage), schema_(schema), words_(words), shorter_(shorter) {}
 
 bool TableStore::Fits() const {
   const std::uint32_t unit = storage_.program_unit;
@@ -74,7 +75,8 @@ SlotState TableStore::Inspect(int slot) {
   if (!IsOk(storage_.Read(commit_at, bytes, 4)) || core::GetBytes32(bytes) != kCommitWord) return SlotState::kCorrupt;
 
   sequence_[slot] = header.sequence;
-  const bool ours = header.format == kFormat && header.schema == schema_ && header.words == words_;
+  length_[slot] = header.words;
+  const bool ours = header.format == kFormat && header.schema == schema_ && Takes(header.words);
   return ours ? SlotState::kGood : SlotState::kOtherSchema;
 }
 
@@ -82,18 +84,19 @@ SlotState TableStore::Inspect(int slot) {
 // checked.
 Status TableStore::CopyOut(int slot, std::uint16_t* out) const {
   const std::uint32_t base = AddressOf(slot);
+  const std::uint32_t words = length_[slot];
   std::uint8_t bytes[kChunkBytes];
   if (!IsOk(storage_.Read(base, bytes, kHeaderBytes))) return Status::kStorageFault;
   const std::uint32_t header_crc = core::Crc32(bytes, kHeaderBytes);
-  for (std::uint32_t done = 0; done < words_;) {
+  for (std::uint32_t done = 0; done < words;) {
     const std::uint32_t room = static_cast<std::uint32_t>(sizeof bytes) / 2;
-    const std::uint32_t count = words_ - done < room ? words_ - done : room;
+    const std::uint32_t count = words - done < room ? words - done : room;
     if (!IsOk(storage_.Read(base + kHeaderBytes + 2 * done, bytes, 2 * count))) return Status::kStorageFault;
     for (std::uint32_t i = 0; i < count; ++i) out[done + i] = core::GetBytes16(bytes + 2 * i);
     done += count;
   }
-  if (!IsOk(storage_.Read(base + kHeaderBytes + 2 * words_, bytes, kCrcBytes))) return Status::kStorageFault;
-  return core::Crc32Words(out, words_, header_crc) == core::GetBytes32(bytes) ? Status::kOk : Status::kCorrupt;
+  if (!IsOk(storage_.Read(base + kHeaderBytes + 2 * words, bytes, kCrcBytes))) return Status::kStorageFault;
+  return core::Crc32Words(out, words, header_crc) == core::GetBytes32(bytes) ? Status::kOk : Status::kCorrupt;
 }
 
 // The slot in `wanted` state that has the highest sequence; -1: none. The sequence may wrap, so the sign of the
@@ -138,9 +141,9 @@ Status TableStore::TakeBest(std::uint16_t* out) {
   return Newest(SlotState::kCorrupt) >= 0 ? Status::kCorrupt : Status::kBlank;
 }
 
-Status TableStore::Save(const std::uint16_t* words) {
+Status TableStore::Save(const std::uint16_t* words, std::uint32_t count) {
   if (busy()) return Status::kBusy;
-  if (!Fits()) return Status::kWrongSize;
+  if (!Fits() || !Takes(count)) return Status::kWrongSize;
   // Keep the slot of the table in force. If there is none, keep the newest record of another schema.
   const int keep = current_ >= 0 ? current_ : Newest(SlotState::kOtherSchema);
   target_ = keep == 0 ? 1 : 0;
@@ -153,9 +156,10 @@ Status TableStore::Save(const std::uint16_t* words) {
   if (whole[0]) newest = sequence_[0];
   if (whole[1] && (!whole[0] || static_cast<std::int32_t>(sequence_[1] - newest) > 0)) newest = sequence_[1];
 
-  PutHeader(header_, {kFormat, schema_, words_, newest + 1});
-  crc_ = core::Crc32Words(words, words_, core::Crc32(header_, kHeaderBytes));
+  PutHeader(header_, {kFormat, schema_, count, newest + 1});
+  crc_ = core::Crc32Words(words, count, core::Crc32(header_, kHeaderBytes));
   source_ = words;
+  source_words_ = count;
   previous_ = current_;
   revocable_ = false;
   at_ = 0;
@@ -175,7 +179,7 @@ void TableStore::BeginRecheck(int slot) {
 // First the record in force. If that no longer reads well, the other one, if it was good: then the two change places.
 // Otherwise the record in force stays where it is, because another reading of it may still succeed.
 Status TableStore::RecheckNext() {
-  const std::uint32_t base = AddressOf(checking_), covered = kHeaderBytes + 2 * words_;
+  const std::uint32_t base = AddressOf(checking_), covered = kHeaderBytes + 2 * length_[checking_];
   std::uint8_t bytes[kChunkBytes];
   const std::uint32_t count = covered - at_ < kChunkBytes ? covered - at_ : kChunkBytes;
   bool good = IsOk(storage_.Read(base + at_, bytes, count));
@@ -187,7 +191,7 @@ Status TableStore::RecheckNext() {
   at_ += count;
   if (good && at_ < covered) return Status::kBusy;
   good = good && IsOk(storage_.Read(base + covered, bytes, kCrcBytes)) && core::GetBytes32(bytes) == check_;
-  const std::uint32_t commit_at = base + CommitOffset(words_, storage_.program_unit);
+  const std::uint32_t commit_at = base + CommitOffset(length_[checking_], storage_.program_unit);
   good = good && IsOk(storage_.Read(commit_at, bytes, 4)) && core::GetBytes32(bytes) == kCommitWord;
 
   if (good && ++passes_ < kRechecks) {
@@ -245,7 +249,7 @@ Status TableStore::Step() {
 
 // Bytes [first, first + count) of the record. Bytes beyond its end have the erased value.
 void TableStore::FillBody(std::uint32_t first, std::uint8_t* bytes, std::uint32_t count) const {
-  const std::uint32_t payload_end = kHeaderBytes + 2 * words_;
+  const std::uint32_t payload_end = kHeaderBytes + 2 * source_words_;
   std::uint8_t crc[kCrcBytes];
   core::PutBytes32(crc, crc_);
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -270,7 +274,7 @@ Status TableStore::EraseNext() {
   state_[target_] = SlotState::kCorrupt;  // until the new record is whole
   if (!IsOk(storage_.Erase(BaseOf(target_) + at_))) return Abandon();
   ++at_;
-  if (at_ * storage_.sector_bytes >= RecordBytes(words_, storage_.program_unit)) {
+  if (at_ * storage_.sector_bytes >= RecordBytes(source_words_, storage_.program_unit)) {
     stage_ = Stage::kProgram;
     at_ = 0;
   }
@@ -278,7 +282,7 @@ Status TableStore::EraseNext() {
 }
 
 Status TableStore::ProgramNext() {
-  const std::uint32_t end = CommitOffset(words_, storage_.program_unit);
+  const std::uint32_t end = CommitAt();
   const std::uint32_t count = end - at_ < kChunkBytes ? end - at_ : kChunkBytes;
   std::uint8_t bytes[kChunkBytes];
   FillBody(at_, bytes, count);
@@ -292,7 +296,7 @@ Status TableStore::ProgramNext() {
 }
 
 Status TableStore::VerifyNext() {
-  const std::uint32_t end = CommitOffset(words_, storage_.program_unit);
+  const std::uint32_t end = CommitAt();
   const std::uint32_t count = end - at_ < kChunkBytes ? end - at_ : kChunkBytes;
   std::uint8_t wanted[kChunkBytes];
   std::uint8_t found[kChunkBytes];
@@ -307,7 +311,7 @@ Status TableStore::VerifyNext() {
 Status TableStore::Commit() {
   std::uint8_t bytes[kChunkBytes];
   FillCommit(bytes);
-  const std::uint32_t at = AddressOf(target_) + CommitOffset(words_, storage_.program_unit);
+  const std::uint32_t at = AddressOf(target_) + CommitAt();
   if (!IsOk(storage_.Program(at, bytes, RoundUp(4, storage_.program_unit)))) return Abandon();
   stage_ = Stage::kVerifyCommit;
   return Status::kBusy;
@@ -315,10 +319,11 @@ Status TableStore::Commit() {
 
 Status TableStore::VerifyCommit() {
   std::uint8_t found[4];
-  const std::uint32_t at = AddressOf(target_) + CommitOffset(words_, storage_.program_unit);
+  const std::uint32_t at = AddressOf(target_) + CommitAt();
   if (!IsOk(storage_.Read(at, found, sizeof found)) || core::GetBytes32(found) != kCommitWord) return Abandon();
   state_[target_] = SlotState::kGood;
   sequence_[target_] = core::GetBytes32(header_ + 16);
+  length_[target_] = source_words_;
   current_ = target_;
   revocable_ = true;
   stage_ = Stage::kIdle;

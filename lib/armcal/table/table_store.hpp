@@ -55,13 +55,14 @@ class TableStore {
  public:
   static constexpr int kSlots = 2;
 
-  // `words`: the length of every table of this schema.
-  TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words);
+  // `words`, `shorter`: the lengths that a table of this schema may have, the longer one first; 0: there is only one. A
+  // record of another length is none of this firmware's.
+  TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words, std::uint32_t shorter = 0);
 
-  // Reads both slots and copies the good record with the highest sequence to `out` [words]. It reads everything at
-  // once, so call it at power-up only. kOk. Without a good record: kWrongSchema (another one is kept), kCorrupt or
-  // kBlank. kWrongSize: a record does not fit this storage. kBusy: a save is running. Unless kOk, `out` may hold words
-  // of a record that was rejected.
+  // Reads both slots and copies the good record with the highest sequence to `out` [words]; words_in_force() says how
+  // many of them the record has. It reads everything at once, so call it at power-up only. kOk. Without a good record:
+  // kWrongSchema (another one is kept), kCorrupt or kBlank. kWrongSize: a record does not fit this storage. kBusy: a
+  // save is running. Unless kOk, `out` may hold words of a record that was rejected.
   core::Status Load(std::uint16_t* out);
 
   // Call it if the application refused the record that Load or LoadOlder copied last. Marks that record as kRefused,
@@ -69,9 +70,10 @@ class TableStore {
   // Call it at power-up only.
   core::Status LoadOlder(std::uint16_t* out);
 
-  // Starts a save. `words` [words] must not change until Step no longer answers kBusy. kOk: it has begun. kBusy: a save
-  // is running. kWrongSize: a record does not fit this storage.
-  core::Status Save(const std::uint16_t* words);
+  // Starts a save. `words` [count] must not change until Step no longer answers kBusy. kOk: it has begun. kBusy: a save
+  // is running. kWrongSize: no table has this length, or a record does not fit this storage.
+  core::Status Save(const std::uint16_t* words, std::uint32_t count);
+  core::Status Save(const std::uint16_t* words) { return Save(words, words_); }
 
   // Takes the last completed save back: erases its slot, so that the table before it is in force again. Call Step until
   // it no longer answers kBusy. kOk: it has begun. kWrongOrder: no completed save to take back. kBusy: a save is
@@ -84,6 +86,9 @@ class TableStore {
   core::Status Step();
 
   bool busy() const { return stage_ != Stage::kIdle; }
+  bool Takes(std::uint32_t count) const { return count != 0 && (count == words_ || count == shorter_); }
+  std::uint32_t shortest() const { return shorter_ != 0 ? shorter_ : words_; }  // length of a table
+  std::uint32_t words_in_force() const { return current_ < 0 ? 0 : length_[current_]; }
   SlotState slot_state(int slot) const { return state_[slot]; }
   std::uint32_t sequence() const { return current_ < 0 ? 0 : sequence_[current_]; }  // of the table in force, 0: none
   int slot() const { return current_; }                                              // -1: none
@@ -98,6 +103,7 @@ class TableStore {
   SlotState Inspect(int slot);
   core::Status CopyOut(int slot, std::uint16_t* out) const;
   int Newest(SlotState wanted) const;
+  std::uint32_t CommitAt() const { return CommitOffset(source_words_, storage_.program_unit); }
   void FillBody(std::uint32_t first, std::uint8_t* bytes, std::uint32_t count) const;
   void FillCommit(std::uint8_t* bytes) const;
   core::Status TakeBest(std::uint16_t* out);
@@ -113,11 +119,12 @@ class TableStore {
 
   hardware::Storage storage_;
   std::uint32_t schema_;
-  std::uint32_t words_;
+  std::uint32_t words_, shorter_;
   SlotState state_[kSlots] = {SlotState::kBlank, SlotState::kBlank};
   std::uint32_t sequence_[kSlots] = {0, 0};
-  int current_ = -1;   // slot of the table in force
-  int previous_ = -1;  // the slot that Revoke puts in force again
+  std::uint32_t length_[kSlots] = {0, 0};  // words of the record
+  int current_ = -1;                       // slot of the table in force
+  int previous_ = -1;                      // the slot that Revoke puts in force again
 
   Stage stage_ = Stage::kIdle;
   bool revocable_ = false;
@@ -127,6 +134,7 @@ class TableStore {
   std::uint32_t check_ = 0;  // checksum of it so far
   std::uint32_t at_ = 0;     // sector or byte offset inside the running stage
   const std::uint16_t* source_ = nullptr;
+  std::uint32_t source_words_ = 0;
   std::uint8_t header_[kHeaderBytes] = {};
   std::uint32_t crc_ = 0;
   std::uint32_t fallbacks_ = 0;              // see register table_fallbacks

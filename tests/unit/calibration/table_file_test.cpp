@@ -71,11 +71,31 @@ TEST(TableFile, EncodedAndDecoded_IsTheSameTableInFloat) {
   EXPECT_EQ(EncodeTable(back), words);
 }
 
+// Layout version 1 is version 2 without what follows the parameters.
 TEST(TableFile, TheDefaultWords_AreThoseOfTheGeneratedModel) {
   using Table = estimator::Table<generated::Er20Like>;
   std::vector<std::uint16_t> expected(Table::kWords);
   model::Encode(estimator::DefaultTable<generated::Er20Like>(), expected.data());
+  EXPECT_EQ(expected[2], 2);
+  expected[2] = 1;
+  expected.resize(Table::kFirstWords);
   EXPECT_EQ(EncodeTable(DefaultTable(Er20Model())), expected);
+}
+
+TEST(TableFile, AGateOfAJoint_IsKeptInTheFileAndReachesTheFirmware) {
+  TableFile t = Changed();
+  t.joint[3].gate_sigma = 7.5;
+  const auto path = std::filesystem::temp_directory_path() / "armcal_gate_table.toml";
+  WriteTable(path, t);
+  const TableFile read = ReadTable(path);
+  std::filesystem::remove(path);
+  const auto words = EncodeTable(read);
+  ASSERT_EQ(words.size(), std::size_t{estimator::Table<generated::Er20Like>::kWords});
+  estimator::Table<generated::Er20Like> decoded;
+  ASSERT_EQ(model::Decode(words.data(), generated::Er20Like::kSchema, decoded), core::Status::kOk);
+  for (int j = 0; j < 6; ++j) EXPECT_EQ(decoded.joint[j].gate_sigma, j == 3 ? 7.5f : 0.0f);
+  EXPECT_EQ(DecodeTable(words, DefaultTable(Er20Model())).joint[3].gate_sigma, 7.5);
+  EXPECT_EQ(decoded.parameter[70].mean, 12.345678f) << "the rest is where version 1 has it";
 }
 
 TEST(TableFile, TheHostsWords_AreWhatTheFirmwareDecodes) {

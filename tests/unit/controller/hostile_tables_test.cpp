@@ -83,6 +83,7 @@ constexpr int n = Model::kJoints, kParameters = Model::kParameters;
 
 int JointWord(int joint, int part) { return model::kHeaderWords + 8 * joint + 2 * part; }
 int ParameterWord(int k, int part) { return model::kHeaderWords + 8 * n + 8 * k + 2 * part; }
+int GateWord(int joint) { return ParameterWord(kParameters, 0) + 2 * joint; }
 float At(const Words& words, int word) { return core::GetF32(&words[word]); }
 void Put(Words& words, int word, float value) { core::PutF32(&words[word], value); }
 
@@ -352,6 +353,10 @@ TEST(Ceilings, EachKindOfWord_IsRefusedByItsNumber) {
   expect(ParameterWord(Model::kBodyParameters, 0), -1e6f, Status::kBeyondCeiling);
   expect(ParameterWord(3, 0), std::nanf(""), Status::kNotFinite);
   expect(ParameterWord(3, 1), -1.0f, Status::kOutOfRange);
+  expect(GateWord(2), 2.9f, Status::kBeyondCeiling);
+  expect(GateWord(2), 1000.5f, Status::kBeyondCeiling);
+  expect(GateWord(5), -5.0f, Status::kOutOfRange);
+  expect(GateWord(0), std::nanf(""), Status::kNotFinite);
 
   const auto expect_bits = [&](int word, unsigned bits, bool allowed, Status status) {
     Words words = DefaultWords<Model>();
@@ -366,11 +371,45 @@ TEST(Ceilings, EachKindOfWord_IsRefusedByItsNumber) {
   expect_bits(ParameterWord(7, 3), 0x0400, true, Status::kOutOfRange);
   expect_bits(ParameterWord(7, 3) + 1, 0x8000, true, Status::kOutOfRange);
   expect_bits(6, 0xFFFF, true, Status::kBeyondCeiling);  // a cross-fade of years
+  for (int k = 0; k < 40; ++k) expect_bits(GateWord(n) + k, 0x0100, true, Status::kOutOfRange);
   Words fast = DefaultWords<Model>();
   fast[5] = 1, fast[7] = 499;
   EXPECT_EQ(model::CheckWords(model::View(Model::kCeilings), true, fast.data()).word, 6);
   fast[7] = 500;
   EXPECT_EQ(model::CheckWords(model::View(Model::kCeilings), true, fast.data()).status, Status::kOk);
+}
+
+// The joint's own gate reaches the filters; 0 and layout version 1 mean the compiled one.
+TEST(Ceilings, AGateOfAJoint_ReplacesTheCompiledOne) {
+  Words words = DefaultWords<Model>();
+  Put(words, GateWord(1), 8.0f);
+  estimator::Table<Model> table;
+  const auto adopted = std::make_unique<estimator::AdoptedTable<Model>>();
+  const auto rigid = std::make_unique<physical::RigidPrior<Model, float>>();
+  for (const bool first_layout : {false, true}) {
+    if (first_layout) words[2] = 1;
+    EXPECT_EQ(model::CheckWords(model::View(Model::kCeilings), false, words.data()).status, Status::kOk);
+    ASSERT_EQ(model::Decode(words.data(), Model::kSchema, table), Status::kOk);
+    ASSERT_EQ(estimator::BuildAdoptedTable(table, 1, *rigid, *adopted), Status::kOk);
+    EXPECT_EQ(adopted->gate_sigma[0], 5.0f);
+    EXPECT_EQ(adopted->gate_sigma[1], first_layout ? 5.0f : 8.0f);
+  }
+}
+
+// Each version has its own length, and the other one's is refused.
+TEST(Ceilings, ATableOfTheWrongLength_IsNoTable) {
+  using Table = estimator::Table<Model>;
+  Words words = DefaultWords<Model>();
+  const auto heading = [&](int version, int count) {
+    words[2] = static_cast<std::uint16_t>(version);
+    return model::CheckHeading<n, kParameters>(words.data(), count, Model::kSchema);
+  };
+  EXPECT_EQ(heading(2, Table::kWords), Status::kOk);
+  EXPECT_EQ(heading(1, Table::kFirstWords), Status::kOk);
+  EXPECT_EQ(heading(1, Table::kWords), Status::kWrongSize);
+  EXPECT_EQ(heading(2, Table::kFirstWords), Status::kWrongSize);
+  EXPECT_EQ(heading(0, Table::kFirstWords), Status::kWrongSize);
+  EXPECT_EQ(heading(3, Table::kWords), Status::kWrongSize);
 }
 
 // Friction that rises less than in proportion to speed has a negative viscous coefficient beside its Coulomb level.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "tests/unit/link/test_device.hpp"
 
@@ -391,6 +392,86 @@ TEST_F(Transaction, PowerCutAtAnyOperation_BootsTheOldOrTheNewTable) {
     EXPECT_TRUE(active == MakeTable(1) || active == MakeTable(2)) << cut;
     EXPECT_EQ(application.adopted, active);
   }
+}
+
+// A drive that takes tables of two lengths: flashes a table of `words` and answers how that ended.
+struct TwoLengths {
+  static constexpr std::uint16_t kShort = 200;
+
+  Words Cut(int number, std::size_t words) {
+    Words table = MakeTable(number);
+    table.resize(words);
+    return table;
+  }
+  Status Do(std::uint32_t command, const Words& words) {
+    const TableCommand c{++sequence, command, kSchema, static_cast<std::uint16_t>(words.size()),
+                         core::Crc32Words(words.data(), words.size())};
+    Status status = transaction.Command(c);
+    for (; status == Status::kUnfinished; status = transaction.Command(c)) transaction.Step(0);
+    return status;
+  }
+  Status Flash(const Words& words) {
+    Status status = Do(reg::kOpen, words);
+    if (core::IsOk(status)) status = transaction.WriteStaged(0, static_cast<std::uint16_t>(words.size()), words.data());
+    if (core::IsOk(status)) status = Do(reg::kCheck, words);
+    if (core::IsOk(status)) status = Do(reg::kSave, words);
+    for (int k = 0; k < 1000 && transaction.state() == TransactionState::kCommitting; ++k) transaction.Step(0);
+    return status;
+  }
+
+  explicit TwoLengths(test::NorFlash& flash) : store(flash.storage(), kSchema, kTableWords, kShort) {}
+
+  table::TableStore store;
+  test::FakeApplication application;
+  Words staged = Words(kTableWords), active = Words(kTableWords);
+  link::TableTransaction transaction{application.Functions(), store,       kSchema, staged.data(),
+                                     active.data(),           kTableWords, {1, 0}};
+  std::uint32_t sequence = 0;
+};
+
+TEST(TransactionOfTwoLengths, EitherTable_IsStoredServedAndBootedWithItsOwnLength) {
+  test::NorFlash flash{{2, 2048, 8, 0xFF}};
+  const auto drive = std::make_unique<TwoLengths>(flash);
+  EXPECT_EQ(drive->transaction.Boot(), Status::kBlank);
+  for (const std::uint16_t words : {kTableWords, TwoLengths::kShort, TwoLengths::kShort, kTableWords}) {
+    const Words table = drive->Cut(words, words);
+    ASSERT_EQ(drive->Flash(table), Status::kOk);
+    EXPECT_EQ(drive->transaction.state(), TransactionState::kActive);
+    EXPECT_EQ(drive->transaction.active_words(), words);
+    EXPECT_EQ(drive->application.adopted, table);
+    Words served = table;
+    served.resize(kTableWords);  // zeros behind a short table
+    EXPECT_EQ(drive->active, served);
+    EXPECT_EQ(drive->transaction.active_crc(), core::Crc32Words(table.data(), words));
+    const auto next = std::make_unique<TwoLengths>(flash);
+    ASSERT_EQ(next->transaction.Boot(), Status::kOk);
+    EXPECT_EQ(next->application.adopted, table);
+    EXPECT_EQ(next->transaction.active_words(), words);
+  }
+}
+
+TEST(TransactionOfTwoLengths, AnotherLengthThanOpened_IsRefused) {
+  test::NorFlash flash{{2, 2048, 8, 0xFF}};
+  const auto drive = std::make_unique<TwoLengths>(flash);
+  EXPECT_EQ(drive->transaction.Boot(), Status::kBlank);
+  const Words shorter = drive->Cut(1, TwoLengths::kShort), longer = MakeTable(1);
+  EXPECT_EQ(drive->Do(reg::kOpen, drive->Cut(1, 201)), Status::kWrongSize);
+  ASSERT_EQ(drive->Do(reg::kOpen, shorter), Status::kOk);
+  EXPECT_EQ(drive->transaction.WriteStaged(101, 100, longer.data()), Status::kWrongSize) << "one word too far";
+  ASSERT_EQ(drive->transaction.WriteStaged(0, TwoLengths::kShort, shorter.data()), Status::kOk);
+  EXPECT_EQ(drive->Do(reg::kCheck, longer), Status::kWrongSize);
+  ASSERT_EQ(drive->Do(reg::kCheck, shorter), Status::kOk);
+  EXPECT_EQ(drive->Do(reg::kSave, longer), Status::kWrongSize);
+  EXPECT_EQ(drive->Do(reg::kSave, shorter), Status::kOk);
+}
+
+// A firmware that knows one length alone neither takes a longer table nor loses its own.
+TEST_F(Transaction, ALongerTable_IsRefusedAndTheOldOneStays) {
+  Flash(1);
+  Words longer = MakeTable(2);
+  longer.resize(kTableWords + 52);
+  EXPECT_EQ(Do(reg::kOpen, longer), Status::kWrongSize);
+  ExpectInForce(1);
 }
 
 }  // namespace

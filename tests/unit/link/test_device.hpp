@@ -41,14 +41,14 @@ struct FakeApplication {
 
   link::TableApplication Functions() { return {this, &Check, &Permit, &Adopt}; }
 
-  static core::Refusal Check(void* self, const std::uint16_t* words, bool first) {
+  static core::Refusal Check(void* self, const std::uint16_t* words, std::uint16_t count, bool first) {
     auto& a = *static_cast<FakeApplication*>(self);
     if (first) a.slices_done = 0;
     if (++a.slices_done < a.slices) return {core::Status::kBusy};
     ++a.checks;
     a.built.clear();
     if (a.refuse_check || words[5] == kBadPhysics) return {core::Status::kUnphysical, 5, 1.0f, 0.0f};
-    a.built.assign(words, words + kTableWords);
+    a.built.assign(words, words + count);
     return {};
   }
   static core::Status Permit(void* self) {

@@ -57,6 +57,51 @@ std::vector<Cut> AllCuts(const Geometry& g) {
   return cuts;
 }
 
+// The record in force and the new one have different lengths, which take one sector or two.
+TEST(PowerCutOfTwoLengths, LeavesTheOldOrTheNewTable_WithItsOwnLength) {
+  constexpr std::uint32_t kLong = 200;
+  const Geometry g{4, 256, 8, 0xFF};
+  const auto table = [](int number, std::uint32_t words) {
+    Words all(words);
+    for (std::size_t i = 0; i < words; ++i) all[i] = static_cast<std::uint16_t>(number + 7 * i);
+    return all;
+  };
+  // Boots, tries to save `words`, and answers what it has booted.
+  const auto boot = [](NorFlash& flash, const Words& words) {
+    TableStore store(flash.storage(), kSchema, kLong, kWords);
+    Words loaded(kLong);
+    const bool good = core::IsOk(store.Load(loaded.data()));
+    loaded.resize(good ? store.words_in_force() : 0);
+    if (!words.empty() && core::IsOk(store.Save(words.data(), static_cast<std::uint32_t>(words.size()))))
+      while (store.Step() == Status::kBusy && !flash.dead()) {
+      }
+    return loaded;
+  };
+  int cuts = 0;
+  for (const bool grows : {true, false}) {
+    const Words before = table(1, grows ? kWords : kLong), after = table(2, grows ? kLong : kWords);
+    NorFlash start(g);
+    boot(start, table(3, kLong));
+    boot(start, before);
+    start.PowerUp();
+    NorFlash whole = start;
+    boot(whole, after);
+    for (int operation = 0; operation < whole.operations(); ++operation)
+      for (const std::uint32_t bytes : {0u, 3u, 8u, 20u, 63u, 128u, 255u}) {
+        NorFlash flash = start;
+        flash.CutAt({operation, bytes});
+        EXPECT_EQ(boot(flash, after), before);
+        flash.PowerUp();
+        const Words found = boot(flash, after);
+        EXPECT_TRUE(found == before || found == after) << operation << ", " << bytes;
+        EXPECT_EQ(boot(flash, {}), after) << "the next save must succeed";
+        EXPECT_FALSE(flash.misused());
+        ++cuts;
+      }
+  }
+  EXPECT_GT(cuts, 100);
+}
+
 class PowerCut : public testing::TestWithParam<Geometry> {};
 
 // `tables`: how many saves come before the one that is cut. 0: it is the first one.

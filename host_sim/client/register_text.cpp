@@ -74,6 +74,10 @@ StatusText TextOf(Status status) {
       return {"Corrupt", "storage holds a record that fails its checks"};
     case Status::kTimeout:
       return {"Timeout", "a partner did not answer in time"};
+    case Status::kInconsistent:
+      return {"Inconsistent", "what is measured does not fit the table"};
+    case Status::kTrackingError:
+      return {"TrackingError", "the axes did not follow the set-point"};
     case Status::kGated:
       return {"Gated", "accepted, but no row of the sample may update an estimate"};
     case Status::kClamped:

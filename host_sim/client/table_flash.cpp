@@ -17,6 +17,7 @@ namespace reg = link::reg;
 
 namespace {
 
+constexpr std::uint16_t kFirstLayout = 1;  // word 2 of a table
 constexpr std::size_t kWordsAtOnce = 120;
 constexpr auto kCommitPoll = std::chrono::milliseconds(5);
 constexpr auto kPatience = std::chrono::seconds(60);      // twice the drive's own limit on a commit
@@ -25,30 +26,47 @@ constexpr auto kSeatPoll = std::chrono::milliseconds(200);
 constexpr int kRounds = 5;    // a broken connection or a damaged word costs one
 constexpr int kReadings = 3;  // of a register that reads back differently
 
+// The PC's part of bringing a table in force: by a save, or on trial.
 class Flash {
  public:
-  Flash(DriveClient& drive, std::span<const std::uint16_t> words) : drive_(drive), words_(words) {
-    crc_ = core::Crc32Words(words.data(), words.size());
+  explicit Flash(DriveClient& drive) : drive_(drive) {}
+
+  // From unlock to the last command. The drive drops what was staged when the connection breaks, and then all begins
+  // anew. limit_s: of a trial; 0: the table is saved.
+  void Send(std::span<const std::uint16_t> words, int limit_s, const FlashProgress& progress) {
+    SetWords({words.begin(), words.end()});
+    Repeat([&] {
+      Command(reg::kOpen);
+      Stage(progress);
+      if (limit_s > 0) drive_.WriteValue<reg::kTrialLimit>(static_cast<std::uint16_t>(limit_s));
+      Check();
+      Finish(limit_s > 0 ? reg::kTrial : reg::kSave);
+    });
   }
 
-  // From unlock to save. The drive drops what was staged when the connection breaks, and then all begins anew.
-  void Send(const FlashProgress& progress) {
-    for (int round = 1;; ++round) try {
-        sequence_ = drive_.ReadStatus().command_sequence;
-        saving_ = false;
-        TakeSeat();
-        Command(reg::kOpen);
-        Stage(progress);
-        Check();
-        saving_ = true;
-        Command(reg::kSave);
-        return;
-      } catch (const RefusedError& error) {
-        if (IsCarriedOut()) return;
-        const bool again = error.status == core::Status::kLocked || error.status == core::Status::kWrongOrder ||
-                           error.status == core::Status::kBadCrc;
-        if (!again || round == kRounds) throw;
-      }
+  // The same with the older table of the drive.
+  void SendOlder() {
+    const Identity id = drive_.ReadIdentity();
+    SetWords(ReadActiveTable(drive_));  // for schema and length in the command
+    Repeat([&] {
+      Command(reg::kLoad);
+      const int room = drive_.ReadValue<reg::kTableRoom>();
+      std::vector<std::uint16_t> older = drive_.Read(SpanOf(reg::kStagedTable, room));
+      if (older[2] == kFirstLayout) older.resize(id.table_words);
+      SetWords(std::move(older));
+      Check();
+      Finish(reg::kSave);
+    });
+  }
+
+  // Of the table that is on trial.
+  void Confirm() {
+    SetWords(ReadActiveTable(drive_));
+    Repeat([&] { Finish(reg::kConfirm); });
+  }
+  void Back() {
+    SetWords(ReadActiveTable(drive_));
+    Repeat([&] { Command(reg::kBack); });
   }
 
   // Another client may write at once. A drive that does not know how to be left is left all the same.
@@ -60,6 +78,32 @@ class Flash {
   }
 
  private:
+  void SetWords(std::vector<std::uint16_t> words) {
+    words_ = std::move(words);
+    crc_ = core::Crc32Words(words_.data(), words_.size());
+  }
+
+  template <class Commands>
+  void Repeat(Commands commands) {
+    for (int round = 1;; ++round) try {
+        sequence_ = drive_.ReadStatus().command_sequence;
+        finishing_ = 0;
+        TakeSeat();
+        return commands();
+      } catch (const RefusedError& error) {
+        if (IsCarriedOut()) return;
+        const bool again = error.status == core::Status::kLocked || error.status == core::Status::kWrongOrder ||
+                           error.status == core::Status::kBadCrc;
+        if (!again || round == kRounds) throw;
+      }
+  }
+
+  // The command after which the drive acts.
+  void Finish(std::uint32_t command) {
+    finishing_ = command;
+    Command(command);
+  }
+
   void TakeSeat() {
     const auto deadline = std::chrono::steady_clock::now() + kSeatPatience;
     for (;;) try {
@@ -70,12 +114,13 @@ class Flash {
       }
   }
 
-  // A save whose reply was damaged or lost may be under way, or done.
+  // A command whose reply was damaged or lost may be under way, or done.
   bool IsCarriedOut() {
-    if (!saving_) return false;
+    if (finishing_ == 0) return false;
     const DriveStatus s = drive_.ReadStatus();
     return s.command_sequence == sequence_ && (s.transaction_state == link::TransactionState::kCommitting ||
-                                               s.transaction_state == link::TransactionState::kActive);
+                                               s.transaction_state == link::TransactionState::kActive ||
+                                               s.transaction_state == link::TransactionState::kOnTrial);
   }
 
   // A refusal names the register that the drive did not like, if it knows one.
@@ -109,7 +154,7 @@ class Flash {
   void Stage(const FlashProgress& progress) {
     for (std::size_t done = 0; done < words_.size(); done += kWordsAtOnce) {
       const std::size_t part = std::min(kWordsAtOnce, words_.size() - done);
-      drive_.Write(reg::kStagedTable + static_cast<int>(done), words_.subspan(done, part));
+      drive_.Write(reg::kStagedTable + static_cast<int>(done), std::span(words_).subspan(done, part));
       if (progress) progress(0.8 * static_cast<double>(done + part) / static_cast<double>(words_.size()));
     }
   }
@@ -119,7 +164,9 @@ class Flash {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
     while (std::chrono::steady_clock::now() < deadline) {
       const DriveStatus s = drive_.ReadStatus();
-      if (s.transaction_state == link::TransactionState::kActive) return s;
+      if (s.transaction_state == link::TransactionState::kActive ||
+          s.transaction_state == link::TransactionState::kOnTrial)
+        return s;
       if (s.transaction_state == link::TransactionState::kFailed)
         throw RefusedError(fmt::format("{}: the table was not taken: {}; the table before it stays in force",
                                        drive_.name(), StatusName(s.transaction_status)),
@@ -149,19 +196,23 @@ class Flash {
   }
 
   DriveClient& drive_;
-  std::span<const std::uint16_t> words_;
-  bool saving_ = false;
+  std::vector<std::uint16_t> words_;
+  std::uint32_t finishing_ = 0;  // the last command, once it was sent
   std::uint32_t sequence_ = 0;
   std::uint32_t crc_ = 0;
 };
 
 }  // namespace
 
-FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress) {
-  Flash flash(drive, words);
+namespace {
+
+// Does what `send` says with a drive, waits for the end, and proves it.
+template <class Send>
+FlashReport Carry(DriveClient& drive, Send send) {
+  Flash flash(drive);
   DriveStatus s;
   try {
-    flash.Send(progress);
+    send(flash);
     s = flash.AwaitEnd();
   } catch (const RefusedError&) {
     flash.LeaveSeat();
@@ -169,8 +220,53 @@ FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words,
   }
   flash.LeaveSeat();
   flash.Verify(s);
-  if (progress) progress(1.0);
   return {s.active_crc, s.generation, s.store_sequence};
+}
+
+void Expect(DriveClient& drive, const char* what) {
+  const Identity id = drive.ReadIdentity();
+  if (id.map_minor >= kMinorOfLayout2) return;
+  throw RefusedError(fmt::format("{}: its map {}.{} has no {}; expected a drive of map 1.{} or newer", drive.name(),
+                                 id.map_major, id.map_minor, what, kMinorOfLayout2),
+                     0, core::Status::kOutOfRange);
+}
+
+}  // namespace
+
+FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress) {
+  const FlashReport report = Carry(drive, [&](Flash& flash) { flash.Send(words, 0, progress); });
+  if (progress) progress(1.0);
+  return report;
+}
+
+FlashReport TryTable(DriveClient& drive, std::span<const std::uint16_t> words, int limit_s,
+                     const FlashProgress& progress) {
+  Expect(drive, "trial");
+  const FlashReport report = Carry(drive, [&](Flash& flash) { flash.Send(words, limit_s, progress); });
+  if (progress) progress(1.0);
+  return report;
+}
+
+FlashReport ConfirmTrial(DriveClient& drive) {
+  Expect(drive, "trial");
+  return Carry(drive, [](Flash& flash) { flash.Confirm(); });
+}
+
+void EndTrial(DriveClient& drive) {
+  Expect(drive, "trial");
+  Flash flash(drive);
+  try {
+    flash.Back();
+  } catch (const RefusedError&) {
+    flash.LeaveSeat();
+    throw;
+  }
+  flash.LeaveSeat();
+}
+
+FlashReport Rollback(DriveClient& drive) {
+  Expect(drive, "older table to load");
+  return Carry(drive, [](Flash& flash) { flash.SendOlder(); });
 }
 
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive) {

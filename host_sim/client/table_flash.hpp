@@ -10,7 +10,8 @@
 
 namespace armcal::client {
 
-// The first minor version of the register map whose drives take tables of layout version 2.
+// The first minor version of the register map whose drives take tables of layout version 2, put tables on trial, load
+// the older table and keep a log.
 inline constexpr int kMinorOfLayout2 = 5;
 
 struct FlashReport {
@@ -27,6 +28,16 @@ using FlashProgress = std::function<void(double share)>;
 // model/parameters.hpp, whose first two words are the schema. Throws RefusedError (the table before it stays in force
 // and stored), VerifyError (the drive says that the table is active, but it reads back otherwise) and LinkError.
 FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress = {});
+
+// The same, but the table is put on trial for so long, and is not stored. Throws as FlashTable, and RefusedError if the
+// drive knows no trial.
+FlashReport TryTable(DriveClient& drive, std::span<const std::uint16_t> words, int limit_s,
+                     const FlashProgress& progress = {});
+// Stores the table on trial, or puts the stored table in force again. Throws as FlashTable.
+FlashReport ConfirmTrial(DriveClient& drive);
+void EndTrial(DriveClient& drive);
+// Stores and adopts the table that was stored before the one in force. Throws as FlashTable.
+FlashReport Rollback(DriveClient& drive);
 
 // The table in force.
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive);

@@ -1,5 +1,4 @@
-// tool - the verbs for a technician at a drive: info, get, set, watch, scan, map, and what is done with the table in
-// force.
+// tool - the verbs for a technician at a drive: info, get, set, watch, scan, map.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
@@ -7,11 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <optional>
 #include <thread>
 
-#include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/register_text.hpp"
@@ -31,7 +28,7 @@ using link::RegisterType;
 using nlohmann::ordered_json;
 
 struct DeviceOptions {
-  std::string connect, json, name, value, file;
+  std::string connect, json, name, value;
   int from = 1, to = 247, count = 0;
   bool csv = false, markdown = false;
 };
@@ -47,7 +44,8 @@ int RunInfo(const DeviceOptions& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   const client::Identity id = drive.ReadIdentity();
   const client::DriveStatus s = drive.ReadStatus();
-  static const char* const states[] = {"idle", "open", "loading", "checked", "committing", "active", "failed"};
+  static const char* const states[] = {"idle",       "open",   "loading", "checked",
+                                       "committing", "active", "failed",  "on trial"};
   static const char* const slots[] = {"blank", "good", "other schema", "corrupt", "refused at boot"};
   static const char* const feed[] = {"off", "on", "cross-fading"};
   const auto word = [](const auto& list, std::size_t k) { return k < std::size(list) ? list[k] : "?"; };
@@ -89,6 +87,13 @@ int RunInfo(const DeviceOptions& o) {
     json["writer"] = word(seats, w.Get<reg::kWriterSeat>());
     json["save_wait_s"] = w.Get<reg::kSaveWait>();
     fmt::print("writer: {}; next save in {} s\n", word(seats, w.Get<reg::kWriterSeat>()), w.Get<reg::kSaveWait>());
+  }
+  if (id.map_minor >= client::kMinorOfLayout2) {
+    const auto w = drive.Read<reg::kTableBlock>();
+    json["writing_allowed"] = w.Get<reg::kWritingAllowed>() != 0;
+    json["trial_left_s"] = w.Get<reg::kTrialLeft>();
+    if (w.Get<reg::kWritingAllowed>() == 0) fmt::print("the board refuses all writing now\n");
+    if (w.Get<reg::kTrialLeft>() != 0) fmt::print("a table is on trial for {} s more\n", w.Get<reg::kTrialLeft>());
   }
   fmt::print("{}\n", kWhoMayWrite);
   json["who_may_write"] = kWhoMayWrite;
@@ -194,7 +199,7 @@ int RunSet(const DeviceOptions& o) {
   if (named.element < 0 && r.count > 1) throw io::InputError(o.name + ": expected an element, as in " + o.name + "[0]");
   client::DriveClient drive = ConnectTo(o.connect);
   std::optional<client::WriterSeat> seat;
-  if (std::string(r.name).rfind("learning_", 0) == 0) seat.emplace(drive);
+  if (std::string(r.name).rfind("learning_", 0) == 0 || std::string(r.name) == "trial_limit") seat.emplace(drive);
   const int at = r + std::max(0, named.element) * link::WordsOf(r.type);
   if (words.size() == 1) drive.WriteSingle(at, words[0]);
   else drive.Write(at, words);
@@ -267,86 +272,6 @@ int RunScan(const DeviceOptions& o) {
   return found.empty() ? kLink : kOk;
 }
 
-// The table in force as a file, and back ------------------------------------------------------------------------------
-
-// What a backup holds: the words, and what they belong to.
-ordered_json Backup(client::DriveClient& drive) {
-  const client::Identity id = drive.ReadIdentity();
-  const auto words = client::ReadActiveTable(drive);
-  const client::DriveStatus s = drive.ReadStatus();
-  const std::uint32_t crc = core::Crc32Words(words.data(), words.size());
-  if (s.table_status != core::Status::kOk)
-    throw client::RefusedError(
-        fmt::format("{}: has no valid table: {}", drive.name(), client::StatusName(s.table_status)), 0, s.table_status);
-  if (s.active_crc != crc)
-    throw client::VerifyError(fmt::format("{}: the table was read with CRC {}, the drive says {}", drive.name(),
-                                          Hex(crc), Hex(s.active_crc)));
-  return {{"armcal_backup", 1},
-          {"schema", Hex(id.schema)},
-          {"serial_number", id.serial_number},
-          {"table_crc", Hex(crc)},
-          {"words", words}};
-}
-
-std::vector<std::uint16_t> ReadBackup(const std::string& path) {
-  const auto json = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
-  const auto bad = [&](const char* what) {
-    return io::InputError(path + ": expected a file of armcal backup: " + what);
-  };
-  if (!json.is_object() || json.value("armcal_backup", ordered_json()) != 1 || !json.contains("words"))
-    throw bad("with \"armcal_backup\": 1 and \"words\"");
-  std::vector<std::uint16_t> words;
-  if (!json["words"].is_array()) throw bad("\"words\" is no list");
-  for (const auto& w : json["words"]) {
-    if (!w.is_number_unsigned() || w.get<std::uint64_t>() > 0xFFFF) throw bad("a word is no number from 0 to 65535");
-    words.push_back(w.get<std::uint16_t>());
-  }
-  if (json.value("table_crc", ordered_json()) != Hex(core::Crc32Words(words.data(), words.size())))
-    throw bad("words and \"table_crc\" differ");
-  return words;
-}
-
-int RunBackup(const DeviceOptions& o) {
-  client::DriveClient drive = ConnectTo(o.connect);
-  const ordered_json backup = Backup(drive);
-  files::WriteWholeFile(o.file, backup.dump(1) + "\n");
-  fmt::print("{}: {} registers, CRC {}, written to {}\n", drive.name(), backup["words"].size(),
-             backup["table_crc"].get<std::string>(), o.file);
-  WriteJson(o.json, {{"file", o.file}, {"table_crc", backup["table_crc"]}, {"registers", backup["words"].size()}});
-  return kOk;
-}
-
-int RunRestore(const DeviceOptions& o) {
-  const std::vector<std::uint16_t> words = ReadBackup(o.file);
-  client::DriveClient drive = ConnectTo(o.connect);
-  const client::FlashReport report = client::FlashTable(drive, words);
-  fmt::print("{}: {} registers stored, adopted and read back: CRC {}, generation {}, store sequence {}\n", drive.name(),
-             words.size(), Hex(report.crc), report.generation, report.store_sequence);
-  WriteJson(o.json, {{"table_crc", Hex(report.crc)},
-                     {"readback_ok", true},
-                     {"generation", report.generation},
-                     {"store_sequence", report.store_sequence}});
-  return kOk;
-}
-
-int RunDiff(const DeviceOptions& o) {
-  const std::vector<std::uint16_t> words = ReadBackup(o.file);
-  client::DriveClient drive = ConnectTo(o.connect);
-  const auto active = client::ReadActiveTable(drive);
-  ordered_json differ = ordered_json::array();
-  for (std::size_t k = 0; k < std::max(words.size(), active.size()); ++k) {
-    const auto is = k < active.size() ? ordered_json(active[k]) : ordered_json(),
-               was = k < words.size() ? ordered_json(words[k]) : ordered_json();
-    if (is == was) continue;
-    differ.push_back({{"word", k}, {"drive", is}, {"file", was}});
-    fmt::print("word {}: drive {}, file {}\n", k, is.dump(), was.dump());
-  }
-  fmt::print("{}: {}\n", drive.name(),
-             differ.empty() ? "the table in force is this file's" : fmt::format("{} words differ", differ.size()));
-  WriteJson(o.json, {{"same", differ.empty()}, {"differ", differ}});
-  return differ.empty() ? kOk : kMismatch;
-}
-
 CLI::App* Add(CLI::App& app, Action& action, const char* name, const char* help,
               const std::shared_ptr<DeviceOptions>& o, int (*run)(const DeviceOptions&), bool connects = true) {
   auto* verb = app.add_subcommand(name, help);
@@ -397,23 +322,6 @@ void AddDevice(CLI::App& app, Action& action) {
   verb->add_flag("--csv", o->csv, "as CSV")->excludes(json);
   verb->add_flag("--md", o->markdown, "as the tables of SPEC.md")->excludes(json);
   verb->callback([o, &action] { action = [o] { return RunMap(*o); }; });
-  o = options();
-  verb = Add(app, action, "backup",
-             "write the table in force to a file, word for word\nexample: armcal backup drive.json --connect "
-             "127.0.0.1:1502",
-             o, RunBackup);
-  verb->add_option("file", o->file, "file to write")->required();
-  o = options();
-  verb = Add(app, action, "restore",
-             "store and adopt the table of a backup\nexample: armcal restore drive.json --connect 127.0.0.1:1502", o,
-             RunRestore);
-  verb->add_option("file", o->file, "file of armcal backup")->required();
-  o = options();
-  verb = Add(app, action, "diff",
-             "compare the table in force with a backup\nexit code 5: they differ\nexample: armcal diff drive.json "
-             "--connect 127.0.0.1:1502",
-             o, RunDiff);
-  verb->add_option("file", o->file, "file of armcal backup")->required();
 }
 
 }  // namespace armcal::tool

@@ -16,7 +16,8 @@ namespace {
 
 struct FlashOptions {
   std::string connect, robot, table, json;
-  bool force = false, dry_run = false;
+  bool force = false, dry_run = false, trial = false;
+  int limit_s = link::reg::kUsualTrial_s;  // of a trial
 };
 
 // The words that the file means for this drive. Parameters that the data hardly determined keep the drive's value
@@ -68,15 +69,21 @@ int Flash(const FlashOptions& o) {
   client::FlashReport report;
   {
     report::Progress progress("flash");
-    report = client::FlashTable(drive, words, [&](double share) { progress.Set(share); });
+    const auto show = [&](double share) { progress.Set(share); };
+    report = o.trial ? client::TryTable(drive, words, o.limit_s, show) : client::FlashTable(drive, words, show);
   }
-  fmt::print("{}: {} registers stored, adopted and read back: CRC {:08X}, generation {}, store sequence {}\n",
-             drive.name(), words.size(), report.crc, report.generation, report.store_sequence);
+  if (o.trial)
+    fmt::print("{}: {} registers on trial for {} s, not stored, and read back: CRC {:08X}, generation {}\n",
+               drive.name(), words.size(), o.limit_s, report.crc, report.generation);
+  else
+    fmt::print("{}: {} registers stored, adopted and read back: CRC {:08X}, generation {}, store sequence {}\n",
+               drive.name(), words.size(), report.crc, report.generation, report.store_sequence);
   WriteJson(o.json, {{"table_crc", fmt::format("{:08X}", report.crc)},
                      {"readback_ok", true},
                      {"generation", report.generation},
                      {"store_sequence", report.store_sequence},
                      {"registers", words.size()},
+                     {"trial_s", o.trial ? o.limit_s : 0},
                      {"from_prior", kept}});
   return kOk;
 }
@@ -123,6 +130,12 @@ void AddFlash(CLI::App& app, Action& action) {
                          "--connect 127.0.0.1:1502 --robot er20_like --table build/table.toml",
                          o);
   verb->add_flag("--dry-run", o->dry_run, "check and say what would be sent");
+  auto* trial = verb->add_flag("--trial", o->trial,
+                               "put it on trial: it is in force, and not stored until armcal trial --confirm");
+  verb->add_option("--limit", o->limit_s, "seconds after which a trial ends by itself")
+      ->needs(trial)
+      ->capture_default_str()
+      ->check(CLI::Range(1, int{link::reg::kLongestTrial_s}));
   verb->callback([o, &action] {
     action = [o] { return Reported(o->json, [&] { return Flash(*o); }, {{"readback_ok", false}}); };
   });

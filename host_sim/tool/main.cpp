@@ -35,6 +35,7 @@ int Main(int argc, char** argv) {
   AddHealth(app, action);
   AddLearning(app, action);
   AddDevice(app, action);
+  AddDriveTable(app, action);
   AddDemo(app, action);
   AddBench(app, action);
   AddSurvey(app, action);

@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include "armcal/core/crc.hpp"
+#include "armcal/core/words.hpp"
 #include "codegen/src/generator/load.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "tests/e2e/tool.hpp"
@@ -70,6 +71,59 @@ TEST_F(DeviceVerbs, ABackup_ComesBackWordForWord_AndADamagedOneIsRefused) {
   write(words, core::Crc32Words(words.data(), words.size()));
   EXPECT_EQ(Ask({"diff", file}).code, 5);
   EXPECT_EQ(Json()["differ"][0]["word"], 17);
+}
+
+// A table file with one number changed, so that two of them differ.
+TEST_F(DeviceVerbs, ATrial_IsStoredOnlyByConfirm_AndRollbackBringsTheOlderTable) {
+  const auto file = [&](double scale) {
+    auto table = calibration::DefaultTable(codegen::LoadModel("er20_like"));
+    table.joint[0].torque_scale = scale;
+    const std::string path = (folder_ / fmt::format("table_{}.toml", scale)).string();
+    calibration::WriteTable(path, table);
+    return path;
+  };
+  const auto flash = [&](double scale, std::vector<std::string> more = {}) {
+    std::vector<std::string> words = {"flash", "--robot", "er20_like", "--table", file(scale)};
+    words.insert(words.end(), more.begin(), more.end());
+    return Ask(words);
+  };
+  const auto scale = [&] {  // of the table in force
+    EXPECT_EQ(Ask({"get", "active_table"}).code, 0);
+    const auto words = Json()["value"].get<std::vector<std::uint16_t>>();
+    return core::GetF32(&words[16 + 6]);
+  };
+  ExpectOneLine(flash(1.01, {"--trial"}), 4, "WrongOrder");
+  ExpectOneLine(Ask({"rollback"}), 4, "Empty");
+  ASSERT_EQ(flash(1.01).code, 0);
+  const Outcome tried = flash(1.02, {"--trial", "--limit", "1200"});
+  ASSERT_EQ(tried.code, 0) << tried.err;
+  EXPECT_EQ(Json()["trial_s"], 1200);
+  EXPECT_EQ(Json()["store_sequence"], 1);
+  EXPECT_EQ(scale(), 1.02f);
+  ASSERT_EQ(Ask({"trial"}).code, 0);
+  EXPECT_EQ(Json()["on_trial"], true);
+  EXPECT_GT(Json()["left_s"], 1000);
+  ExpectOneLine(flash(1.03), 4, "WrongOrder");
+  ASSERT_EQ(Ask({"trial", "--end"}).code, 0);
+  EXPECT_EQ(Json()["on_trial"], false);
+  EXPECT_EQ(scale(), 1.01f);
+  ExpectOneLine(Ask({"trial", "--confirm"}), 4, "WrongOrder");
+  ASSERT_EQ(flash(1.02, {"--trial"}).code, 0);
+  ASSERT_EQ(Ask({"trial", "--confirm"}).code, 0);
+  EXPECT_EQ(Json()["store_sequence"], 2);
+  EXPECT_EQ(scale(), 1.02f);
+  ASSERT_EQ(Ask({"rollback"}).code, 0);
+  EXPECT_EQ(Json()["store_sequence"], 3);
+  EXPECT_EQ(scale(), 1.01f);
+  ASSERT_EQ(Ask({"rollback"}).code, 0) << "and forth";
+  EXPECT_EQ(scale(), 1.02f);
+  const Outcome log = Ask({"log"});
+  ASSERT_EQ(log.code, 0);
+  EXPECT_NE(log.out.find("trial   Ok"), std::string::npos) << log.out;
+  EXPECT_EQ(Json()["log"].size(), 32u);
+  EXPECT_EQ(Json()["log"].back()["command"], "save");
+  EXPECT_EQ(Json()["log"].back()["connection"], 0);
+  EXPECT_EQ(Json()["log"].back()["event"], Json()["events"].get<int>() - 1);
 }
 
 TEST_F(DeviceVerbs, WatchScanAndMap_WriteWhatTheyShow) {

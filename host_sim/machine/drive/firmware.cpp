@@ -110,6 +110,7 @@ class Compiled final : public Firmware {
     return controller_.feed_forward().valid() ? static_cast<double>(controller_.adopted().committed.torque_scale[j])
                                               : 1.0;
   }
+  void ReportTrackingError() override { controller_.ReportTrackingError(); }
   void Push(const Reading* readings) override {
     const std::uint32_t tick = tick_.load();
     model::RawSample<n> raw;

@@ -12,7 +12,7 @@
 
 namespace armcal::drive {
 
-inline constexpr int kFirmwareInterface = 2;
+inline constexpr int kFirmwareInterface = 3;
 
 // What the registers of the player do. Context: background.
 class PlayedMotion {
@@ -81,6 +81,8 @@ class Firmware {
   virtual bool KeepsUp() = 0;
   virtual std::uint32_t tick() const = 0;
   virtual void SetEnabled(bool enabled) = 0;
+  // The motion was stopped because a joint was too far from its set-point.
+  virtual void ReportTrackingError() = 0;
   // Arrays [joints]. tau_Nm: zero without a table.
   virtual void FeedForward(const double* q, const double* qd, const double* qdd, const double* temperature_degC,
                            double* tau_Nm) = 0;

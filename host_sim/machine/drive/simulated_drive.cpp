@@ -132,6 +132,8 @@ void SimulatedDrive::Tick() {
       player_.enabled() ? last_set_ : SetPoint{q, Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
   const SetPoint& set = player_.Step(tick, q);
   last_set_ = set;
+  if (before != player_.state() && player_.reason() == client::StopReason::kTrackingError)
+    firmware_->ReportTrackingError();
   Eigen::VectorXd tau_ff(n);
   firmware_->FeedForward(set.q.data(), set.qd.data(), set.qdd.data(), sensors_.temperature_degC.data(), tau_ff.data());
 

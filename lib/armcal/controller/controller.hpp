@@ -29,6 +29,9 @@ struct SetPoint {
 struct BoardRules {
   bool adopt_while_enabled = false;  // a bumpless table may be adopted while axes are enabled
   link::SaveRate saves = {};
+  // Whether clients may write now; a register shows the answer. nullptr: they may. See link::ClientRequests.
+  bool (*may_write)(void* context) = nullptr;
+  void* context = nullptr;  // of may_write
 };
 
 // One motion controller. It lives as long as the power is on, and takes some 80 KB for six joints. Filters: one or two
@@ -53,8 +56,9 @@ class Controller {
         rules_(rules),
         ceilings_(model::View(ceilings)),
         store_(storage, Model::kSchema, kWords, kFirstWords),
-        transaction_({this, Check, Permit, Adopt}, store_, Model::kSchema, staged_, active_, kWords, rules.saves),
-        device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals}),
+        transaction_({this, Check, Permit, Adopt, TryOut, GiveBack, Doubt}, store_, Model::kSchema, staged_, active_,
+                     kWords, rules.saves),
+        device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals, MayWrite}),
         estimators_(Shared<Filters>()...) {
     model::Encode(estimator::DefaultTable<Model>(), active_, model::kFirstLayout);  // as clients of any age read it
     estimator<0>().SetResiduals(&residuals_);
@@ -79,6 +83,10 @@ class Controller {
 
   // Which axes are under control, a bit each. While an axis is enabled, only a bumpless table is adopted. Context: any.
   void SetEnabledAxes(std::uint32_t axes) { enabled_axes_.store(axes, std::memory_order_relaxed); }
+
+  // The motion controller says that the axes did not follow the set-point. A table on trial is then taken back; without
+  // one nothing happens. Context: any.
+  void ReportTrackingError() { tracking_error_.store(true, std::memory_order_relaxed); }
 
   // Lets a client record the raw samples of Push, and of FeedForward the positions of the set-point and the torque that
   // it answered. `ring` must live as long as this object. Call it once, before the first tick. Answers as
@@ -251,6 +259,11 @@ class Controller {
     return status;
   }
 
+  static bool MayWrite(void* self) {
+    const BoardRules& rules = static_cast<Controller*>(self)->rules_;
+    return rules.may_write == nullptr || rules.may_write(rules.context);
+  }
+
   // The calls of link::TableApplication, which link::TableTransaction makes when a table is flashed. Check decodes and
   // builds the table, once and in slices. What it has built waits in the spare until it is adopted or until another
   // table is checked. Context: background.
@@ -277,6 +290,31 @@ class Controller {
     return offered;
   }
 
+  // The spare becomes the table in force, and the table in force the spare, which GiveBack uses.
+  static core::Status TryOut(void* self) {
+    auto& c = *static_cast<Controller*>(self);
+    if (const core::Status permitted = Permit(self); !core::IsOk(permitted)) return permitted;
+    c.tracking_error_.store(false, std::memory_order_relaxed);
+    c.FadeIn();
+    return core::Status::kOk;
+  }
+  static void GiveBack(void* self) { static_cast<Controller*>(self)->FadeIn(); }
+  static core::Status Doubt(void* self) {
+    auto& c = *static_cast<Controller*>(self);
+    if (c.tracking_error_.load(std::memory_order_relaxed)) return core::Status::kTrackingError;
+    return c.live_.health != 0 ? core::Status::kInconsistent : core::Status::kOk;
+  }
+  // Puts the spare in force with the shortest fade that the ceilings allow, whatever its table says.
+  void FadeIn() {
+    model::Committed<Model>& committed = Spare().committed;
+    committed.generation = generation_ + 1;
+    committed.bumpless = true;
+    committed.blend_ticks = static_cast<std::uint32_t>(static_cast<float>(ceilings_.table->least_fade_ms) *
+                                                       (Model::kTickRate_Hz / 1000.0f));
+    (void)feed_forward_.Offer(committed, enabled());  // a bumpless table is never refused
+    PutInForce();
+  }
+
   bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
   // The adopted table that nobody reads: the estimators read the other one, and the feed-forward has a copy.
   estimator::AdoptedTable<Model>& Spare() { return adopted_[1 - in_force_.load(std::memory_order_relaxed)]; }
@@ -287,6 +325,7 @@ class Controller {
   // The estimators restart in slices after this, and do nothing else until then.
   void PutInForce() {
     spare_is_checked_ = false;  // from now on the spare is the table before
+    live_.health = 0;           // it told of the table before
     const std::uint32_t now = clock_.Ticks();
     adopted_tick_.store(now, std::memory_order_relaxed);
     restarts_due_ = (1u << kFilters) - 1u;
@@ -350,6 +389,7 @@ class Controller {
   int turn_ = 0;  // the estimator that worked last
   std::uint32_t generation_ = 0;
   std::atomic<int> in_force_{0};
+  std::atomic<bool> tracking_error_{false};
   std::atomic<std::uint32_t> adopted_tick_{0}, enabled_axes_{0}, feedforward_state_{0}, clamp_count_{0};
 };
 

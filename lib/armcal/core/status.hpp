@@ -36,6 +36,8 @@ enum class [[nodiscard]] Status : std::uint8_t {
   kBlank = 33,          // storage holds no record at all
   kCorrupt = 34,        // storage holds a record that fails its checks
   kTimeout = 35,        // a partner did not answer in time
+  kInconsistent = 36,   // what is measured does not fit the table
+  kTrackingError = 37,  // the axes did not follow the set-point
   kGated = 64,          // accepted, but no row of the sample may update an estimate
   kClamped = 65,        // a value was cut to its limit; the limit's counter went up
   kHeld = 66,           // the last good value is kept

@@ -22,6 +22,8 @@ Status Device::ServeOwn() {
       FilledBlock<reg::kDoubtBlock, &Device::FillDoubt>(this),
       FilledBlock<reg::kWritingBlock, &Device::FillWriting>(this),
       FilledBlock<reg::kTableBlock, &Device::FillTable>(this),
+      FilledBlock<reg::kLogBlock, &Device::FillLog>(this),
+      FilledBlock<reg::kTrialLimit, &Device::FillTrialLimit, &Device::TakeTrialLimit>(this),
       DirectBlock<&Device::ReadOverview>(SpanOf(reg::kOverview), this),
       FilledBlock<reg::kResidualHeaderBlock, &Device::FillResidualHeader>(this),
       DirectBlock<&FloatList::Read>(reg::kResidualValuesBlock, &residual_values_),
@@ -53,7 +55,7 @@ void Device::Step(std::uint32_t now_ms) {
   sessions.Tell(now_ms);
   const bool late = now_ms - touched_ms_ >= kUnlock_ms;
   if (sessions.writer() != Sessions::kNobody && (late || !sessions.IsOpen(sessions.writer()))) LeaveSeat();
-  transaction_.Step(now_ms);
+  transaction_.Step(now_ms, live_.tick);
 }
 
 // Identity and status ------------------------------------------------------------------------------------------------
@@ -131,6 +133,8 @@ void Device::FillWriting(Words<reg::kWritingBlock>& w) {
 void Device::FillTable(Words<reg::kTableBlock>& w) {
   w.Set<reg::kTableRoom>(transaction_.words());
   w.Set<reg::kActiveWords>(transaction_.active_words());
+  w.Set<reg::kWritingAllowed>(MayWrite());
+  w.Set<reg::kTrialLeft>(transaction_.trial_left_s());
 }
 
 Status Device::ReadOverview(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
@@ -161,8 +165,9 @@ void Device::LeaveSeat() {
   transaction_.Abandon();
 }
 
-// kLocked, kSeatTaken; or kOk, and the seat is kept for another while.
+// kForbidden, kLocked, kSeatTaken; or kOk, and the seat is kept for another while.
 Status Device::NeedsUnlock() {
+  if (!MayWrite()) return Status::kForbidden;
   if (!Seated()) return map_.sessions().IsPresent(map_.sessions().writer()) ? Status::kSeatTaken : Status::kLocked;
   touched_ms_ = now_ms_;
   return Status::kOk;
@@ -178,6 +183,7 @@ Status Device::TakeUnlock(const Words<reg::kUnlock>& w) {
     return Status::kOk;
   }
   if (key != reg::kUnlockKey) return Status::kLocked;
+  if (!MayWrite()) return Status::kForbidden;
   if (!Seated()) {
     if (sessions.IsPresent(sessions.writer())) return Status::kSeatTaken;
     LeaveSeat();
@@ -204,7 +210,25 @@ Status Device::TakeCommand(const Words<reg::kCommandBlock>& w) {
   const Status unlocked = NeedsUnlock();
   if (!core::IsOk(unlocked)) return unlocked;
   if (w.Get<reg::kCommandReserved>() != 0) return Status::kOutOfRange;
-  return transaction_.Command(command);
+  return transaction_.Command(command, map_.sessions().asking());
+}
+
+void Device::FillTrialLimit(Words<reg::kTrialLimit>& w) { w.Set<reg::kTrialLimit>(transaction_.trial_limit_s()); }
+
+Status Device::TakeTrialLimit(const Words<reg::kTrialLimit>& w) {
+  const Status unlocked = NeedsUnlock();
+  return core::IsOk(unlocked) ? transaction_.SetTrialLimit(w.Get<reg::kTrialLimit>()) : unlocked;
+}
+
+void Device::FillLog(Words<reg::kLogBlock>& w) {
+  const EventLog& log = transaction_.log();
+  w.Set<reg::kLogCount>(log.count());
+  for (std::uint32_t k = 0; k < EventLog::kEvents; ++k) {
+    w.Put<reg::kLogTick>(k, log.at(k).tick);
+    w.Put<reg::kLogConnection>(k, log.at(k).connection);
+    w.Put<reg::kLogCommand>(k, log.at(k).command);
+    w.Put<reg::kLogStatus>(k, log.at(k).status);
+  }
 }
 
 Status Device::ReadStaged(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {

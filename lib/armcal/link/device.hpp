@@ -56,6 +56,9 @@ struct ClientRequests {
   core::Status (*reset)(void* context, int block);
   // Fills all of `page`. joint: from 0.
   void (*take_residuals)(void* context, int joint, ResidualPage& page);
+  // Whether clients may write now, for example by the position of a key switch. It is asked at every unlock, table
+  // command, write to the stage and command to the estimators. nullptr: they may.
+  bool (*may_write)(void* context) = nullptr;
 };
 
 // Only one session at a time may load tables and command learning: the one that has the seat. A session takes the seat
@@ -106,6 +109,7 @@ class Device {
   core::Status ServeOwn();
   bool Seated();
   void LeaveSeat();
+  bool MayWrite() const { return requests_.may_write == nullptr || requests_.may_write(requests_.context); }
   core::Status NeedsUnlock();
 
   void FillIdentity(Words<reg::kIdentityBlock>& w);
@@ -127,6 +131,9 @@ class Device {
   core::Status TakeReset(const Words<reg::kLearningReset>& w);
   void FillSelect(Words<reg::kResidualSelect>& w);
   core::Status TakeSelect(const Words<reg::kResidualSelect>& w);
+  void FillTrialLimit(Words<reg::kTrialLimit>& w);
+  core::Status TakeTrialLimit(const Words<reg::kTrialLimit>& w);
+  void FillLog(Words<reg::kLogBlock>& w);
   void FillResidualHeader(Words<reg::kResidualHeaderBlock>& w);
 
   Identity identity_;

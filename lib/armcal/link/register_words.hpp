@@ -29,9 +29,15 @@ class Words {
   // T is the register's type. It may also be an enumeration or bool, whose number is then sent.
   template <const Register& kRegister, int kElement = 0, class T>
   void Set(T value) {
+    static_assert(kElement >= 0 && kElement < kRegister.count, "the register has fewer elements");
+    Put<kRegister>(kElement, value);
+  }
+  // The same for an element that the compiler does not know; it must be one of the register's.
+  template <const Register& kRegister, class T>
+  void Put(std::uint32_t element, T value) {
     using Value = ValueOf<kRegister>;
     static_assert(std::is_same_v<T, Value> || std::is_enum_v<T> || std::is_same_v<T, bool>, "a value of another type");
-    std::uint16_t* w = words_ + OffsetOf<kRegister, kElement>();
+    std::uint16_t* w = words_ + OffsetOf<kRegister, 0>() + element * WordsOf(kRegister.type);
     if constexpr (kRegister.type == RegisterType::kU16) *w = static_cast<Value>(value);
     if constexpr (kRegister.type == RegisterType::kU32) core::PutU32(w, static_cast<Value>(value));
     if constexpr (kRegister.type == RegisterType::kF32) core::PutF32(w, value);
@@ -39,7 +45,12 @@ class Words {
 
   template <const Register& kRegister, int kElement = 0>
   ValueOf<kRegister> Get() const {
-    const std::uint16_t* w = words_ + OffsetOf<kRegister, kElement>();
+    static_assert(kElement >= 0 && kElement < kRegister.count, "the register has fewer elements");
+    return At<kRegister>(kElement);
+  }
+  template <const Register& kRegister>
+  ValueOf<kRegister> At(std::uint32_t element) const {
+    const std::uint16_t* w = words_ + OffsetOf<kRegister, 0>() + element * WordsOf(kRegister.type);
     if constexpr (kRegister.type == RegisterType::kU16) return *w;
     if constexpr (kRegister.type == RegisterType::kU32) return core::GetU32(w);
     if constexpr (kRegister.type == RegisterType::kF32) return core::GetF32(w);

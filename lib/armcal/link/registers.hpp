@@ -114,7 +114,8 @@ inline constexpr std::uint16_t kResidualBinValues = kResidualSignals * 2 * kResi
 inline constexpr std::uint16_t kResidualSliceValues = 3 * kResidualSlices;
 inline constexpr std::uint16_t kResidualValues = 2 * kResidualBinValues + kResidualSliceValues;
 inline constexpr std::uint16_t kWindowWords = 114;  // with its header they fill one reply
-inline constexpr int kTraces = 2;                   // 0 raw samples, 1 processed samples
+inline constexpr std::uint16_t kLogEvents = 32, kLongestTrial_s = 3600, kUsualTrial_s = 600;
+inline constexpr int kTraces = 2;  // 0 raw samples, 1 processed samples
 inline constexpr std::uint16_t kVendor = 0x8000;
 
 // Values that never change.
@@ -127,6 +128,10 @@ inline constexpr std::uint32_t kProbeU32Value = 0x12345678;
 inline constexpr std::uint32_t kOpen = 0x6E65706F;       // "open"
 inline constexpr std::uint32_t kCheck = 0x6B656863;      // "chek"
 inline constexpr std::uint32_t kSave = 0x65766173;       // "save"
+inline constexpr std::uint32_t kTrial = 0x61697274;      // "tria"
+inline constexpr std::uint32_t kConfirm = 0x666E6F63;    // "conf"
+inline constexpr std::uint32_t kBack = 0x6B636162;       // "back"
+inline constexpr std::uint32_t kLoad = 0x64616F6C;       // "load"
 inline constexpr std::uint32_t kUnlockKey = 0x6B6C6E75;  // "unlk"
 
 // Bits of `capabilities`.
@@ -158,7 +163,7 @@ inline constexpr Register kPageDataWords = In(0x0019, 1, kU16, "page_data_words"
 inline constexpr Span kIdentityBlock = Between(kMagic, kPageDataWords);
 
 // Status: what the device does now, and the last request that it refused.
-inline constexpr Register kTransactionState = In(0x0040, 1, kU16, "transaction_state", "", "0 idle, 1 open, 2 loading, 3 checked, 4 committing, 5 active, 6 failed");
+inline constexpr Register kTransactionState = In(0x0040, 1, kU16, "transaction_state", "", "0 idle, 1 open, 2 loading, 3 checked, 4 committing, 5 active, 6 failed, 7 on trial");
 inline constexpr Register kTransactionStatus = In(0x0041, 1, kU16, "transaction_status", "", "Status of the last command, or why it failed later");
 inline constexpr Register kTableStatus = In(0x0042, 1, kU16, "table_status", "", "Status: 0 a valid table is active, else why not");
 inline constexpr Register kFeedForwardState = In(0x0043, 1, kU16, "feedforward_state", "", "0 off: no valid table, 1 on, 2 cross-fading");
@@ -199,7 +204,9 @@ inline constexpr Register kSaveWait = In(0x0077, 1, kU16, "save_wait", "s", "unt
 inline constexpr Span kWritingBlock = Between(kRefusedStatus, kSaveWait);
 inline constexpr Register kTableRoom = In(0x0078, 1, kU16, "table_room", "", "registers of the longest table that the drive takes, of layout version 2");
 inline constexpr Register kActiveWords = In(0x0079, 1, kU16, "active_words", "", "registers of the table in force");
-inline constexpr Span kTableBlock = Between(kTableRoom, kActiveWords);
+inline constexpr Register kWritingAllowed = In(0x007A, 1, kU16, "writing_allowed", "", "1: the board lets clients write, 0: it refuses, for example by a key switch");
+inline constexpr Register kTrialLeft = In(0x007B, 1, kU16, "trial_left", "s", "until the trial of a table ends, 0: there is none");
+inline constexpr Span kTableBlock = Between(kTableRoom, kTrialLeft);
 inline constexpr Span kErrorBlock = Between(kErrorException, kErrorStatus);
 
 // Estimates: lists of floats, one a joint or one a column.
@@ -224,6 +231,14 @@ inline constexpr Span kResidualValuesBlock = Between(kResidualReference, kResidu
 
 // The identity and everything about the state, for one request.
 inline constexpr Register kOverview = In(0x0C00, kIdentityBlock.count + kWritingBlock.end() - kStatusBlock.first, kU16, "overview", "", "copy of 0x0000-0x0019, and behind it of 0x0040-0x0077");
+
+// The last events of the table. Event number k, from 0, lies in element k modulo 32.
+inline constexpr Register kLogCount = In(0x0D00, 1, kU32, "log_count", "", "table events since power-up");
+inline constexpr Register kLogTick = In(0x0D02, kLogEvents, kU32, "log_tick", "", "tick of each event; event number k, from 0, lies in element k modulo 32");
+inline constexpr Register kLogConnection = In(0x0D42, kLogEvents, kU32, "log_connection", "", "connection that asked, 0: the drive itself");
+inline constexpr Register kLogCommand = In(0x0D82, kLogEvents, kU32, "log_command", "", "command word; also boot 0x746F6F62, drop 0x706F7264");
+inline constexpr Register kLogStatus = In(0x0DC2, kLogEvents, kU16, "log_status", "", "Status of its answer or end");
+inline constexpr Span kLogBlock = Between(kLogCount, kLogStatus);
 
 // A page of a trace: a header, then records. The names trace0_arm and trace0_arm_number mean the recording. Programs use them, so they stay.
 inline constexpr Register kTraceFirstRecord = Twice(In(0x4000, 1, kU32, "trace0_first_record", "", "number of the page's first record, counted from the start of the recording"), "trace1_first_record", kPageStride);
@@ -255,16 +270,17 @@ inline constexpr Span kWindowBlock = Between(kWindowFirstRecord, kWindowData);
 
 // A command of a table transaction.
 inline constexpr Register kSequence = Within(1, 4294967295.0, Hold(0x0000, 1, kU32, kBlock, "sequence", "", "client's number of this command, not 0"));
-inline constexpr Register kCommand = Hold(0x0002, 1, kU32, kBlock, "command", "", "open 0x6E65706F, check 0x6B656863, save 0x65766173");
+inline constexpr Register kCommand = Hold(0x0002, 1, kU32, kBlock, "command", "", "open 0x6E65706F, check 0x6B656863, save 0x65766173, trial 0x61697274, confirm 0x666E6F63, back 0x6B636162, load 0x64616F6C");
 inline constexpr Register kCommandSchema = Hold(0x0004, 1, kU32, kBlock, "command_schema", "", "schema of the table");
 inline constexpr Register kCommandWords = Within(1, kMaxTableWords, Hold(0x0006, 1, kU16, kBlock, "command_words", "", "registers of the table"));
 inline constexpr Register kCommandReserved = Within(0, 0, Hold(0x0007, 1, kU16, kBlock, "command_reserved", "", "0"));
-inline constexpr Register kCommandCrc = Hold(0x0008, 1, kU32, kBlock, "command_crc", "", "CRC-32 over the table's registers; open: ignored");
+inline constexpr Register kCommandCrc = Hold(0x0008, 1, kU32, kBlock, "command_crc", "", "CRC-32 over the table's registers; open, back, load: ignored");
 inline constexpr Span kCommandBlock = Between(kSequence, kCommandCrc);
 
 // The session's lock, and registers for trying the connection.
 inline constexpr Register kScratch = Hold(0x0020, kScratchWords, kU16, kWrite, "scratch", "", "does nothing: for trying the connection");
 inline constexpr Register kUnlock = Hold(0x0040, 1, kU32, kWrite, "unlock", "", "write 0x6B6C6E75, or 0 to give the seat up; reads 1 while this connection has unlocked, else 0");
+inline constexpr Register kTrialLimit = Within(1, kLongestTrial_s, Hold(0x0048, 1, kU16, kWrite, "trial_limit", "s", "how long the next trial may last; open sets 600; needs unlock"));
 inline constexpr Register kScratchFloat = Hold(0x0050, kScratchValues, kF32, kWrite, "scratch_float", "", "does nothing; NaN and infinity are refused");
 inline constexpr Register kScratchU32 = Hold(0x0058, kScratchValues, kU32, kWrite, "scratch_u32", "", "does nothing; half a value is refused");
 
@@ -296,7 +312,8 @@ inline constexpr const Register* kDeclared[] = {
   &kErrorAddress, &kErrorStatus, &kErrorRequest, &kUnlocked, &kHealth, &kRowsUsedA, &kRowsGatedA, &kRowsUsedB, &kRowsGatedB,
   &kRowsOutsideA, &kRowsOutsideB, &kImplausibleTicks, &kTableFallbacks,
   &kRefusedStatus, &kRefusedWord, &kRefusedValue, &kRefusedBound, &kWriterSeat, &kSaveWait,
-  &kTableRoom, &kActiveWords,
+  &kTableRoom, &kActiveWords, &kWritingAllowed, &kTrialLeft, &kTrialLimit,
+  &kLogCount, &kLogTick, &kLogConnection, &kLogCommand, &kLogStatus,
   &kResidualRms, &kConsistency, &kEstimateA, &kDeviationA, &kEstimateB, &kDeviationB,
   &kResidualJoint, &kResidualSnapshot, &kResidualGeneration, &kResidualElapsed, &kResidualSigma, &kResidualReference, &kResidualRecent,
   &kResidualHistory,
@@ -322,6 +339,7 @@ enum class TransactionState : std::uint16_t {
   kCommitting = 4,  // being stored, then adopted
   kActive = 5,      // the staged table is stored and in force
   kFailed = 6,      // the table before the staged one is stored and in force
+  kOnTrial = 7,     // the staged table is in force; the table before it is stored
 };
 enum class TraceMode : std::uint16_t { kOff = 0, kOneShot = 1, kStreaming = 2 };
 enum class TraceState : std::uint16_t { kOff = 0, kWaiting = 1, kRecording = 2, kDone = 3 };
@@ -381,10 +399,10 @@ constexpr bool IsWhole(const Span& block) {
   return at == block.end();
 }
 static_assert(IsWhole(reg::kIdentityBlock) && IsWhole(reg::kStatusBlock) && IsWhole(reg::kDoubtBlock) &&
-                  IsWhole(reg::kWritingBlock) && IsWhole(reg::kTableBlock) && IsWhole(reg::kErrorBlock) &&
-                  IsWhole(reg::kResidualHeaderBlock) && IsWhole(reg::kResidualValuesBlock) &&
-                  IsWhole(reg::kTracePageBlock) && IsWhole(reg::kCommandBlock) && IsWhole(reg::kWindowHeader) &&
-                  IsWhole(reg::kWindowBlock) && IsWhole(reg::kTraceStartBlock),
+                  IsWhole(reg::kWritingBlock) && IsWhole(reg::kTableBlock) && IsWhole(reg::kLogBlock) &&
+                  IsWhole(reg::kErrorBlock) && IsWhole(reg::kResidualHeaderBlock) &&
+                  IsWhole(reg::kResidualValuesBlock) && IsWhole(reg::kTracePageBlock) && IsWhole(reg::kCommandBlock) &&
+                  IsWhole(reg::kWindowHeader) && IsWhole(reg::kWindowBlock) && IsWhole(reg::kTraceStartBlock),
               "a block has a gap, or a register of it is not listed in kDeclared");
 
 constexpr std::uint32_t LayoutCrc() {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "armcal/core/status.hpp"
+#include "armcal/link/event_log.hpp"
 #include "armcal/link/registers.hpp"
 #include "armcal/table/table_store.hpp"
 
@@ -23,6 +24,14 @@ struct TableApplication {
   // Puts in force what the last check built. kBusy: call again, it is not finished. Any other answer but kOk: no
   // effect. The transaction calls it only as long as the staged words are those of the last check.
   core::Status (*adopt)(void* context);
+  // Puts in force what the last check built, without a word about storage: it fades in by the shortest fade, and what
+  // was in force stays ready for give_back(). kOk; any other answer: no effect.
+  core::Status (*try_out)(void* context);
+  // Puts in force what was in force before try_out(), also while axes are enabled, by the shortest fade. The
+  // transaction checks no other table in between.
+  void (*give_back)(void* context);
+  // Whether a table on trial does well: kOk, or why it must end.
+  core::Status (*doubt)(void* context);
 };
 
 // How often tables may be stored, because a storage wears out: `burst` saves without a pause, then one in each
@@ -46,7 +55,10 @@ struct TableCommand {
 // kAxisEnabled: if it still does so after kStageTimeout_ms), the stored record is erased, and the state is kFailed: the
 // table before is in force. Status kStorageFault means that the storage failed; see TableStore::Step. A command with
 // the same sequence number and content as the last accepted one has no second effect. So a client that lost a reply may
-// send it again. Context of every call: background.
+// send it again.
+// In place of a save, a client may put a checked table on trial. It is then in force and not stored. A confirm stores
+// it. The table before comes back when the time limit has passed, when the application has doubts, or when the client
+// asks for it; a power cut has the same effect. Context of every call: background.
 class TableTransaction {
  public:
   // After this time without a write, the staged words are dropped. After this time, an adoption that is still refused
@@ -64,13 +76,14 @@ class TableTransaction {
   // Step() finishes it.
   core::Status Boot();
 
-  // kWrongOrder: not in this state, or the sequence is 0 or was used with other content. kOutOfRange: no such command.
-  // kWrongSchema: not a table of this firmware. kWrongSize: it has no table of this length, or another one was opened.
-  // kBadCrc: check: the staged words have another checksum; save: the checksum is not that of the last check. kBusy:
-  // committing, or another command is being checked. kTooSoon: the rate of saves. Or the application's answer.
-  // kUnfinished: it is being checked; the same command again gives the answer when Step() has done the rest.
-  // kStorageFault and kTimeout appear in status() only.
-  core::Status Command(const TableCommand& command);
+  // `connection`: who asks, for the log. kWrongOrder: not in this state, or the sequence is 0 or was used with other
+  // content; trial: no stored table is in force. kEmpty, kCorrupt, kStorageFault: load: no older table is there to
+  // read. kOutOfRange: no such command. kWrongSchema: not a table of this firmware. kWrongSize: it has no table of this
+  // length, or another one was opened. kBadCrc: check: the staged words have another checksum; save: the checksum is
+  // not that of the last check. kBusy: committing, or another command is being checked. kTooSoon: the rate of saves. Or
+  // the application's answer. kUnfinished: it is being checked; the same command again gives the answer when Step() has
+  // done the rest. kStorageFault and kTimeout appear in status() only.
+  core::Status Command(const TableCommand& command, std::uint32_t connection = 0);
   // Returns true if `command` equals the last accepted command, sequence number included. Then Command() has no effect.
   bool IsRepeat(const TableCommand& command) const;
   // Drops the staged words and a running check, because their writer is gone. A commit goes on.
@@ -80,9 +93,14 @@ class TableTransaction {
   // kBusy: committing or checking.
   core::Status WriteStaged(std::uint16_t offset, std::uint16_t count, const std::uint16_t* words);
 
-  // Does one bounded piece of a check or a commit. Drops the staged words after kStageTimeout_ms without a write (state
-  // kIdle, status kTimeout).
-  void Step(std::uint32_t now_ms);
+  // Does one bounded piece of a check, a load or a commit. Drops the staged words after kStageTimeout_ms without a
+  // write (state kIdle, status kTimeout). Ends a trial if it must (state kFailed, and the reason as status).
+  void Step(std::uint32_t now_ms, std::uint32_t tick = 0);
+
+  // How long the next trial may last: 1 to reg::kLongestTrial_s. An open sets reg::kUsualTrial_s.
+  core::Status SetTrialLimit(std::uint16_t limit_s);
+  std::uint16_t trial_limit_s() const { return trial_limit_s_; }
+  std::uint16_t trial_left_s() const;  // 0: no trial
 
   TransactionState state() const { return state_; }
   bool busy() const { return phase_ != Phase::kNone; }  // Step() has something to do
@@ -97,10 +115,12 @@ class TableTransaction {
   std::uint16_t words() const { return words_; }                // of the longest table
   std::uint16_t active_words() const { return active_words_; }  // of the table in force
   const table::TableStore& store() const { return store_; }
+  const EventLog& log() const { return log_; }
 
  private:
-  enum class Phase : std::uint8_t { kNone, kChecking, kStoring, kAdopting, kRevoking, kBooting };
+  enum class Phase : std::uint8_t { kNone, kChecking, kLoading, kStoring, kAdopting, kRevoking, kBooting };
 
+  void BootFromStore();
   core::Status Apply(const TableCommand& command);
   bool staging() const {
     return state_ == TransactionState::kOpen || state_ == TransactionState::kLoading ||
@@ -110,10 +130,23 @@ class TableTransaction {
   core::Status Check(const TableCommand& command);
   void CheckNext();
   void Answer(core::Status status);
+  core::Status Load(const TableCommand& command);
+  void LoadNext();
+  core::Status MayStore(const TableCommand& command, TransactionState wanted) const;
+  core::Status Store(const std::uint16_t* words, std::uint16_t count);
   core::Status Save(const TableCommand& command);
+  core::Status Trial(const TableCommand& command);
+  core::Status Confirm(const TableCommand& command);
+  core::Status Back();
+  void WatchTrial();
+  void SwapTables();
+  void StoreNext();
+  void Revoke(core::Status why);
+  void Note(std::uint32_t command, core::Status status, std::uint32_t connection = 0);
   void Adopt();
   void Activate();
   void Finish(TransactionState state, core::Status status);
+  void End(TransactionState state, core::Status status);
 
   TableApplication application_;
   table::TableStore& store_;
@@ -140,6 +173,12 @@ class TableTransaction {
   std::uint32_t active_crc_ = 0;
   std::uint32_t now_ms_ = 0;
   std::uint32_t touched_ms_ = 0;
+  std::uint32_t tick_ = 0;
+  EventLog log_;
+  std::uint32_t checking_connection_ = 0;
+  std::uint16_t trial_limit_s_ = reg::kUsualTrial_s;
+  std::uint32_t trial_ms_ = 0, trial_began_ms_ = 0;  // of the trial that runs
+  bool confirming_ = false;                          // what is being stored is a table on trial
   SaveRate rate_;
   std::uint16_t saves_left_;
   std::uint32_t earned_ms_ = 0;  // when the last one of saves_left_ was earned

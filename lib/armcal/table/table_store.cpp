@@ -225,6 +225,34 @@ Status TableStore::Revoke() {
   return Status::kOk;
 }
 
+Status TableStore::Copy(std::uint16_t* out) {
+  if (busy()) return Status::kBusy;
+  checking_ = current_ == 0 ? 1 : 0;
+  if (current_ < 0 || state_[checking_] != SlotState::kGood) return Status::kEmpty;
+  copy_ = out;
+  check_ = 0;
+  at_ = 0;
+  stage_ = Stage::kCopy;
+  return Status::kOk;
+}
+
+// First the header, which only counts for the checksum, then the words.
+Status TableStore::CopyNext() {
+  const std::uint32_t base = AddressOf(checking_), end = kHeaderBytes + 2 * length_[checking_];
+  std::uint8_t bytes[kChunkBytes];
+  const std::uint32_t left = at_ == 0 ? kHeaderBytes : end - at_, count = left < kChunkBytes ? left : kChunkBytes;
+  bool good = IsOk(storage_.Read(base + at_, bytes, count));
+  check_ = core::Crc32(bytes, count, check_);
+  if (at_ != 0)
+    for (std::uint32_t i = 0; i < count; i += 2) copy_[(at_ + i - kHeaderBytes) / 2] = core::GetBytes16(bytes + i);
+  at_ += count;
+  if (good && at_ < end) return Status::kBusy;
+  stage_ = Stage::kIdle;
+  if (good) good = IsOk(storage_.Read(base + end, bytes, kCrcBytes));
+  if (!good) return Status::kStorageFault;
+  return check_ != core::GetBytes32(bytes) ? Status::kCorrupt : Status::kOk;
+}
+
 Status TableStore::Step() {
   switch (stage_) {
     case Stage::kIdle:
@@ -243,6 +271,8 @@ Status TableStore::Step() {
       return VerifyCommit();
     case Stage::kRevoke:
       return EraseTarget();
+    case Stage::kCopy:
+      return CopyNext();
   }
   return Status::kOk;
 }

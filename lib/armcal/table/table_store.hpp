@@ -80,14 +80,23 @@ class TableStore {
   // running.
   core::Status Revoke();
 
-  // One piece of a save or of Revoke. kBusy: call again. kOk: nothing is left to do. kStorageFault: the save or the
-  // Revoke failed; the table before it is in force. If the driver has also refused to erase the new record (slot_state:
-  // kCorrupt), the next power-up may load that record.
+  // Begins to copy the good record that is not in force to `out` [words]. Call Step until it no longer answers kBusy;
+  // words_copied() is then its length. kOk: it has begun. kEmpty: there is no such record. kBusy: a save is running.
+  core::Status Copy(std::uint16_t* out);
+  // Ends a Copy that is not finished; `out` may hold a part of the record.
+  void StopCopy() {
+    if (stage_ == Stage::kCopy) stage_ = Stage::kIdle;
+  }
+
+  // One piece of a save, of Revoke or of Copy. kBusy: call again. kOk: nothing is left to do. kCorrupt: the record that
+  // Copy reads has changed. kStorageFault: the storage failed; the table before a save or a Revoke is in force. If the
+  // driver has also refused to erase the new record (slot_state: kCorrupt), the next power-up may load that record.
   core::Status Step();
 
   bool busy() const { return stage_ != Stage::kIdle; }
   bool Takes(std::uint32_t count) const { return count != 0 && (count == words_ || count == shorter_); }
   std::uint32_t shortest() const { return shorter_ != 0 ? shorter_ : words_; }  // length of a table
+  std::uint32_t words_copied() const { return length_[checking_]; }
   std::uint32_t words_in_force() const { return current_ < 0 ? 0 : length_[current_]; }
   SlotState slot_state(int slot) const { return state_[slot]; }
   std::uint32_t sequence() const { return current_ < 0 ? 0 : sequence_[current_]; }  // of the table in force, 0: none
@@ -95,7 +104,17 @@ class TableStore {
   std::uint32_t fallbacks() const { return fallbacks_; }  // records passed over since power-up
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kRecheck, kErase, kProgram, kVerify, kCommit, kVerifyCommit, kRevoke };
+  enum class Stage : std::uint8_t {
+    kIdle,
+    kRecheck,
+    kErase,
+    kProgram,
+    kVerify,
+    kCommit,
+    kVerifyCommit,
+    kRevoke,
+    kCopy
+  };
 
   bool Fits() const;
   std::uint32_t BaseOf(int slot) const { return static_cast<std::uint32_t>(slot) * (storage_.sector_count / 2); }
@@ -109,6 +128,7 @@ class TableStore {
   core::Status TakeBest(std::uint16_t* out);
   core::Status RecheckNext();
   void BeginRecheck(int slot);
+  core::Status CopyNext();
   core::Status EraseNext();
   core::Status ProgramNext();
   core::Status VerifyNext();
@@ -129,12 +149,13 @@ class TableStore {
   Stage stage_ = Stage::kIdle;
   bool revocable_ = false;
   int target_ = 0;
-  int checking_ = 0;         // slot that is read once more before the erase
+  int checking_ = 0;         // slot that is read once more before the erase, or copied
   int passes_ = 0;           // how often it was read well
   std::uint32_t check_ = 0;  // checksum of it so far
   std::uint32_t at_ = 0;     // sector or byte offset inside the running stage
   const std::uint16_t* source_ = nullptr;
   std::uint32_t source_words_ = 0;
+  std::uint16_t* copy_ = nullptr;
   std::uint8_t header_[kHeaderBytes] = {};
   std::uint32_t crc_ = 0;
   std::uint32_t fallbacks_ = 0;              // see register table_fallbacks

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 
+#include "armcal/link/event_log.hpp"
 #include "armcal/link/registers.hpp"
 #include "armcal/table/table_store.hpp"
 #include "host_sim/client/register_text.hpp"
@@ -34,11 +36,13 @@ TEST(Spec, StatusTable_IsThatOfTheHeader) { ExpectInSpec(client::StatusMarkdown(
 TEST(Spec, Numbers_InTheText_AreThoseOfTheHeaders) {
   const auto hex = [](std::uint32_t value) {
     std::ostringstream out;
-    out << "0x" << std::hex << std::uppercase << value;
+    out << "0x" << std::hex << std::uppercase << std::setw(8) << std::setfill('0') << value;
     return out.str();
   };
-  for (const std::uint32_t value : {link::reg::kOpen, link::reg::kCheck, link::reg::kSave, link::reg::kUnlockKey,
-                                    table::kRecordMagic, table::kCommitWord, link::kLayoutCrc})
+  for (const std::uint32_t value :
+       {link::reg::kOpen, link::reg::kCheck, link::reg::kSave, link::reg::kUnlockKey, link::reg::kTrial,
+        link::reg::kConfirm, link::reg::kBack, link::reg::kLoad, link::kBootEvent, link::kDropEvent,
+        table::kRecordMagic, table::kCommitWord, link::kLayoutCrc})
     ExpectInSpec("`" + hex(value) + "`");
 }
 

@@ -51,6 +51,22 @@ TEST(Flash, OfAGoodTable_IsActiveStoredAndReadBack) {
   EXPECT_EQ(drive.ReadStatus().table_status, Status::kOk);
 }
 
+TEST(Flash, OnTrial_IsInForceAndNotStored_UntilItIsConfirmed) {
+  test::TestServer server;
+  auto drive = server.Connect();
+  FlashTable(drive, MakeTable(1));
+  EXPECT_EQ(client::TryTable(drive, MakeTable(2), 30).store_sequence, 1u);
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(2));
+  EXPECT_EQ(drive.ReadValue<reg::kTrialLeft>(), 30);
+  client::EndTrial(drive);
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(1));
+  client::TryTable(drive, MakeTable(3), 30);
+  EXPECT_EQ(client::ConfirmTrial(drive).store_sequence, 2u);
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(3));
+  EXPECT_EQ(client::Rollback(drive).store_sequence, 3u);
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(1));
+}
+
 TEST(Flash, Refused_SaysWhyAndLeavesTheOldTable) {
   test::TestServer server;
   auto drive = server.Connect();

@@ -9,114 +9,20 @@
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
 #include "codegen/generated/er20_like/model.hpp"
-#include "port/mps2/application/pretend_axes.hpp"
+#include "tests/unit/controller/bench.hpp"
 #include "tests/unit/table/nor_flash.hpp"
 
 namespace {
 
 using namespace armcal;
 using core::Status;
+using test::Bench;
 using Model = generated::Er20Like;
 using Axes = application::PretendAxes<Model>;
 namespace reg = link::reg;
 
 constexpr int n = Model::kJoints;
 constexpr std::uint32_t kAllAxes = (1u << n) - 1;
-
-// A controller with axes that are as its model says, and a client that needs no wire.
-template <class... Filters>
-struct Bench {
-  Bench() { booted = controller.Boot(); }
-
-  void Run(int ticks) {
-    for (; ticks > 0; --ticks, ++now) {
-      model::RawSample<n> raw;
-      controller::SetPoint<n> set;
-      (void)axes.Read(now, raw, set);
-      const int sign = now / Model::kSampleTicks % 2 == 0 ? 1 : -1;  // changes from sample to sample
-      for (std::int16_t& current : raw.current) current = static_cast<std::int16_t>(current + sign * disturbance_LSB);
-      torque = controller.FeedForward(set, raw.temperature_degC, tau_Nm);
-      ASSERT_EQ(controller.Push(raw), Status::kOk);
-      Idle();
-    }
-  }
-  void Idle() {  // the limit is for an adoption that stays refused, which would keep it busy until a time-out
-    for (int k = 0; k < 100000 && controller.Step(); ++k) {
-    }
-  }
-
-  template <const auto& kBlock>
-  Status Write(const link::Words<kBlock>& words) {
-    return controller.map().Write(words.span().first, words.size(), words.data());
-  }
-  template <const link::Register& kRegister>
-  Status WriteValue(link::ValueOf<kRegister> value) {
-    link::Words<kRegister> words;
-    words.template Set<kRegister>(value);
-    return Write(words);
-  }
-  std::vector<std::uint16_t> Read(const link::Span& span) {
-    std::vector<std::uint16_t> words(span.count);
-    EXPECT_EQ(controller.map().Read(span.kind, span.first, span.count, words.data()), Status::kOk);
-    return words;
-  }
-  template <const auto& kBlock>
-  link::Words<kBlock> Read() {
-    return link::Words<kBlock>(Read(link::SpanOf(kBlock)).data());
-  }
-  template <const link::Register& kRegister>
-  link::ValueOf<kRegister> Value() {
-    return Read<kRegister>().template Get<kRegister>();
-  }
-  void Unlock() { ASSERT_EQ(WriteValue<reg::kUnlock>(reg::kUnlockKey), Status::kOk); }
-
-  Status Command(std::uint32_t command, std::uint32_t crc) {
-    link::Words<reg::kCommandBlock> w;
-    w.template Set<reg::kSequence>(++sequence);
-    w.template Set<reg::kCommand>(command);
-    w.template Set<reg::kCommandSchema>(Model::kSchema);
-    w.template Set<reg::kCommandWords>(kWords);
-    w.template Set<reg::kCommandCrc>(crc);
-    Status status = Write(w);
-    for (; status == Status::kUnfinished; status = Write(w)) EXPECT_TRUE(controller.Step());
-    return status;
-  }
-  // Stages a table and checks it. Answers the status of the first step that is refused.
-  Status Check(const estimator::Table<Model>& table, std::uint32_t& crc) {
-    std::vector<std::uint16_t> words(kWords);
-    model::Encode(table, words.data());
-    Unlock();
-    if (const Status opened = Command(reg::kOpen, 0); !core::IsOk(opened)) return opened;
-    for (std::uint16_t i = 0; i < kWords; ++i)
-      if (const Status s = controller.map().Write(reg::kStagedTable + i, 1, &words[i]); !core::IsOk(s)) return s;
-    crc = core::Crc32Words(words.data(), words.size());
-    return Command(reg::kCheck, crc);
-  }
-  // Also saves it. kOk: it is stored, and adopted as far as the status registers say.
-  Status Flash(const estimator::Table<Model>& table) {
-    std::uint32_t crc = 0;
-    if (const Status checked = Check(table, crc); !core::IsOk(checked)) return checked;
-    const Status saved = Command(reg::kSave, crc);
-    Idle();
-    return saved;
-  }
-
-  static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
-  test::NorFlash flash{{2, 16384, 8, 0xFF}};
-  std::uint32_t now = 0, sequence = 0;
-  hardware::Clock clock{&now, [](void* t) { return *static_cast<std::uint32_t*>(t); },
-                        [](void* t) { return *static_cast<std::uint32_t*>(t); }};
-  Axes axes;
-  static controller::BoardRules Rules() {
-    controller::BoardRules rules;
-    rules.adopt_while_enabled = true;
-    return rules;
-  }
-  controller::Controller<Model, Filters...> controller{flash.storage(), clock, {}, Rules()};
-  Status booted = Status::kOk, torque = Status::kOk;
-  float tau_Nm[n] = {};
-  int disturbance_LSB = 0;
-};
 
 using Forgetting = filter::ForgettingFilter<Model>;
 using Block = filter::KalmanFilter<Model, filter::Form::kBlock>;

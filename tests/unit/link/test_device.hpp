@@ -36,10 +36,12 @@ struct FakeApplication {
   std::atomic<bool> refuse_check{false};    // every check refuses
   std::atomic<int> slices{1};               // calls that a check needs
   std::atomic<int> checks{0}, adoptions{0};
+  std::atomic<core::Status> doubts{core::Status::kOk};  // about a table on trial
   int slices_done = 0;
   std::vector<std::uint16_t> built, adopted;  // by the last check; by the last adoption
+  std::vector<std::uint16_t> before;          // what was in force before a trial
 
-  link::TableApplication Functions() { return {this, &Check, &Permit, &Adopt}; }
+  link::TableApplication Functions() { return {this, &Check, &Permit, &Adopt, &TryOut, &GiveBack, &Doubt}; }
 
   static core::Refusal Check(void* self, const std::uint16_t* words, std::uint16_t count, bool first) {
     auto& a = *static_cast<FakeApplication*>(self);
@@ -65,6 +67,18 @@ struct FakeApplication {
     ++a.adoptions;
     return core::Status::kOk;
   }
+  static core::Status TryOut(void* self) {
+    auto& a = *static_cast<FakeApplication*>(self);
+    a.before = a.adopted;
+    a.adopted = a.built;
+    return core::Status::kOk;
+  }
+  static void GiveBack(void* self) {
+    auto& a = *static_cast<FakeApplication*>(self);
+    a.adopted = a.before;
+    a.before.clear();
+  }
+  static core::Status Doubt(void* self) { return static_cast<FakeApplication*>(self)->doubts; }
 };
 
 // What the application of the drive does about learning and about residual statistics.
@@ -73,8 +87,11 @@ struct FakeEstimator {
   std::vector<bool> holds;
   std::vector<int> resets;
   int snapshots_taken = 0;
+  std::atomic<bool> key_switch{true};  // clients may write
 
-  link::ClientRequests Functions() { return {this, &Hold, &Reset, &TakeResiduals}; }
+  link::ClientRequests Functions() { return {this, &Hold, &Reset, &TakeResiduals, &MayWrite}; }
+
+  static bool MayWrite(void* self) { return static_cast<FakeEstimator*>(self)->key_switch; }
 
   static core::Status Hold(void* self, bool hold) {
     static_cast<FakeEstimator*>(self)->holds.push_back(hold);

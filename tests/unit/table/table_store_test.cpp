@@ -78,6 +78,32 @@ TEST(Store, DuringASave_DoesOneStorageOperationAStep) {
     EXPECT_LE(flash.operations() - before, 1);
 }
 
+TEST(Store, Copy_GivesTheOlderTable_OrSaysThatItHasFaded) {
+  NorFlash flash(kNor);
+  TableStore store(flash.storage(), kSchema, kWords);
+  Words words(kWords), copy(kWords);
+  ASSERT_EQ(store.Load(words.data()), Status::kBlank);
+  EXPECT_EQ(store.Copy(copy.data()), Status::kEmpty);
+  ASSERT_EQ(SaveAll(store, Table(1)), Status::kOk);
+  EXPECT_EQ(store.Copy(copy.data()), Status::kEmpty);
+  ASSERT_EQ(SaveAll(store, Table(2)), Status::kOk);
+  ASSERT_EQ(store.Copy(copy.data()), Status::kOk);
+  EXPECT_EQ(store.Copy(copy.data()), Status::kBusy);
+  EXPECT_EQ(store.Save(words.data()), Status::kBusy);
+  EXPECT_EQ(Finish(store), Status::kOk);
+  EXPECT_EQ(copy, Table(1));
+  EXPECT_EQ(store.words_copied(), kWords);
+  const std::uint32_t older = store.slot() == 0 ? 512 : 0;
+  for (std::uint32_t byte = 0; byte < 20 + 2 * kWords + 4; ++byte) {
+    flash.Fade(older + byte, static_cast<int>(byte % 8));
+    ASSERT_EQ(store.Copy(copy.data()), Status::kOk);
+    EXPECT_EQ(Finish(store), Status::kCorrupt) << byte;
+    flash.Fade(older + byte, static_cast<int>(byte % 8));
+  }
+  ASSERT_EQ(store.Copy(copy.data()), Status::kOk);
+  EXPECT_EQ(Finish(store), Status::kOk);
+}
+
 TEST(Store, OfManySaves_ErasesOnceASaveAndAlternates) {
   NorFlash flash(kNor);
   TableStore store(flash.storage(), kSchema, kWords);

@@ -1,0 +1,247 @@
+// tool - the verbs about the table of a drive: backup, restore, diff, rollback, trial, log.
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "armcal/core/crc.hpp"
+#include "armcal/link/event_log.hpp"
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/register_text.hpp"
+#include "host_sim/client/table_flash.hpp"
+#include "host_sim/tool/connect.hpp"
+#include "host_sim/tool/verb.hpp"
+
+namespace armcal::tool {
+namespace {
+
+namespace reg = link::reg;
+using nlohmann::ordered_json;
+
+struct TableOptions {
+  std::string connect, json, file;
+  bool confirm = false, end = false;
+};
+
+std::string CrcText(std::uint32_t crc) { return fmt::format("{:08X}", crc); }
+
+ordered_json Told(const client::FlashReport& report) {
+  return {{"table_crc", CrcText(report.crc)},
+          {"readback_ok", true},
+          {"generation", report.generation},
+          {"store_sequence", report.store_sequence}};
+}
+
+// The table in force as a file, and back ------------------------------------------------------------------------------
+
+// What a backup holds: the words, and what they belong to.
+ordered_json Backup(client::DriveClient& drive) {
+  const client::Identity id = drive.ReadIdentity();
+  const auto words = client::ReadActiveTable(drive);
+  const client::DriveStatus s = drive.ReadStatus();
+  const std::uint32_t crc = core::Crc32Words(words.data(), words.size());
+  if (s.table_status != core::Status::kOk)
+    throw client::RefusedError(
+        fmt::format("{}: has no valid table: {}", drive.name(), client::StatusName(s.table_status)), 0, s.table_status);
+  if (s.active_crc != crc)
+    throw client::VerifyError(fmt::format("{}: the table was read with CRC {}, the drive says {}", drive.name(),
+                                          CrcText(crc), CrcText(s.active_crc)));
+  return {{"armcal_backup", 1},
+          {"schema", CrcText(id.schema)},
+          {"serial_number", id.serial_number},
+          {"table_crc", CrcText(crc)},
+          {"words", words}};
+}
+
+std::vector<std::uint16_t> ReadBackup(const std::string& path) {
+  const auto json = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
+  const auto bad = [&](const char* what) {
+    return io::InputError(path + ": expected a file of armcal backup: " + what);
+  };
+  if (!json.is_object() || json.value("armcal_backup", ordered_json()) != 1 || !json.contains("words"))
+    throw bad("with \"armcal_backup\": 1 and \"words\"");
+  std::vector<std::uint16_t> words;
+  if (!json["words"].is_array()) throw bad("\"words\" is no list");
+  for (const auto& w : json["words"]) {
+    if (!w.is_number_unsigned() || w.get<std::uint64_t>() > 0xFFFF) throw bad("a word is no number from 0 to 65535");
+    words.push_back(w.get<std::uint16_t>());
+  }
+  if (json.value("table_crc", ordered_json()) != CrcText(core::Crc32Words(words.data(), words.size())))
+    throw bad("words and \"table_crc\" differ");
+  return words;
+}
+
+int RunBackup(const TableOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  const ordered_json backup = Backup(drive);
+  files::WriteWholeFile(o.file, backup.dump(1) + "\n");
+  fmt::print("{}: {} registers, CRC {}, written to {}\n", drive.name(), backup["words"].size(),
+             backup["table_crc"].get<std::string>(), o.file);
+  WriteJson(o.json, {{"file", o.file}, {"table_crc", backup["table_crc"]}, {"registers", backup["words"].size()}});
+  return kOk;
+}
+
+int RunRestore(const TableOptions& o) {
+  const std::vector<std::uint16_t> words = ReadBackup(o.file);
+  client::DriveClient drive = ConnectTo(o.connect);
+  const client::FlashReport report = client::FlashTable(drive, words);
+  fmt::print("{}: {} registers stored, adopted and read back: CRC {}, generation {}, store sequence {}\n", drive.name(),
+             words.size(), CrcText(report.crc), report.generation, report.store_sequence);
+  WriteJson(o.json, Told(report));
+  return kOk;
+}
+
+int RunDiff(const TableOptions& o) {
+  const std::vector<std::uint16_t> words = ReadBackup(o.file);
+  client::DriveClient drive = ConnectTo(o.connect);
+  const auto active = client::ReadActiveTable(drive);
+  ordered_json differ = ordered_json::array();
+  for (std::size_t k = 0; k < std::max(words.size(), active.size()); ++k) {
+    const auto is = k < active.size() ? ordered_json(active[k]) : ordered_json(),
+               was = k < words.size() ? ordered_json(words[k]) : ordered_json();
+    if (is == was) continue;
+    differ.push_back({{"word", k}, {"drive", is}, {"file", was}});
+    fmt::print("word {}: drive {}, file {}\n", k, is.dump(), was.dump());
+  }
+  fmt::print("{}: {}\n", drive.name(),
+             differ.empty() ? "the table in force is this file's" : fmt::format("{} words differ", differ.size()));
+  WriteJson(o.json, {{"same", differ.empty()}, {"differ", differ}});
+  return differ.empty() ? kOk : kMismatch;
+}
+
+// rollback, trial, log ------------------------------------------------------------------------------------------------
+
+int RunRollback(const TableOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  const client::FlashReport report = client::Rollback(drive);
+  fmt::print("{}: the older table is stored, adopted and read back: CRC {}, generation {}, store sequence {}\n",
+             drive.name(), CrcText(report.crc), report.generation, report.store_sequence);
+  WriteJson(o.json, Told(report));
+  return kOk;
+}
+
+int RunTrial(const TableOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  if (o.confirm) {
+    const client::FlashReport report = client::ConfirmTrial(drive);
+    fmt::print("{}: the table on trial is stored: CRC {}, store sequence {}\n", drive.name(), CrcText(report.crc),
+               report.store_sequence);
+    WriteJson(o.json, Told(report));
+    return kOk;
+  }
+  if (o.end) client::EndTrial(drive);
+  const int left_s = drive.ReadIdentity().map_minor < client::kMinorOfLayout2 ? 0 : drive.ReadValue<reg::kTrialLeft>();
+  const client::DriveStatus s = drive.ReadStatus();
+  fmt::print("{}: {}\n", drive.name(),
+             left_s > 0 ? fmt::format("a table is on trial for {} s more", left_s) : "no table is on trial");
+  WriteJson(o.json, {{"on_trial", left_s > 0}, {"left_s", left_s}, {"table_crc", CrcText(s.active_crc)}});
+  return kOk;
+}
+
+const char* CommandName(std::uint32_t command) {
+  switch (command) {
+    case reg::kOpen:
+      return "open";
+    case reg::kCheck:
+      return "check";
+    case reg::kSave:
+      return "save";
+    case reg::kTrial:
+      return "trial";
+    case reg::kConfirm:
+      return "confirm";
+    case reg::kBack:
+      return "back";
+    case reg::kLoad:
+      return "load";
+    case link::kBootEvent:
+      return "boot";
+    case link::kDropEvent:
+      return "drop";
+    default:
+      return "unknown";
+  }
+}
+
+// The drive may add an event between two requests, so the log is read until its count stays.
+link::Words<reg::kLogBlock> ReadLog(client::DriveClient& drive) {
+  for (;;) {
+    const auto log = drive.Read<reg::kLogBlock>();
+    if (log.Get<reg::kLogCount>() == drive.ReadValue<reg::kLogCount>()) return log;
+  }
+}
+
+int RunLog(const TableOptions& o) {
+  client::DriveClient drive = ConnectTo(o.connect);
+  if (const client::Identity id = drive.ReadIdentity(); id.map_minor < client::kMinorOfLayout2)
+    throw client::RefusedError(fmt::format("{}: its map {}.{} has no log; expected a drive of map 1.{} or newer",
+                                           drive.name(), id.map_major, id.map_minor, client::kMinorOfLayout2),
+                               0, core::Status::kBadAddress);
+  const auto log = ReadLog(drive);
+  const std::uint32_t count = log.Get<reg::kLogCount>(),
+                      first = count - std::min<std::uint32_t>(count, reg::kLogEvents);
+  ordered_json events = ordered_json::array();
+  if (first > 0) fmt::print("{} older events are no longer held\n", first);
+  for (std::uint32_t k = first; k != count; ++k) {
+    const std::uint32_t place = k % reg::kLogEvents, connection = log.At<reg::kLogConnection>(place);
+    const auto status = static_cast<core::Status>(log.At<reg::kLogStatus>(place));
+    const char* const command = CommandName(log.At<reg::kLogCommand>(place));
+    fmt::print("tick {:>10}  {:>16}  {:<8}{}\n", log.At<reg::kLogTick>(place),
+               connection == 0 ? std::string("drive") : fmt::format("connection {}", connection), command,
+               client::StatusName(status));
+    events.push_back({{"event", k},
+                      {"tick", log.At<reg::kLogTick>(place)},
+                      {"connection", connection},
+                      {"command", command},
+                      {"status", static_cast<int>(status)}});
+  }
+  WriteJson(o.json, {{"events", count}, {"log", events}});
+  return kOk;
+}
+
+CLI::App* AddVerb(CLI::App& app, Action& action, const char* name, const char* help,
+                  const std::shared_ptr<TableOptions>& o, int (*run)(const TableOptions&)) {
+  auto* verb = app.add_subcommand(name, help);
+  verb->add_option("--connect", o->connect, kConnectHelp)->required();
+  verb->add_option("--json", o->json, "write the result here");
+  verb->callback([o, &action, run] { action = [o, run] { return Reported(o->json, [&] { return run(*o); }); }; });
+  return verb;
+}
+
+}  // namespace
+
+void AddDriveTable(CLI::App& app, Action& action) {
+  auto o = std::make_shared<TableOptions>();
+  auto* verb = AddVerb(app, action, "backup",
+                       "write the table in force to a file, word for word\nexample: armcal backup drive.json --connect "
+                       "127.0.0.1:1502",
+                       o, RunBackup);
+  verb->add_option("file", o->file, "file to write")->required();
+  o = std::make_shared<TableOptions>();
+  verb = AddVerb(app, action, "restore",
+                 "store and adopt the table of a backup\nexample: armcal restore drive.json --connect 127.0.0.1:1502",
+                 o, RunRestore);
+  verb->add_option("file", o->file, "file of armcal backup")->required();
+  o = std::make_shared<TableOptions>();
+  verb = AddVerb(app, action, "diff",
+                 "compare the table in force with a backup\nexit code 5: they differ\nexample: armcal diff drive.json "
+                 "--connect 127.0.0.1:1502",
+                 o, RunDiff);
+  verb->add_option("file", o->file, "file of armcal backup")->required();
+  AddVerb(app, action, "rollback",
+          "store and adopt the table that was stored before the one in force\nexample: armcal rollback --connect "
+          "127.0.0.1:1502",
+          std::make_shared<TableOptions>(), RunRollback);
+  o = std::make_shared<TableOptions>();
+  verb = AddVerb(app, action, "trial",
+                 "show, store or end the trial that armcal flash --trial began\nexample: armcal trial --confirm "
+                 "--connect 127.0.0.1:1502",
+                 o, RunTrial);
+  auto* confirm = verb->add_flag("--confirm", o->confirm, "store the table on trial");
+  verb->add_flag("--end", o->end, "put the stored table in force again")->excludes(confirm);
+  AddVerb(app, action, "log",
+          "show what became of the drive's tables since power-up: the last 32 events\nexample: armcal log --connect "
+          "127.0.0.1:1502",
+          std::make_shared<TableOptions>(), RunLog);
+}
+
+}  // namespace armcal::tool

@@ -66,6 +66,12 @@ StatusText TextOf(Status status) {
       return {"SeatTaken", "another connection is writing"};
     case Status::kTooSoon:
       return {"TooSoon", "the board allows no further save yet"};
+    case Status::kBadSignature:
+      return {"BadSignature", "the table is not signed, or its signature does not fit"};
+    case Status::kReplayed:
+      return {"Replayed", "the counter of the signed table is not above the highest one"};
+    case Status::kOtherDrive:
+      return {"OtherDrive", "the table is signed for another drive"};
     case Status::kStorageFault:
       return {"StorageFault", "the storage refused, or returned what was not written"};
     case Status::kBlank:

@@ -9,7 +9,9 @@
 
 #include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
+#include "armcal/link/seal.hpp"
 #include "host_sim/client/register_text.hpp"
+#include "host_sim/client/table_seal.hpp"
 
 namespace armcal::client {
 
@@ -29,13 +31,13 @@ constexpr int kReadings = 3;  // of a register that reads back differently
 // The PC's part of bringing a table in force: by a save, or on trial.
 class Flash {
  public:
-  explicit Flash(DriveClient& drive) : drive_(drive) {}
+  Flash(DriveClient& drive, const Key* key) : drive_(drive), key_(key) {}
 
   // From unlock to the last command. The drive drops what was staged when the connection breaks, and then all begins
   // anew. limit_s: of a trial; 0: the table is saved.
   void Send(std::span<const std::uint16_t> words, int limit_s, const FlashProgress& progress) {
-    SetWords({words.begin(), words.end()});
     Repeat([&] {
+      SetWords(AsTheDriveWants(words));
       Command(reg::kOpen);
       Stage(progress);
       if (limit_s > 0) drive_.WriteValue<reg::kTrialLimit>(static_cast<std::uint16_t>(limit_s));
@@ -53,7 +55,11 @@ class Flash {
       const int room = drive_.ReadValue<reg::kTableRoom>();
       std::vector<std::uint16_t> older = drive_.Read(SpanOf(reg::kStagedTable, room));
       if (older[2] == kFirstLayout) older.resize(id.table_words);
-      SetWords(std::move(older));
+      SetWords(AsTheDriveWants(UnsealTable(older)));
+      if (words_ != older) {
+        Command(reg::kOpen);
+        Stage({});
+      }
       Check();
       Finish(reg::kSave);
     });
@@ -78,6 +84,26 @@ class Flash {
   }
 
  private:
+  // Signed with the next counter if the drive asks for it. A counter is used once, so each round takes another one.
+  std::vector<std::uint16_t> AsTheDriveWants(std::span<const std::uint16_t> words) {
+    const Identity id = drive_.ReadIdentity();
+    const auto method = id.map_minor < kMinorOfLayout2
+                            ? link::SealMethod::kNone
+                            : static_cast<link::SealMethod>(drive_.ReadValue<reg::kSigning>());
+    const auto refuse = [&](const char* why) {
+      throw RefusedError(fmt::format("{}: {}", drive_.name(), why), 0, core::Status::kBadSignature);
+    };
+    if (method == link::SealMethod::kNone) {
+      if (key_ != nullptr) refuse("takes tables without a signature; leave --key out");
+      return {words.begin(), words.end()};
+    }
+    if (method != link::SealMethod::kHmac) refuse("takes tables that are signed in its board's own way only");
+    if (key_ == nullptr) refuse("takes signed tables only; give its key as --key FILE");
+    const auto counter = drive_.ReadValue<reg::kSigningCounter>();
+    if (counter == 0xFFFFFFFF) refuse("has used its last counter; it needs another key and a blank store");
+    return SealTable(words, id.serial_number, counter + 1, *key_);
+  }
+
   void SetWords(std::vector<std::uint16_t> words) {
     words_ = std::move(words);
     crc_ = core::Crc32Words(words_.data(), words_.size());
@@ -93,7 +119,7 @@ class Flash {
       } catch (const RefusedError& error) {
         if (IsCarriedOut()) return;
         const bool again = error.status == core::Status::kLocked || error.status == core::Status::kWrongOrder ||
-                           error.status == core::Status::kBadCrc;
+                           error.status == core::Status::kBadCrc || error.status == core::Status::kReplayed;
         if (!again || round == kRounds) throw;
       }
   }
@@ -196,6 +222,7 @@ class Flash {
   }
 
   DriveClient& drive_;
+  const Key* key_;  // nullptr: none
   std::vector<std::uint16_t> words_;
   std::uint32_t finishing_ = 0;  // the last command, once it was sent
   std::uint32_t sequence_ = 0;
@@ -208,8 +235,8 @@ namespace {
 
 // Does what `send` says with a drive, waits for the end, and proves it.
 template <class Send>
-FlashReport Carry(DriveClient& drive, Send send) {
-  Flash flash(drive);
+FlashReport Carry(DriveClient& drive, const Key* key, Send send) {
+  Flash flash(drive, key);
   DriveStatus s;
   try {
     send(flash);
@@ -233,28 +260,29 @@ void Expect(DriveClient& drive, const char* what) {
 
 }  // namespace
 
-FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress) {
-  const FlashReport report = Carry(drive, [&](Flash& flash) { flash.Send(words, 0, progress); });
+FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress,
+                       const Key* key) {
+  const FlashReport report = Carry(drive, key, [&](Flash& flash) { flash.Send(words, 0, progress); });
   if (progress) progress(1.0);
   return report;
 }
 
 FlashReport TryTable(DriveClient& drive, std::span<const std::uint16_t> words, int limit_s,
-                     const FlashProgress& progress) {
+                     const FlashProgress& progress, const Key* key) {
   Expect(drive, "trial");
-  const FlashReport report = Carry(drive, [&](Flash& flash) { flash.Send(words, limit_s, progress); });
+  const FlashReport report = Carry(drive, key, [&](Flash& flash) { flash.Send(words, limit_s, progress); });
   if (progress) progress(1.0);
   return report;
 }
 
 FlashReport ConfirmTrial(DriveClient& drive) {
   Expect(drive, "trial");
-  return Carry(drive, [](Flash& flash) { flash.Confirm(); });
+  return Carry(drive, nullptr, [](Flash& flash) { flash.Confirm(); });
 }
 
 void EndTrial(DriveClient& drive) {
   Expect(drive, "trial");
-  Flash flash(drive);
+  Flash flash(drive, nullptr);
   try {
     flash.Back();
   } catch (const RefusedError&) {
@@ -264,9 +292,9 @@ void EndTrial(DriveClient& drive) {
   flash.LeaveSeat();
 }
 
-FlashReport Rollback(DriveClient& drive) {
+FlashReport Rollback(DriveClient& drive, const Key* key) {
   Expect(drive, "older table to load");
-  return Carry(drive, [](Flash& flash) { flash.SendOlder(); });
+  return Carry(drive, key, [](Flash& flash) { flash.SendOlder(); });
 }
 
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host_sim/client/drive_client.hpp"
+#include "host_sim/client/key_file.hpp"
 
 namespace armcal::client {
 
@@ -25,19 +26,21 @@ using FlashProgress = std::function<void(double share)>;
 
 // Unlocks, opens, stages the words, checks, saves, waits and reads back. If another client is writing, it waits for the
 // seat. If the connection breaks or a word is damaged on the way, it begins anew. `words`: the layout of
-// model/parameters.hpp, whose first two words are the schema. Throws RefusedError (the table before it stays in force
-// and stored), VerifyError (the drive says that the table is active, but it reads back otherwise) and LinkError.
-FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress = {});
+// model/parameters.hpp, whose first two words are the schema. If the drive takes signed tables only, they are signed
+// with `key` and the drive's next counter. Throws RefusedError (the table before it stays in force and stored),
+// VerifyError (the drive says that the table is active, but it reads back otherwise) and LinkError.
+FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress = {},
+                       const Key* key = nullptr);
 
 // The same, but the table is put on trial for so long, and is not stored. Throws as FlashTable, and RefusedError if the
 // drive knows no trial.
 FlashReport TryTable(DriveClient& drive, std::span<const std::uint16_t> words, int limit_s,
-                     const FlashProgress& progress = {});
+                     const FlashProgress& progress = {}, const Key* key = nullptr);
 // Stores the table on trial, or puts the stored table in force again. Throws as FlashTable.
 FlashReport ConfirmTrial(DriveClient& drive);
 void EndTrial(DriveClient& drive);
 // Stores and adopts the table that was stored before the one in force. Throws as FlashTable.
-FlashReport Rollback(DriveClient& drive);
+FlashReport Rollback(DriveClient& drive, const Key* key = nullptr);
 
 // The table in force.
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive);

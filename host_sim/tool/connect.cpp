@@ -63,6 +63,14 @@ client::DriveClient ConnectTo(const std::string& address) {
   return client::DriveClient(host, port);
 }
 
+void AddKeyOption(CLI::App& verb, std::string& path) {
+  verb.add_option("--key", path, "file with the drive's key, if it takes signed tables only");
+}
+
+std::optional<client::Key> ReadKeyOption(const std::string& path) {
+  return path.empty() ? std::nullopt : std::optional<client::Key>(client::ReadKey(path));
+}
+
 calibration::TableFile LayoutOf(client::DriveClient& drive, const codegen::Model& model) {
   calibration::TableFile layout = calibration::DefaultTable(model);
   const client::Identity id = drive.ReadIdentity();

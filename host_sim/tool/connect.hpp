@@ -1,10 +1,13 @@
 // tool - reads the address of a drive, connects, and gives the layout of its table.
 #pragma once
 
+#include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "host_sim/client/drive_client.hpp"
+#include "host_sim/client/key_file.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 
 namespace armcal::tool {
@@ -16,6 +19,11 @@ client::DriveClient ConnectTo(const std::string& address);
 bool IsSerialLine(const std::string& address);
 std::pair<std::string, int> HostAndPort(const std::string& address);
 inline constexpr char kConnectHelp[] = "drive: HOST:PORT, or a serial line as /dev/ttyUSB0[:115200[:E[:1]]]";
+
+// The file with the key of a drive that takes signed tables only. Throws io::InputError.
+void AddKeyOption(CLI::App& verb, std::string& path);
+std::optional<client::Key> ReadKeyOption(const std::string& path);
+inline const client::Key* KeyOf(const std::optional<client::Key>& key) { return key ? &*key : nullptr; }
 
 // The layout that the drive's schema names: the default table of `model`. Throws client::RefusedError if the drive runs
 // another one.

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "armcal/core/words.hpp"
+#include "armcal/link/seal.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_flash.hpp"
@@ -35,6 +36,7 @@ struct DeviceOptions {
 
 constexpr char kNameHelp[] = "name, as armcal map lists it; an element in brackets, from 0";
 constexpr char kWhoMayWrite[] = "Without a key anyone who reaches the line may write within the ceilings.";
+constexpr char kSignedOnly[] = "Only tables that are signed with the drive's key are taken.";
 
 std::string Hex(std::uint32_t value) { return fmt::format("{:08X}", value); }
 
@@ -88,15 +90,20 @@ int RunInfo(const DeviceOptions& o) {
     json["save_wait_s"] = w.Get<reg::kSaveWait>();
     fmt::print("writer: {}; next save in {} s\n", word(seats, w.Get<reg::kWriterSeat>()), w.Get<reg::kSaveWait>());
   }
+  const char* who_may_write = kWhoMayWrite;
   if (id.map_minor >= client::kMinorOfLayout2) {
     const auto w = drive.Read<reg::kTableBlock>();
     json["writing_allowed"] = w.Get<reg::kWritingAllowed>() != 0;
     json["trial_left_s"] = w.Get<reg::kTrialLeft>();
+    const auto method = static_cast<link::SealMethod>(w.Get<reg::kSigning>());
+    json["signing"] = method == link::SealMethod::kNone ? "none" : method == link::SealMethod::kHmac ? "hmac" : "own";
+    json["signing_counter"] = w.Get<reg::kSigningCounter>();
+    if (method != link::SealMethod::kNone) who_may_write = kSignedOnly;
     if (w.Get<reg::kWritingAllowed>() == 0) fmt::print("the board refuses all writing now\n");
     if (w.Get<reg::kTrialLeft>() != 0) fmt::print("a table is on trial for {} s more\n", w.Get<reg::kTrialLeft>());
   }
-  fmt::print("{}\n", kWhoMayWrite);
-  json["who_may_write"] = kWhoMayWrite;
+  fmt::print("{}\n", who_may_write);
+  json["who_may_write"] = who_may_write;
   WriteJson(o.json, json);
   return kOk;
 }

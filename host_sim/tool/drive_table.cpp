@@ -8,6 +8,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_flash.hpp"
+#include "host_sim/client/table_seal.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -18,7 +19,7 @@ namespace reg = link::reg;
 using nlohmann::ordered_json;
 
 struct TableOptions {
-  std::string connect, json, file;
+  std::string connect, json, file, key;
   bool confirm = false, end = false;
 };
 
@@ -81,9 +82,10 @@ int RunBackup(const TableOptions& o) {
 }
 
 int RunRestore(const TableOptions& o) {
-  const std::vector<std::uint16_t> words = ReadBackup(o.file);
+  const std::vector<std::uint16_t> words = client::UnsealTable(ReadBackup(o.file));
+  const std::optional<client::Key> key = ReadKeyOption(o.key);
   client::DriveClient drive = ConnectTo(o.connect);
-  const client::FlashReport report = client::FlashTable(drive, words);
+  const client::FlashReport report = client::FlashTable(drive, words, {}, KeyOf(key));
   fmt::print("{}: {} registers stored, adopted and read back: CRC {}, generation {}, store sequence {}\n", drive.name(),
              words.size(), CrcText(report.crc), report.generation, report.store_sequence);
   WriteJson(o.json, Told(report));
@@ -91,9 +93,10 @@ int RunRestore(const TableOptions& o) {
 }
 
 int RunDiff(const TableOptions& o) {
-  const std::vector<std::uint16_t> words = ReadBackup(o.file);
+  // The seal says who stored a table and when, and nothing about the arm.
+  const std::vector<std::uint16_t> words = client::UnsealTable(ReadBackup(o.file));
   client::DriveClient drive = ConnectTo(o.connect);
-  const auto active = client::ReadActiveTable(drive);
+  const auto active = client::UnsealTable(client::ReadActiveTable(drive));
   ordered_json differ = ordered_json::array();
   for (std::size_t k = 0; k < std::max(words.size(), active.size()); ++k) {
     const auto is = k < active.size() ? ordered_json(active[k]) : ordered_json(),
@@ -111,8 +114,9 @@ int RunDiff(const TableOptions& o) {
 // rollback, trial, log ------------------------------------------------------------------------------------------------
 
 int RunRollback(const TableOptions& o) {
+  const std::optional<client::Key> key = ReadKeyOption(o.key);
   client::DriveClient drive = ConnectTo(o.connect);
-  const client::FlashReport report = client::Rollback(drive);
+  const client::FlashReport report = client::Rollback(drive, KeyOf(key));
   fmt::print("{}: the older table is stored, adopted and read back: CRC {}, generation {}, store sequence {}\n",
              drive.name(), CrcText(report.crc), report.generation, report.store_sequence);
   WriteJson(o.json, Told(report));
@@ -221,16 +225,20 @@ void AddDriveTable(CLI::App& app, Action& action) {
                  "store and adopt the table of a backup\nexample: armcal restore drive.json --connect 127.0.0.1:1502",
                  o, RunRestore);
   verb->add_option("file", o->file, "file of armcal backup")->required();
+  AddKeyOption(*verb, o->key);
   o = std::make_shared<TableOptions>();
   verb = AddVerb(app, action, "diff",
                  "compare the table in force with a backup\nexit code 5: they differ\nexample: armcal diff drive.json "
                  "--connect 127.0.0.1:1502",
                  o, RunDiff);
   verb->add_option("file", o->file, "file of armcal backup")->required();
-  AddVerb(app, action, "rollback",
-          "store and adopt the table that was stored before the one in force\nexample: armcal rollback --connect "
-          "127.0.0.1:1502",
-          std::make_shared<TableOptions>(), RunRollback);
+  o = std::make_shared<TableOptions>();
+  verb =
+      AddVerb(app, action, "rollback",
+              "store and adopt the table that was stored before the one in force\nexample: armcal rollback --connect "
+              "127.0.0.1:1502",
+              o, RunRollback);
+  AddKeyOption(*verb, o->key);
   o = std::make_shared<TableOptions>();
   verb = AddVerb(app, action, "trial",
                  "show, store or end the trial that armcal flash --trial began\nexample: armcal trial --confirm "

@@ -15,7 +15,7 @@ namespace armcal::tool {
 namespace {
 
 struct FlashOptions {
-  std::string connect, robot, table, json;
+  std::string connect, robot, table, json, key;
   bool force = false, dry_run = false, trial = false;
   int limit_s = link::reg::kUsualTrial_s;  // of a trial
 };
@@ -50,6 +50,7 @@ std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptio
 }
 
 int Flash(const FlashOptions& o) {
+  const std::optional<client::Key> key = ReadKeyOption(o.key);
   client::DriveClient drive = ConnectTo(o.connect);
   calibration::TableFile sent;
   std::vector<std::string> missing;
@@ -70,7 +71,8 @@ int Flash(const FlashOptions& o) {
   {
     report::Progress progress("flash");
     const auto show = [&](double share) { progress.Set(share); };
-    report = o.trial ? client::TryTable(drive, words, o.limit_s, show) : client::FlashTable(drive, words, show);
+    report = o.trial ? client::TryTable(drive, words, o.limit_s, show, KeyOf(key))
+                     : client::FlashTable(drive, words, show, KeyOf(key));
   }
   if (o.trial)
     fmt::print("{}: {} registers on trial for {} s, not stored, and read back: CRC {:08X}, generation {}\n",
@@ -130,6 +132,7 @@ void AddFlash(CLI::App& app, Action& action) {
                          "--connect 127.0.0.1:1502 --robot er20_like --table build/table.toml",
                          o);
   verb->add_flag("--dry-run", o->dry_run, "check and say what would be sent");
+  AddKeyOption(*verb, o->key);
   auto* trial = verb->add_flag("--trial", o->trial,
                                "put it on trial: it is in force, and not stored until armcal trial --confirm");
   verb->add_option("--limit", o->limit_s, "seconds after which a trial ends by itself")

@@ -12,7 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct SimulateOptions {
-  std::string scenario = "any", robot = "er20_like", drive, storage = "build/drive.nor", truth_log, serial;
+  std::string scenario = "any", robot = "er20_like", drive, storage = "build/drive.nor", truth_log, serial, key;
   int port = 1502, read_port = -1;
   bool real_time = false;
 };
@@ -42,6 +42,7 @@ int RunSimulate(const SimulateOptions& o) {
   if (!o.truth_log.empty()) words.insert(words.end(), {"--truth-log", o.truth_log});
   if (o.read_port >= 0) words.insert(words.end(), {"--read-port", std::to_string(o.read_port)});
   if (!o.serial.empty()) words.insert(words.end(), {"--serial", o.serial});
+  if (!o.key.empty()) words.insert(words.end(), {"--key", o.key});
   if (o.real_time) words.push_back("--real-time");
   Become(words);
 }
@@ -66,6 +67,7 @@ void AddSimulate(CLI::App& app, Action& action) {
   verb->add_option("--storage", o->storage, "file that plays the drive's flash memory")->capture_default_str();
   verb->add_option("--truth-log", o->truth_log,
                    "what the torque sensors would read without noise, for the report's floor");
+  verb->add_option("--key", o->key, "file with a key: the drive then takes only tables that are signed with it");
   verb->add_flag("--real-time", o->real_time, "one virtual second a second (default: as fast as the host follows)");
   verb->callback([o, &action] { action = [o] { return RunSimulate(*o); }; });
 }

@@ -37,7 +37,7 @@ void AddVerify(CLI::App& app, Action& action);
 void AddHealth(CLI::App& app, Action& action);
 void AddLearning(CLI::App& app, Action& action);
 void AddDemo(CLI::App& app, Action& action);
-void AddDevice(CLI::App& app, Action& action);  // info, get, set, watch, scan, map
+void AddDevice(CLI::App& app, Action& action);      // info, get, set, watch, scan, map
 void AddDriveTable(CLI::App& app, Action& action);  // backup, restore, diff, rollback, trial, log
 void AddBench(CLI::App& app, Action& action);
 void AddSurvey(CLI::App& app, Action& action);

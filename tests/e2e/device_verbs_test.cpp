@@ -140,6 +140,57 @@ TEST_F(DeviceVerbs, WatchScanAndMap_WriteWhatTheyShow) {
   EXPECT_EQ(nlohmann::json::parse(Tool({"map", "--json"}).out)["map_minor"], 5);
 }
 
+// Against a drive with a key: without the key nothing is stored, and with it all verbs go on as before.
+TEST(DriveWithAKey, TakesWhatIsSignedForIt) {
+  const fs::path folder = FreshFolder("drive_with_a_key");
+  const auto key_file = [&](const char* name, char digit) {
+    const fs::path path = folder / name;
+    std::ofstream(path) << std::string(64, digit);
+    fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write);
+    return path.string();
+  };
+  const std::string key = key_file("drive.key", '7'), wrong = key_file("wrong.key", '8');
+  const RunningDrive drive(folder, "none", {"--key", key});
+  const auto ask = [&](std::vector<std::string> words) {
+    words.insert(words.end(), {"--connect", drive.address(), "--json", (folder / "out.json").string()});
+    return Tool(words);
+  };
+  const auto told = [&] { return ReadJson(folder / "out.json"); };
+  const auto flash = [&](double scale, std::vector<std::string> more) {
+    auto table = calibration::DefaultTable(codegen::LoadModel("er20_like"));
+    table.joint[0].torque_scale = scale;
+    const std::string path = (folder / "table.toml").string();
+    calibration::WriteTable(path, table);
+    std::vector<std::string> words = {"flash", "--robot", "er20_like", "--table", path};
+    words.insert(words.end(), more.begin(), more.end());
+    return ask(words);
+  };
+  ExpectOneLine(flash(1.01, {}), 4, "--key FILE");
+  ExpectOneLine(flash(1.01, {"--key", wrong}), 4, "BadSignature");
+  ASSERT_EQ(flash(1.01, {"--key", key}).code, 0);
+  EXPECT_EQ(ask({"verify", "--robot", "er20_like", "--table", (folder / "table.toml").string()}).code, 0);
+  const Outcome info = ask({"info"});
+  EXPECT_NE(info.out.find("signed with the drive's key"), std::string::npos);
+  EXPECT_EQ(told()["signing"], "hmac");
+  EXPECT_EQ(told()["signing_counter"], 1);
+  const std::string backup = (folder / "backup.json").string();
+  ASSERT_EQ(ask({"backup", backup}).code, 0);
+  ASSERT_EQ(flash(1.02, {"--trial", "--key", key}).code, 0);
+  ASSERT_EQ(ask({"trial", "--confirm"}).code, 0);
+  EXPECT_EQ(ask({"diff", backup}).code, 5);
+  ExpectOneLine(ask({"restore", backup}), 4, "--key FILE");
+  ASSERT_EQ(ask({"restore", backup, "--key", key}).code, 0);
+  EXPECT_EQ(ask({"diff", backup}).code, 0);
+  ExpectOneLine(ask({"rollback"}), 4, "--key FILE");
+  ASSERT_EQ(ask({"rollback", "--key", key}).code, 0);
+  EXPECT_EQ(ask({"diff", backup}).code, 5);
+  ASSERT_EQ(ask({"info"}).code, 0);
+  EXPECT_EQ(told()["signing_counter"], 4);
+  ExpectOneLine(ask({"learning", "--reset", "bodies"}), 4, "Forbidden");
+  fs::permissions(key, fs::perms::group_read, fs::perm_options::add);
+  ExpectOneLine(flash(1.03, {"--key", key}), 2, "chmod 600");
+}
+
 TEST(ReadPort, MayBeReadButNotWritten) {
   const RunningDrive drive(FreshFolder("read_port"), "none", {"--read-port", "0"});
   ASSERT_EQ(Tool({"get", "generation", "--connect", drive.read_address()}).code, 0);

@@ -78,7 +78,8 @@ const Edges kEdges = {
     // Machine: the simulated arm, and lib running on a PC. The plant sees neither the generator nor lib: it is the truth
     // that the others are judged by.
     {"host_sim/machine/plant", {kCode + "io"}},
-    {"host_sim/machine/drive", {kHost + "machine/plant", kHost + "client/vendor_registers.hpp", kHost + "data/trajectory", "port/linux", kCode + "io",
+    {"host_sim/machine/drive", {kHost + "machine/plant", kHost + "client/vendor_registers.hpp", kHost + "client/key_file.hpp",
+                                kHost + "data/trajectory", "port/linux", kCode + "io",
                                 kCode + "robot", kLib}},
     {"host_sim/machine/estimate", {kCode + "io", kHost + "data/files", kHost + "client", kHost + "identify/calibration",
                                    kLib}},

@@ -80,12 +80,20 @@ hardware::Storage RamStorage() {
 }
 std::uint32_t Now(void*) { return now; }
 
-// A controller with two filters and a client that flashes a table.
+constexpr std::uint8_t kDriveKey[link::kKeyBytes] = {1, 2, 3};
+
+controller::BoardRules KeyRules() {
+  controller::BoardRules rules;
+  rules.signing.key = kDriveKey;
+  return rules;
+}
+
+// A controller with two filters and a key, and a client that flashes signed tables.
 struct Drive {
   static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
 
   controller::Controller<Model, filter::ForgettingFilter<Model>, filter::KalmanFilter<Model, filter::Form::kBlock>>
-      controller{RamStorage(), {nullptr, Now, Now}};
+      controller{RamStorage(), {nullptr, Now, Now}, {}, KeyRules()};
   controller::RawTrace<Model, 4096> trace;
   std::uint8_t request[link::kMaxPdu] = {}, reply[link::kMaxPdu] = {};
   std::uint16_t words[kWords] = {};
@@ -116,6 +124,33 @@ struct Drive {
     step.Add(CostOf([&] { busy = controller.Step(); }));
     return busy;
   }
+  void Sign(std::uint32_t counter) {
+    link::PutSeal({0, counter, link::SealMethod::kHmac}, words, kWords);
+    core::HmacSha256 hmac;
+    hmac.Begin(kDriveKey, sizeof kDriveKey);
+    std::uint8_t bytes[core::Sha256::kDigestBytes];
+    constexpr int kCovered = kWords - link::kSignatureWords;
+    for (int k = 0; k < kCovered; ++k) {
+      core::PutBytes16(bytes, words[k]);
+      hmac.Add(bytes, 2);
+    }
+    hmac.Finish(bytes);
+    for (int k = 0; k < 16; ++k) words[kCovered + k] = core::GetBytes16(bytes + 2 * k);
+  }
+  // Opens, stages and checks the defaults with this counter. Answers whether all was accepted.
+  bool Check(std::uint32_t counter) {
+    model::Encode(defaults, words);
+    Sign(counter);
+    bool accepted = Command(link::reg::kOpen);
+    for (std::uint16_t at = 0; at < kWords; at = static_cast<std::uint16_t>(at + 123)) {
+      const int rest = kWords - at;
+      (void)Write(static_cast<std::uint16_t>(link::reg::kStagedTable.address + at),
+                  static_cast<std::uint16_t>(rest < 123 ? rest : 123), words + at);
+      accepted &= reply[0] == 16;
+    }
+    step = {};
+    return accepted && Command(link::reg::kCheck);
+  }
   // Answers whether it was accepted.
   bool Command(std::uint32_t command) {
     link::Words<link::reg::kCommandBlock> w;
@@ -130,7 +165,8 @@ struct Drive {
 };
 
 // Each figure is the longest call: of the tick, of one that takes a new table, of the background while it learns, while
-// it checks a table, and while it stores and adopts one; of a request.
+// it checks a signed table, and while it stores and adopts one; of a request, those that begin and end a trial
+// included.
 void MeasureController() {
   static Drive drive;
   std::memset(memory, 0xFF, sizeof memory);
@@ -160,30 +196,28 @@ void MeasureController() {
     learn = slice > learn ? slice : learn;
   }
 
-  model::Encode(defaults, drive.words);
   const std::uint16_t key[] = {link::reg::kUnlockKey >> 16, link::reg::kUnlockKey & 0xFFFF};
   (void)drive.Write(link::reg::kUnlock.address, 2, key);
-  bool accepted = drive.Command(link::reg::kOpen);
-  for (std::uint16_t at = 0; at < Drive::kWords; at = static_cast<std::uint16_t>(at + 123)) {
-    const int rest = Drive::kWords - at;
-    (void)drive.Write(static_cast<std::uint16_t>(link::reg::kStagedTable.address + at),
-                      static_cast<std::uint16_t>(rest < 123 ? rest : 123), drive.words + at);
-  }
-  drive.step = {};
-  accepted &= drive.Command(link::reg::kCheck);
+  bool accepted = drive.Check(1);
   const std::uint32_t check = drive.step.most;
   accepted &= drive.Command(link::reg::kSave);
   const std::uint32_t save = work();
-  const std::uint32_t fed = feed.most, read = [&] {
+  const std::uint32_t fed = feed.most;
+  accepted &= drive.Check(2) && drive.Command(link::reg::kTrial);
+  (void)work();
+  accepted &= drive.Command(link::reg::kBack);
+  (void)work();
+  const std::uint32_t read = [&] {
     (void)drive.Read(3, link::reg::kStagedTable.address, 125);
     (void)drive.Read(4, link::reg::kStatusBlock.first, 28);
+    (void)drive.Read(4, link::reg::kLogBlock.first, 125);
     const std::uint16_t joint = 1;
     (void)drive.Write(link::reg::kResidualSelect.address, 1, &joint);
     return drive.request_cost.most;
   }();
   feed = {};
   tick();
-  if (!accepted || c.generation() != 2) return;
+  if (!accepted || c.generation() != 4) return;  // defaults, a save, a trial and back
   port::runner::Line("controller")
       .Text(Model::kName)
       .Value("push", push.most)

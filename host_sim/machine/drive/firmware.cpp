@@ -1,6 +1,8 @@
 // drive - lib's controller for one model, behind Modbus TCP and RTU. Compiled once for each model, linked in or loaded.
 #include "host_sim/machine/drive/firmware.hpp"
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -27,9 +29,11 @@ class Compiled final : public Firmware {
  public:
   static constexpr int n = Model::kJoints;
 
-  Compiled()
+  explicit Compiled(const std::uint8_t* key)
       : storage_(2, kSectorBytes, 8),
-        controller_(storage_.storage(), port_linux::SteadyClock(tick_), Identity(), Rules()),
+        key_(key == nullptr ? std::nullopt : std::optional(CopyOf(key))),
+        controller_(storage_.storage(), port_linux::SteadyClock(tick_), Identity(),
+                    Rules(key_ ? key_->data() : nullptr)),
         service_(controller_.engine()),
         read_service_(controller_.engine(), link::Rights::kRead),
         server_(Bytes(service_), port_linux::SteadyClock(tick_)) {}
@@ -144,10 +148,17 @@ class Compiled final : public Firmware {
     identity.capabilities = link::reg::kHasSampleTrace;
     return identity;
   }
+  using Key = std::array<std::uint8_t, link::kKeyBytes>;
+  static Key CopyOf(const std::uint8_t* key) {
+    Key copy;
+    std::copy(key, key + copy.size(), copy.begin());
+    return copy;
+  }
   // A file does not wear out.
-  static controller::BoardRules Rules() {
+  static controller::BoardRules Rules(const std::uint8_t* key) {
     controller::BoardRules rules;
     rules.saves.interval_ms = 0;
+    rules.signing.key = key;
     return rules;
   }
 
@@ -163,6 +174,7 @@ class Compiled final : public Firmware {
 
   std::atomic<std::uint32_t> tick_{0};  // the controller's clock
   port_linux::FileStorage storage_;
+  std::optional<Key> key_;
   controller::Controller<Model, filter::ForgettingFilter<Model>, filter::KalmanFilter<Model>> controller_;
   std::unique_ptr<VendorBlock> vendor_;
   controller::RawTrace<Model> raw_trace_;
@@ -178,7 +190,8 @@ class Compiled final : public Firmware {
 }  // namespace
 }  // namespace armcal::drive
 
-extern "C" __attribute__((visibility("default"))) armcal::drive::Firmware* MakeArmcalFirmware(int interface) {
+extern "C" __attribute__((visibility("default"))) armcal::drive::Firmware* MakeArmcalFirmware(int interface,
+                                                                                              const std::uint8_t* key) {
   if (interface != armcal::drive::kFirmwareInterface) return nullptr;
-  return new armcal::drive::Compiled<armcal::generated::SelectedModel>;
+  return new armcal::drive::Compiled<armcal::generated::SelectedModel>(key);
 }

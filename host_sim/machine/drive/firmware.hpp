@@ -94,6 +94,6 @@ class Firmware {
 
 }  // namespace armcal::drive
 
-// The firmware of the model that this was compiled for; `delete` ends it. nullptr: another interface. A program without
-// a firmware of its own has none of this name.
-extern "C" armcal::drive::Firmware* MakeArmcalFirmware(int interface) __attribute__((weak));
+// The firmware of the model that this was compiled for; `delete` ends it. key: [32], with which tables must be signed;
+// nullptr: they need not. nullptr: another interface. A program without a firmware of its own has none of this name.
+extern "C" armcal::drive::Firmware* MakeArmcalFirmware(int interface, const std::uint8_t* key) __attribute__((weak));

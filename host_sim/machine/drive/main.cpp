@@ -1,14 +1,16 @@
 // drive - the program of the simulated drive. Its firmware is linked in, or loaded from a shared object.
 //   armcal-drive[-ROBOT] [--firmware FILE] --scenario FILE --robot FILE --storage FILE [--port N] [--read-port N]
-//     [--serial DEVICE] [--truth-log FILE]
+//     [--serial DEVICE] [--truth-log FILE] [--key FILE]
 //   armcal-drive-ROBOT --schema
 //     prints which model is linked in
 #include <dlfcn.h>
 
 #include <csignal>
 #include <cstring>
+#include <optional>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/key_file.hpp"
 #include "host_sim/machine/drive/simulated_drive.hpp"
 
 namespace {
@@ -18,7 +20,7 @@ using namespace armcal;
 std::atomic<bool> quit{false};
 
 // Never unloaded: its objects live until the program ends.
-std::unique_ptr<drive::Firmware> Load(const std::string& path) {
+std::unique_ptr<drive::Firmware> Load(const std::string& path, const std::uint8_t* key) {
   auto make = &MakeArmcalFirmware;
   if (!path.empty()) {
     void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -27,7 +29,7 @@ std::unique_ptr<drive::Firmware> Load(const std::string& path) {
     if (!make) throw io::InputError(path + ": expected a firmware that armcal has compiled");
   }
   if (!make) throw io::InputError("--firmware: missing, expected a firmware that armcal has compiled");
-  std::unique_ptr<drive::Firmware> firmware(make(drive::kFirmwareInterface));
+  std::unique_ptr<drive::Firmware> firmware(make(drive::kFirmwareInterface, key));
   if (!firmware) throw io::InputError(path + ": compiled for another version of armcal; build armcal again");
   return firmware;
 }
@@ -35,6 +37,7 @@ std::unique_ptr<drive::Firmware> Load(const std::string& path) {
 int Main(int argc, char** argv) {
   drive::DriveOptions o;
   std::string firmware;
+  std::optional<client::Key> key;
   bool schema = false;
   const auto value = [&](int& i) -> std::string {
     if (i + 1 >= argc) throw io::InputError(std::string(argv[i]) + ": expected a value");
@@ -48,12 +51,13 @@ int Main(int argc, char** argv) {
     else if (!std::strcmp(argv[i], "--port")) o.port = std::stoi(value(i));
     else if (!std::strcmp(argv[i], "--read-port")) o.read_address = o.address, o.read_port = std::stoi(value(i));
     else if (!std::strcmp(argv[i], "--serial")) o.serial = value(i);
+    else if (!std::strcmp(argv[i], "--key")) key = client::ReadKey(value(i));
     else if (!std::strcmp(argv[i], "--firmware")) firmware = value(i);
     else if (!std::strcmp(argv[i], "--real-time")) o.real_time = true;
     else if (!std::strcmp(argv[i], "--schema")) schema = true;
     else throw io::InputError(std::string(argv[i]) + ": no such option of the simulated drive");
   }
-  std::unique_ptr<drive::Firmware> loaded = Load(firmware);
+  std::unique_ptr<drive::Firmware> loaded = Load(firmware, key ? key->data() : nullptr);
   if (schema) {
     std::printf("%08X\n", static_cast<unsigned>(loaded->schema()));
     return 0;

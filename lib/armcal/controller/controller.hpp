@@ -19,6 +19,8 @@
 
 namespace armcal::controller {
 
+static_assert(model::kSealWords == link::kSealWords && model::kLayoutVersion == link::kSealedLayout);
+
 // Where the axes shall be. Shapes: [n], rad (m), rad/s, rad/s^2.
 template <int n>
 struct SetPoint {
@@ -32,6 +34,9 @@ struct BoardRules {
   // Whether clients may write now; a register shows the answer. nullptr: they may. See link::ClientRequests.
   bool (*may_write)(void* context) = nullptr;
   void* context = nullptr;  // of may_write
+  // Who may change tables. With a key or a function, clients can neither hold nor reset what the estimators learn. The
+  // controller fills in the serial number.
+  link::Signing signing = {};
 };
 
 // One motion controller. It lives as long as the power is on, and takes some 80 KB for six joints. Filters: one or two
@@ -57,7 +62,7 @@ class Controller {
         ceilings_(model::View(ceilings)),
         store_(storage, Model::kSchema, kWords, kFirstWords),
         transaction_({this, Check, Permit, Adopt, TryOut, GiveBack, Doubt}, store_, Model::kSchema, staged_, active_,
-                     kWords, rules.saves),
+                     kWords, rules.saves, SigningOf(rules, identity)),
         device_(Describe(identity), live_, transaction_, {this, Hold, Reset, TakeResiduals, MayWrite}),
         estimators_(Shared<Filters>()...) {
     model::Encode(estimator::DefaultTable<Model>(), active_, model::kFirstLayout);  // as clients of any age read it
@@ -72,6 +77,7 @@ class Controller {
     const core::Status served = Serve(std::make_index_sequence<kFilters>());
     if (!core::IsOk(served)) return served;
     const core::Status stored = transaction_.Boot();
+    booted_ = true;
     RestartAll();
     if (core::IsOk(stored)) return stored;
     const core::Status built = check_.BuildDefaults(generation_ + 1, &Suits, Spare());
@@ -87,6 +93,11 @@ class Controller {
   // The motion controller says that the axes did not follow the set-point. A table on trial is then taken back; without
   // one nothing happens. Context: any.
   void ReportTrackingError() { tracking_error_.store(true, std::memory_order_relaxed); }
+
+  // What learning_hold and learning_reset do for a client, for the firmware itself. `block`: a joint from 0, or the
+  // number of joints for what acts on several of them. kOutOfRange: no filter can reset this part. Context: background.
+  void HoldLearning(bool hold) { (void)Hold(this, hold); }
+  core::Status ResetLearning(int block) { return Reset(this, block); }
 
   // Lets a client record the raw samples of Push, and of FeedForward the positions of the set-point and the torque that
   // it answered. `ring` must live as long as this object. Call it once, before the first tick. Answers as
@@ -128,7 +139,7 @@ class Controller {
   // One bounded slice of all work that is not the tick's: of a table, of the restart after it, or of one of the
   // estimators. Returns false if nothing was left to do. Context: background.
   bool Step() {
-    table_slice_ = false;
+    table_slice_ = transaction_.sealing();
     device_.Step(clock_.Ms());
     bool busy = transaction_.busy() || table_slice_;
     if (restarts_due_ != 0u) busy = RestartNext();
@@ -162,6 +173,11 @@ class Controller {
     std::apply([&](auto&... estimator) { (call(estimator), ...); }, estimators_);
   }
 
+  static link::Signing SigningOf(const BoardRules& rules, const link::Identity& identity) {
+    link::Signing signing = rules.signing;
+    signing.serial_number = identity.serial_number;
+    return signing;
+  }
   static link::Identity Describe(link::Identity identity) {
     identity.schema = Model::kSchema;
     identity.axes = n;
@@ -272,11 +288,14 @@ class Controller {
     c.table_slice_ = true;
     c.spare_is_checked_ = false;
     if (first)
-      c.check_.Begin(words, count, c.ceilings_, c.rules_.adopt_while_enabled, c.generation_ + 1, &Suits, c.Spare());
+      c.check_.Begin(words, count, c.ceilings_, c.rules_.adopt_while_enabled, c.MayBeSealed(), c.generation_ + 1,
+                     &Suits, c.Spare());
     const core::Refusal refusal = c.check_.Step();
     c.spare_is_checked_ = core::IsOk(refusal.status);
     return refusal;
   }
+  // A record that is stored is taken as it is. A table that comes later has a seal only if the drive can judge it.
+  bool MayBeSealed() const { return !booted_ || rules_.signing.required(); }
   static core::Status Permit(void* self) {
     auto& c = *static_cast<Controller*>(self);
     if (!c.spare_is_checked_) return core::Status::kWrongOrder;
@@ -382,6 +401,7 @@ class Controller {
   monitor::ResidualStatistics<n> residuals_;
   TableCheck<Model> check_;
   estimator::AdoptedTable<Model> adopted_[2];
+  bool booted_ = false;
   bool spare_is_checked_ = false;   // the spare is what the last Check was given
   bool table_slice_ = false;        // this Step has worked on a table
   std::uint32_t restarts_due_ = 0;  // estimators, a bit each

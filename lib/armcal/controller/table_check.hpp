@@ -13,16 +13,17 @@ class TableCheck {
  public:
   static constexpr int n = Model::kJoints;
 
-  // `words` [count]: a table in its layout. It must not change until the end. ceilings, bumpless_allowed: see
-  // model::CheckWords. generation: the number of the coming adoption. suits: says whether the filters can hold what the
-  // table asks for. `spare`: the check fills it in; nobody else may use it until the end.
+  // `words` [count]: a table in its layout. It must not change until the end. ceilings, bumpless_allowed,
+  // sealed: see model::CheckWords. generation: the number of the coming adoption. suits: says whether the filters can
+  // hold what the table asks for. `spare`: the check fills it in; nobody else may use it until the end.
   void Begin(const std::uint16_t* words, int count, const model::CeilingView& ceilings, bool bumpless_allowed,
-             std::uint32_t generation, bool (*suits)(const estimator::AdoptedTable<Model>&),
+             bool sealed, std::uint32_t generation, bool (*suits)(const estimator::AdoptedTable<Model>&),
              estimator::AdoptedTable<Model>& spare) {
     words_ = words;
     count_ = count;
     ceilings_ = ceilings;
     bumpless_allowed_ = bumpless_allowed;
+    sealed_ = sealed;
     generation_ = generation;
     suits_ = suits;
     spare_ = &spare;
@@ -38,7 +39,7 @@ class TableCheck {
     switch (stage_) {
       case Stage::kWords:
         refusal.status = model::CheckHeading<n, Model::kParameters>(words_, count_, Model::kSchema);
-        if (core::IsOk(refusal.status)) refusal = model::CheckWords(ceilings_, bumpless_allowed_, words_);
+        if (core::IsOk(refusal.status)) refusal = model::CheckWords(ceilings_, bumpless_allowed_, words_, sealed_);
         return Next(Stage::kDecode, refusal);
       case Stage::kDecode:
         refusal.status = model::Decode(words_, Model::kSchema, table_);
@@ -95,7 +96,7 @@ class TableCheck {
   model::Rows<Model> rows_;
   std::uint32_t generation_ = 0;
   int count_ = 0, point_ = 0;
-  bool bumpless_allowed_ = false;
+  bool bumpless_allowed_ = false, sealed_ = false;
   Stage stage_ = Stage::kWords;
 };
 

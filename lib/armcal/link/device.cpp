@@ -135,6 +135,8 @@ void Device::FillTable(Words<reg::kTableBlock>& w) {
   w.Set<reg::kActiveWords>(transaction_.active_words());
   w.Set<reg::kWritingAllowed>(MayWrite());
   w.Set<reg::kTrialLeft>(transaction_.trial_left_s());
+  w.Set<reg::kSigningCounter>(transaction_.counter());
+  w.Set<reg::kSigning>(transaction_.signing());
 }
 
 Status Device::ReadOverview(std::uint16_t offset, std::uint16_t count, std::uint16_t* words) {
@@ -246,12 +248,17 @@ Status Device::ReadActive(std::uint16_t offset, std::uint16_t count, std::uint16
 
 // Learning -----------------------------------------------------------------------------------------------------------
 
+// kForbidden: the drive has a key, and nothing in these commands is signed. Else as NeedsUnlock.
+Status Device::MayCommandLearning() {
+  return transaction_.signing() != SealMethod::kNone ? Status::kForbidden : NeedsUnlock();
+}
+
 void Device::FillHold(Words<reg::kLearningHold>& w) { w.Set<reg::kLearningHold>(held_); }
 
 Status Device::TakeHold(const Words<reg::kLearningHold>& w) {
   const std::uint16_t hold = w.Get<reg::kLearningHold>();
   if (hold > 1) return Status::kOutOfRange;
-  const Status unlocked = NeedsUnlock();
+  const Status unlocked = MayCommandLearning();
   const Status done = core::IsOk(unlocked) ? requests_.hold(requests_.context, hold == 1) : unlocked;
   if (core::IsOk(done)) held_ = hold;
   return done;
@@ -262,7 +269,7 @@ void Device::FillReset(Words<reg::kLearningReset>&) {}  // it is a command and r
 Status Device::TakeReset(const Words<reg::kLearningReset>& w) {
   const std::uint16_t block = w.Get<reg::kLearningReset>();
   if (block < 1 || block > identity_.axes + 1) return Status::kOutOfRange;
-  const Status unlocked = NeedsUnlock();
+  const Status unlocked = MayCommandLearning();
   return core::IsOk(unlocked) ? requests_.reset(requests_.context, block - 1) : unlocked;
 }
 

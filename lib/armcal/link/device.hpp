@@ -111,6 +111,7 @@ class Device {
   void LeaveSeat();
   bool MayWrite() const { return requests_.may_write == nullptr || requests_.may_write(requests_.context); }
   core::Status NeedsUnlock();
+  core::Status MayCommandLearning();
 
   void FillIdentity(Words<reg::kIdentityBlock>& w);
   void FillWriting(Words<reg::kWritingBlock>& w);

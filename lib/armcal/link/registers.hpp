@@ -206,7 +206,9 @@ inline constexpr Register kTableRoom = In(0x0078, 1, kU16, "table_room", "", "re
 inline constexpr Register kActiveWords = In(0x0079, 1, kU16, "active_words", "", "registers of the table in force");
 inline constexpr Register kWritingAllowed = In(0x007A, 1, kU16, "writing_allowed", "", "1: the board lets clients write, 0: it refuses, for example by a key switch");
 inline constexpr Register kTrialLeft = In(0x007B, 1, kU16, "trial_left", "s", "until the trial of a table ends, 0: there is none");
-inline constexpr Span kTableBlock = Between(kTableRoom, kTrialLeft);
+inline constexpr Register kSigningCounter = In(0x007C, 1, kU32, "signing_counter", "", "highest counter of a signed table; the next one needs a higher one");
+inline constexpr Register kSigning = In(0x007E, 1, kU16, "signing", "", "how a table must be signed: 0 it need not, 1 HMAC-SHA256, 2 in the board's own way");
+inline constexpr Span kTableBlock = Between(kTableRoom, kSigning);
 inline constexpr Span kErrorBlock = Between(kErrorException, kErrorStatus);
 
 // Estimates: lists of floats, one a joint or one a column.
@@ -312,7 +314,7 @@ inline constexpr const Register* kDeclared[] = {
   &kErrorAddress, &kErrorStatus, &kErrorRequest, &kUnlocked, &kHealth, &kRowsUsedA, &kRowsGatedA, &kRowsUsedB, &kRowsGatedB,
   &kRowsOutsideA, &kRowsOutsideB, &kImplausibleTicks, &kTableFallbacks,
   &kRefusedStatus, &kRefusedWord, &kRefusedValue, &kRefusedBound, &kWriterSeat, &kSaveWait,
-  &kTableRoom, &kActiveWords, &kWritingAllowed, &kTrialLeft, &kTrialLimit,
+  &kTableRoom, &kActiveWords, &kWritingAllowed, &kTrialLeft, &kTrialLimit, &kSigningCounter, &kSigning,
   &kLogCount, &kLogTick, &kLogConnection, &kLogCommand, &kLogStatus,
   &kResidualRms, &kConsistency, &kEstimateA, &kDeviationA, &kEstimateB, &kDeviationB,
   &kResidualJoint, &kResidualSnapshot, &kResidualGeneration, &kResidualElapsed, &kResidualSigma, &kResidualReference, &kResidualRecent,

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "armcal/core/crc.hpp"
+#include "armcal/core/words.hpp"
 
 namespace armcal::link {
 
@@ -20,7 +21,7 @@ bool Same(const TableCommand& a, const TableCommand& b) {
 
 TableTransaction::TableTransaction(const TableApplication& application, table::TableStore& store, std::uint32_t schema,
                                    std::uint16_t* staged, std::uint16_t* active, std::uint16_t words,
-                                   const SaveRate& rate)
+                                   const SaveRate& rate, const Signing& signing)
     : application_(application),
       store_(store),
       schema_(schema),
@@ -28,6 +29,7 @@ TableTransaction::TableTransaction(const TableApplication& application, table::T
       active_(active),
       words_(words),
       active_words_(static_cast<std::uint16_t>(store.shortest())),
+      signing_(signing),
       rate_(rate),
       saves_left_(rate.burst) {
   active_crc_ = core::Crc32Words(active_, active_words_);
@@ -35,6 +37,7 @@ TableTransaction::TableTransaction(const TableApplication& application, table::T
 
 Status TableTransaction::Boot() {
   table_status_ = store_.Load(staged_);
+  ReadCounters();
   if (core::IsOk(table_status_)) BootFromStore();
   Note(kBootEvent, table_status_);
   return table_status_;
@@ -181,6 +184,7 @@ Status TableTransaction::Check(const TableCommand& command) {
   checking_ = command;
   summed_ = 0;
   sum_ = 0;
+  sealing_ = false;
   phase_ = Phase::kChecking;
   return Status::kUnfinished;
 }
@@ -195,16 +199,49 @@ void TableTransaction::CheckNext() {
     if (summed_ < staged_words_) return;
     if (sum_ != checking_.crc) return Answer(Status::kBadCrc);
     first_ = true;
+    sealing_ = signing_.required();
+    if (sealing_) seal_.Begin(staged_, staged_words_, signing_, counter_);
     return;
   }
+  if (sealing_) return JudgeSeal();
   const core::Refusal why = application_.check(application_.context, staged_, staged_words_, first_);
   first_ = false;
-  if (why.status == Status::kBusy) return;
+  if (why.status != Status::kBusy) Judged(why);
+}
+
+void TableTransaction::Judged(const core::Refusal& why) {
   why_ = why;
   // A refused check has thrown away what an earlier one built, so nothing is left that could be saved.
   state_ = core::IsOk(why.status) ? TransactionState::kChecked : TransactionState::kLoading;
   checked_crc_ = checking_.crc;
   Answer(why.status);
+}
+
+// One slice. The application looks at the words only if the seal is good.
+void TableTransaction::JudgeSeal() {
+  const Status good = seal_.Step();
+  if (good == Status::kBusy) return;
+  sealing_ = false;
+  if (!core::IsOk(good)) Judged({good});
+}
+
+// After this, no table with this counter or a lower one is accepted.
+void TableTransaction::UseCounter(const std::uint16_t* words, int count) {
+  const std::uint32_t counter = GetSeal(words, count).counter;
+  if (counter > counter_) counter_ = counter;
+}
+
+// The counters of all records that read well, of whichever schema: the layout version and the seal have the same places
+// in every table.
+void TableTransaction::ReadCounters() {
+  for (int slot = 0; slot < table::TableStore::kSlots; ++slot) {
+    const std::uint32_t length = store_.words_in(slot);
+    std::uint16_t head[3], tail[kSealWords - kSignatureWords];
+    if (length < kSealWords || !core::IsOk(store_.Read(slot, 0, 3, head)) || head[2] < kSealedLayout) continue;
+    if (!core::IsOk(store_.Read(slot, length - kSealWords, kSealWords - kSignatureWords, tail))) continue;
+    const std::uint32_t counter = core::GetU32(tail + 2);
+    if (counter > counter_) counter_ = counter;
+  }
 }
 
 void TableTransaction::Answer(Status status) {
@@ -231,6 +268,7 @@ Status TableTransaction::Store(const std::uint16_t* words, std::uint16_t count) 
   if (rate_.interval_ms != 0 && saves_left_ == 0) return Status::kTooSoon;
   if (const Status begun = store_.Save(words, count); !core::IsOk(begun)) return begun;
   if (saves_left_ > 0) --saves_left_;
+  UseCounter(words, count);
   refusal_ = Status::kOk;
   state_ = TransactionState::kCommitting;
   phase_ = Phase::kStoring;
@@ -255,6 +293,7 @@ Status TableTransaction::Trial(const TableCommand& command) {
   if (!core::IsOk(table_status_) || store_.slot() < 0) return Status::kWrongOrder;  // nothing to come back to
   status = application_.try_out(application_.context);
   if (!core::IsOk(status)) return status;
+  UseCounter(staged_, staged_words_);
   SwapTables();
   trial_began_ms_ = now_ms_;
   trial_ms_ = 1000u * trial_limit_s_;

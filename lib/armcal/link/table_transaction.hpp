@@ -6,6 +6,7 @@
 #include "armcal/core/status.hpp"
 #include "armcal/link/event_log.hpp"
 #include "armcal/link/registers.hpp"
+#include "armcal/link/seal.hpp"
 #include "armcal/table/table_store.hpp"
 
 namespace armcal::link {
@@ -66,9 +67,12 @@ class TableTransaction {
   static constexpr std::uint32_t kStageTimeout_ms = 30000;
 
   // `staged`, `active`: buffers [words] that outlive this; words: the longest table that `store` takes. `active` may
-  // hold defaults of the shortest length, which Boot() replaces.
+  // hold defaults of the shortest length, which Boot() replaces. signing: if it has a key or a function, only tables
+  // with a good seal are accepted over the wire, and each needs a counter above every counter in the store. What is
+  // already stored is taken as it is.
   TableTransaction(const TableApplication& application, table::TableStore& store, std::uint32_t schema,
-                   std::uint16_t* staged, std::uint16_t* active, std::uint16_t words, const SaveRate& rate = {});
+                   std::uint16_t* staged, std::uint16_t* active, std::uint16_t words, const SaveRate& rate = {},
+                   const Signing& signing = {});
 
   // At power-up: loads the stored table, checks it and adopts it. The answer is kept as table_status(): kOk; what the
   // store answers (kBlank, kCorrupt, kWrongSchema, kWrongSize); or why the application refused the last stored table
@@ -80,9 +84,10 @@ class TableTransaction {
   // content; trial: no stored table is in force. kEmpty, kCorrupt, kStorageFault: load: no older table is there to
   // read. kOutOfRange: no such command. kWrongSchema: not a table of this firmware. kWrongSize: it has no table of this
   // length, or another one was opened. kBadCrc: check: the staged words have another checksum; save: the checksum is
-  // not that of the last check. kBusy: committing, or another command is being checked. kTooSoon: the rate of saves. Or
-  // the application's answer. kUnfinished: it is being checked; the same command again gives the answer when Step() has
-  // done the rest. kStorageFault and kTimeout appear in status() only.
+  // not that of the last check. kBadSignature, kOtherDrive, kReplayed: check: the seal. kBusy: committing, or another
+  // command is being checked. kTooSoon: the rate of saves. Or the application's answer. kUnfinished: it is being
+  // checked; the same command again gives the answer when Step() has done the rest. kStorageFault and kTimeout appear
+  // in status() only.
   core::Status Command(const TableCommand& command, std::uint32_t connection = 0);
   // Returns true if `command` equals the last accepted command, sequence number included. Then Command() has no effect.
   bool IsRepeat(const TableCommand& command) const;
@@ -116,6 +121,11 @@ class TableTransaction {
   std::uint16_t active_words() const { return active_words_; }  // of the table in force
   const table::TableStore& store() const { return store_; }
   const EventLog& log() const { return log_; }
+  bool sealing() const {
+    return phase_ == Phase::kChecking && sealing_;
+  }  // the next Step works on a signature, which takes as long as other slices
+  SealMethod signing() const { return signing_.method(); }
+  std::uint32_t counter() const { return counter_; }  // the highest one: a signed table needs a higher one
 
  private:
   enum class Phase : std::uint8_t { kNone, kChecking, kLoading, kStoring, kAdopting, kRevoking, kBooting };
@@ -129,6 +139,10 @@ class TableTransaction {
   core::Status Open(const TableCommand& command);
   core::Status Check(const TableCommand& command);
   void CheckNext();
+  void JudgeSeal();
+  void Judged(const core::Refusal& why);
+  void UseCounter(const std::uint16_t* words, int count);
+  void ReadCounters();
   void Answer(core::Status status);
   core::Status Load(const TableCommand& command);
   void LoadNext();
@@ -169,6 +183,10 @@ class TableTransaction {
   std::uint16_t summed_ = 0;                 // words whose checksum is in sum_
   std::uint32_t sum_ = 0;
   bool first_ = false;  // the application has not begun
+  Signing signing_;
+  SealCheck seal_;
+  bool sealing_ = false;  // the seal of the staged table is not judged yet
+  std::uint32_t counter_ = 0;
   std::uint32_t checked_crc_ = 0;
   std::uint32_t active_crc_ = 0;
   std::uint32_t now_ms_ = 0;

@@ -154,10 +154,12 @@ core::Status CheckHeading(const std::uint16_t* words, int count, std::uint32_t s
 }
 
 // Judges the numbers of a table one by one. `words`: a table of this model, by schema, version and shapes.
-// bumpless_allowed: whether the board lets a table be adopted while axes are enabled. kNotFinite; kOutOfRange (against
-// the layout: not positive, unknown state or group, a reserved bit is set); kForbidden (bumpless); kBeyondCeiling. The
-// count of instructions depends on the model's shapes, and on the first word that is refused. Context: background.
-inline core::Refusal CheckWords(const CeilingView& ceilings, bool bumpless_allowed, const std::uint16_t* words) {
+// bumpless_allowed: whether the board lets a table be adopted while axes are enabled. sealed: whether the table may
+// have a seal; it is not judged here. kNotFinite; kOutOfRange (against the layout: not positive, unknown state or
+// group, a reserved bit is set); kForbidden (bumpless); kBeyondCeiling. The count of instructions depends on the
+// model's shapes, and on the first word that is refused. Context: background.
+inline core::Refusal CheckWords(const CeilingView& ceilings, bool bumpless_allowed, const std::uint16_t* words,
+                                bool sealed = false) {
   internal::WordCheck check(words);
   if (!internal::HeaderIsAllowed(*ceilings.table, bumpless_allowed, words, check)) return check.refusal();
   for (int j = 0; j < ceilings.joints; ++j) {
@@ -184,7 +186,7 @@ inline core::Refusal CheckWords(const CeilingView& ceilings, bool bumpless_allow
     if (!check.Positive(word, kNarrowestGate, kWidestGate)) return check.refusal();
   }
   const int seal = WordOfGate(ceilings.joints, ceilings.parameters, ceilings.joints);
-  for (int k = 0; k < kSealWords; ++k)
+  for (int k = 0; k < kSealWords && !sealed; ++k)
     if (!check.Bits(seal + k, 0)) return check.refusal();
   return check.refusal();
 }

@@ -7,7 +7,7 @@
 //   joint   (8 words each): sigma f32, v_min f32, torque_limit f32, torque_scale f32
 //   parameter (8 words each): mean f32, sd f32, process_noise f32, state u8 << 8 | group u8, 0
 //   gate    (2 words a joint): gate_sigma f32, 0: the compiled default
-//   seal    (40 words): 0
+//   seal    (40 words): which drive the table is for, a counter and a signature; 0: it is not signed
 // Version 1 ends before the gate and is otherwise the same. A table of version 1 means what the compiled defaults say.
 #pragma once
 
@@ -28,7 +28,7 @@ inline constexpr int kHeaderWords = 16;
 inline constexpr int kJointWords = 8;
 inline constexpr int kParameterWords = 8;
 inline constexpr int kGateWords = 2;
-inline constexpr int kSealWords = 40;  // the last words of every table of version 2
+inline constexpr int kSealWords = 40;  // the last words of every table of version 2; no part of the numbers
 
 struct JointEntry {
   float sigma_Nm;

@@ -147,11 +147,7 @@ Status TableStore::Save(const std::uint16_t* words, std::uint32_t count) {
   // Keep the slot of the table in force. If there is none, keep the newest record of another schema.
   const int keep = current_ >= 0 ? current_ : Newest(SlotState::kOtherSchema);
   target_ = keep == 0 ? 1 : 0;
-  const auto is_whole = [&](int slot) {
-    return state_[slot] == SlotState::kGood || state_[slot] == SlotState::kOtherSchema ||
-           state_[slot] == SlotState::kRefused;
-  };
-  const bool whole[kSlots] = {is_whole(0), is_whole(1)};
+  const bool whole[kSlots] = {IsWhole(0), IsWhole(1)};
   std::uint32_t newest = 0;
   if (whole[0]) newest = sequence_[0];
   if (whole[1] && (!whole[0] || static_cast<std::int32_t>(sequence_[1] - newest) > 0)) newest = sequence_[1];
@@ -222,6 +218,15 @@ Status TableStore::Revoke() {
   current_ = previous_;
   result_ = Status::kOk;
   stage_ = Stage::kRevoke;
+  return Status::kOk;
+}
+
+Status TableStore::Read(int slot, std::uint32_t first, std::uint32_t count, std::uint16_t* out) const {
+  if (!IsWhole(slot)) return Status::kEmpty;
+  if (count > kChunkBytes / 2 || first > length_[slot] || count > length_[slot] - first) return Status::kOutOfRange;
+  std::uint8_t bytes[kChunkBytes];
+  if (!IsOk(storage_.Read(AddressOf(slot) + kHeaderBytes + 2 * first, bytes, 2 * count))) return Status::kStorageFault;
+  for (std::uint32_t i = 0; i < count; ++i) out[i] = core::GetBytes16(bytes + 2 * i);
   return Status::kOk;
 }
 

@@ -83,6 +83,11 @@ class TableStore {
   // Begins to copy the good record that is not in force to `out` [words]. Call Step until it no longer answers kBusy;
   // words_copied() is then its length. kOk: it has begun. kEmpty: there is no such record. kBusy: a save is running.
   core::Status Copy(std::uint16_t* out);
+  // Reads words [first, first + count) of the whole record in `slot` to `out`; count: at most kChunkBytes / 2. kEmpty:
+  // there is no whole record. kOutOfRange: it has no such words. kStorageFault.
+  core::Status Read(int slot, std::uint32_t first, std::uint32_t count, std::uint16_t* out) const;
+  std::uint32_t words_in(int slot) const { return IsWhole(slot) ? length_[slot] : 0; }
+
   // Ends a Copy that is not finished; `out` may hold a part of the record.
   void StopCopy() {
     if (stage_ == Stage::kCopy) stage_ = Stage::kIdle;
@@ -116,6 +121,10 @@ class TableStore {
     kCopy
   };
 
+  bool IsWhole(int slot) const {
+    return state_[slot] == SlotState::kGood || state_[slot] == SlotState::kOtherSchema ||
+           state_[slot] == SlotState::kRefused;
+  }
   bool Fits() const;
   std::uint32_t BaseOf(int slot) const { return static_cast<std::uint32_t>(slot) * (storage_.sector_count / 2); }
   std::uint32_t AddressOf(int slot) const { return BaseOf(slot) * storage_.sector_bytes; }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "armcal/controller/controller.hpp"
@@ -19,7 +20,11 @@ struct Bench {
   using Model = generated::Er20Like;
   static constexpr int n = Model::kJoints;
 
-  Bench() { booted = controller.Boot(); }
+  explicit Bench(const controller::BoardRules& rules = Rules(), const link::Identity& identity = {},
+                 const NorFlash& stored = NorFlash({2, 16384, 8, 0xFF}))
+      : flash(stored), controller(flash.storage(), clock, identity, rules) {
+    booted = controller.Boot();
+  }
 
   void Run(int ticks) {
     for (; ticks > 0; --ticks, ++now) {
@@ -63,27 +68,43 @@ struct Bench {
   }
   void Unlock() { ASSERT_EQ(WriteValue<link::reg::kUnlock>(link::reg::kUnlockKey), Status::kOk); }
 
-  Status Command(std::uint32_t command, std::uint32_t crc) {
+  Status Command(std::uint32_t command, std::uint32_t crc, std::uint16_t words = kWords) {
     link::Words<link::reg::kCommandBlock> w;
     w.template Set<link::reg::kSequence>(++sequence);
     w.template Set<link::reg::kCommand>(command);
     w.template Set<link::reg::kCommandSchema>(Model::kSchema);
-    w.template Set<link::reg::kCommandWords>(kWords);
+    w.template Set<link::reg::kCommandWords>(words);
     w.template Set<link::reg::kCommandCrc>(crc);
     Status status = Write(w);
     for (; status == Status::kUnfinished; status = Write(w)) EXPECT_TRUE(controller.Step());
     return status;
   }
+  Status Command(std::uint32_t command, const std::vector<std::uint16_t>& words) {
+    return Command(command, core::Crc32Words(words.data(), words.size()), static_cast<std::uint16_t>(words.size()));
+  }
   // Stages a table and checks it. Answers the status of the first step that is refused.
+  Status Check(const std::vector<std::uint16_t>& words) {
+    Unlock();
+    if (const Status opened = Command(link::reg::kOpen, words); !core::IsOk(opened)) return opened;
+    for (std::size_t at = 0; at < words.size(); at += 100) {
+      const auto count = static_cast<std::uint16_t>(std::min<std::size_t>(100, words.size() - at));
+      const Status s = controller.map().Write(link::reg::kStagedTable + static_cast<int>(at), count, &words[at]);
+      if (!core::IsOk(s)) return s;
+    }
+    return Command(link::reg::kCheck, words);
+  }
   Status Check(const estimator::Table<Model>& table, std::uint32_t& crc) {
     std::vector<std::uint16_t> words(kWords);
     model::Encode(table, words.data());
-    Unlock();
-    if (const Status opened = Command(link::reg::kOpen, 0); !core::IsOk(opened)) return opened;
-    for (std::uint16_t i = 0; i < kWords; ++i)
-      if (const Status s = controller.map().Write(link::reg::kStagedTable + i, 1, &words[i]); !core::IsOk(s)) return s;
     crc = core::Crc32Words(words.data(), words.size());
-    return Command(link::reg::kCheck, crc);
+    return Check(words);
+  }
+  // Also saves it. kOk: it is stored, and adopted as far as the status registers say.
+  Status Flash(const std::vector<std::uint16_t>& words) {
+    if (const Status checked = Check(words); !core::IsOk(checked)) return checked;
+    const Status saved = Command(link::reg::kSave, words);
+    Idle();
+    return saved;
   }
   // Also saves it. kOk: it is stored, and adopted as far as the status registers say.
   Status Flash(const estimator::Table<Model>& table) {
@@ -95,7 +116,7 @@ struct Bench {
   }
 
   static constexpr std::uint16_t kWords = estimator::Table<Model>::kWords;
-  test::NorFlash flash{{2, 16384, 8, 0xFF}};
+  NorFlash flash;
   std::uint32_t now = 0, sequence = 0;
   hardware::Clock clock{&now, [](void* t) { return *static_cast<std::uint32_t*>(t); },
                         [](void* t) { return *static_cast<std::uint32_t*>(t); }};
@@ -105,7 +126,7 @@ struct Bench {
     rules.adopt_while_enabled = true;
     return rules;
   }
-  controller::Controller<Model, Filters...> controller{flash.storage(), clock, {}, Rules()};
+  controller::Controller<Model, Filters...> controller;
   Status booted = Status::kOk, torque = Status::kOk;
   float tau_Nm[n] = {};
   int disturbance_LSB = 0;

@@ -16,6 +16,7 @@
 #include "codegen/generated/puma560/model.hpp"
 #include "codegen/generated/two_link/model.hpp"
 #include "codegen/generated/ur10/model.hpp"
+#include "tests/unit/controller/bench.hpp"
 #include "tests/unit/table/nor_flash.hpp"
 
 namespace armcal::stored_tables {
@@ -102,6 +103,21 @@ TEST(StoredTables, OfVersion1_BootWithTheSameTorqueBits) {
   ExpectBootsAsBefore<generated::Puma560>("puma560");
   ExpectBootsAsBefore<generated::TwoLink>("two_link");
   ExpectBootsAsBefore<generated::Ur10>("ur10");
+}
+
+// A client of layout version 1 reads table_words registers of the table in force, also of a drive without a stored one,
+// changes some, and flashes them with this length.
+TEST(StoredTables, AnOlderClient_ReadsTheDefaultsAndFlashesThem) {
+  const auto drive = std::make_unique<test::Bench<filter::ForgettingFilter<generated::Er20Like>>>();
+  ASSERT_EQ(drive->booted, Status::kBlank);
+  const std::uint16_t size = drive->Value<link::reg::kTableWords>();
+  std::vector<std::uint16_t> words = drive->Read(SpanOf(link::reg::kActiveTable, size));
+  EXPECT_EQ(words[2], 1);
+  core::PutF32(&words[16], 1.5f * core::GetF32(&words[16]));  // sigma of joint 1
+  ASSERT_EQ(drive->Flash(words), Status::kOk);
+  EXPECT_EQ(drive->Read(SpanOf(link::reg::kActiveTable, size)), words);
+  EXPECT_EQ(drive->Value<link::reg::kActiveCrc>(), core::Crc32Words(words.data(), words.size()));
+  EXPECT_EQ(drive->controller.adopted().sigma_Nm[0], core::GetF32(&words[16]));
 }
 
 }  // namespace

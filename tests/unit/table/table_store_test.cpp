@@ -104,6 +104,24 @@ TEST(Store, Copy_GivesTheOlderTable_OrSaysThatItHasFaded) {
   EXPECT_EQ(Finish(store), Status::kOk);
 }
 
+TEST(Store, Read_GivesWordsOfAnyWholeRecord) {
+  NorFlash flash(kNor);
+  TableStore store(flash.storage(), kSchema, kWords);
+  Words words(kWords), part(32);
+  ASSERT_EQ(store.Load(words.data()), Status::kBlank);
+  EXPECT_EQ(store.Read(0, 0, 1, part.data()), Status::kEmpty);
+  Prepare(flash, 5, kOther);
+  ASSERT_EQ(store.Load(words.data()), Status::kWrongSchema);
+  const int slot = store.words_in(0) != 0 ? 0 : 1;
+  EXPECT_EQ(store.words_in(slot), kWords);
+  EXPECT_EQ(store.words_in(1 - slot), 0u);
+  ASSERT_EQ(store.Read(slot, kWords - 32, 32, part.data()), Status::kOk);
+  for (std::uint32_t k = 0; k < 32; ++k) EXPECT_EQ(part[k], Table(5)[kWords - 32 + k]);
+  EXPECT_EQ(store.Read(slot, kWords - 31, 32, part.data()), Status::kOutOfRange);
+  EXPECT_EQ(store.Read(slot, 0, 33, part.data()), Status::kOutOfRange);
+  EXPECT_EQ(store.Read(1 - slot, 0, 1, part.data()), Status::kEmpty);
+}
+
 TEST(Store, OfManySaves_ErasesOnceASaveAndAlternates) {
   NorFlash flash(kNor);
   TableStore store(flash.storage(), kSchema, kWords);

@@ -112,7 +112,7 @@ if [[ $scope != fast ]]; then
 
   # Under sanitizers: what bytes from outside reach and what runs on the target. The host's matrix code takes long to compile so; it
   # comes with `long`.
-  rooms=(core math signal filter physical monitor feedforward table link controller client files logs report port_template)
+  rooms=(core math signal filter physical monitor feedforward table link controller client files bags logs report port_template)
   targets=("${rooms[@]/#/test_}")
   tests="^($(IFS='|'; echo "${targets[*]}"))$"
   if [[ $scope == long ]]; then

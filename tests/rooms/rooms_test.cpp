@@ -49,7 +49,8 @@ const Edges kEdges = {
 
     // Data: what is read and what is shown.
     {"host_sim/data/files",    {kCode + "io"}},
-    {"host_sim/data/logs",     {kCode + "io", kHost + "data/files"}},
+    {"host_sim/data/bags",     {kCode + "io", kHost + "data/files"}},
+    {"host_sim/data/logs",     {kCode + "io", kHost + "data/files", kHost + "data/bags"}},
     {"host_sim/data/trajectory", {kCode + "io", kHost + "data/files"}},
     {"host_sim/data/report",   {kHost + "data/files"}},
 

@@ -4,6 +4,7 @@
 #include <toml++/toml.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -11,6 +12,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
+#include "host_sim/data/logs/table.hpp"
 
 namespace armcal::logs {
 namespace {
@@ -86,9 +88,15 @@ class MapReader {
     map.joints = static_cast<int>(root_["joints"].value_or<std::int64_t>(0));
     if (map.joints < 1 || map.joints > 64) Fail("joints", "expected a number of joints, 1 to 64");
     joints_ = 1;
-    if (!root_["time"].is_table()) Fail("time", "expected a table with column and unit");
-    map.time = Channels("time", *root_["time"].as_table(), "time").front();
+    if (root_.contains("time") && !root_["time"].is_table()) Fail("time", "expected a table with column and unit");
+    map.time =
+        root_.contains("time") ? Channels("time", *root_["time"].as_table(), "time").front() : Channel{kTimeColumn};
     joints_ = static_cast<std::size_t>(map.joints);
+    names_ = Texts("names");
+    if (!names_.empty() && names_.size() != joints_)
+      Fail("names", "expected a list of " + std::to_string(joints_) + " names, one a joint");
+    for (const std::string& file : Texts("messages"))
+      map.definitions.push_back(std::filesystem::path(file_).parent_path() / file);
     const std::string torque = root_["torque"].value_or<std::string>("tau");
     if ((root_.contains("torque") && !root_["torque"].is_string()) || (torque != "tau" && torque != kLinkTorque))
       Fail("torque", "expected \"tau\" or \"" + std::string(kLinkTorque) + "\", the torque to use");
@@ -119,9 +127,12 @@ class MapReader {
 
   void CheckTopLevelKeys() const {
     for (const auto& [key, node] : root_) {
-      bool known = key == "joints" || key == "title" || key == "time" || key == "torque" || key.str() == kLinkTorque;
+      bool known = key == "joints" || key == "title" || key == "names" || key == "messages" || key == "time" ||
+                   key == "torque" || key.str() == kLinkTorque;
       for (const Rule& rule : kRules) known = known || key.str() == rule.key;
-      if (!known) Fail(std::string(key.str()), "unknown key, expected joints, title, time, torque or a quantity");
+      if (!known)
+        Fail(std::string(key.str()),
+             "unknown key, expected joints, names, title, messages, time, torque or a quantity");
     }
   }
 
@@ -157,6 +168,30 @@ class MapReader {
     return values;
   }
 
+  // A list of texts; empty without the key.
+  std::vector<std::string> Texts(const std::string& key) const {
+    std::vector<std::string> out;
+    if (!root_.contains(key)) return out;
+    const toml::array* list = root_[key].as_array();
+    for (std::size_t k = 0; list != nullptr && k < list->size(); ++k)
+      out.push_back(list->get(k)->value<std::string>().value_or(""));
+    if (out.empty() || std::find(out.begin(), out.end(), "") != out.end()) Fail(key, "expected a list of texts");
+    return out;
+  }
+
+  // The column of joint j, where the map may say the joint by its number or its name.
+  std::string ColumnOf(const std::string& key, std::string column, std::size_t j) const {
+    const auto put = [&column](std::string_view mark, const std::string& text) {
+      if (const auto at = column.find(mark); at != column.npos) column.replace(at, mark.size(), text);
+    };
+    put("{}", std::to_string(j + 1));
+    put("{0}", std::to_string(j));
+    if (column.find("{joint}") != column.npos && names_.empty())
+      Fail(key + ".column", "{joint} needs the joints' names, as in names = [\"base\", \"elbow\"]");
+    if (!names_.empty()) put("{joint}", names_[j]);
+    return column;
+  }
+
   std::vector<Channel> Channels(const std::string& key, const toml::table& table, std::string_view dimension) const {
     for (const auto& [name, node] : table) {
       if (name != "column" && name != "unit" && name != "scale" && name != "offset" && name != "optional" &&
@@ -174,8 +209,7 @@ class MapReader {
     std::vector<Channel> channels;
     for (std::size_t j = 0; j < joints_; ++j) {
       const Unit& unit = FindUnit(key, units[j], dimension);
-      std::string column = columns[j];
-      if (const auto at = column.find("{}"); at != column.npos) column.replace(at, 2, std::to_string(j + 1));
+      const std::string column = ColumnOf(key, columns[j], j);
       if (column.empty()) Fail(key + ".column", "expected the name of a column of the log");
       for (const Channel& other : channels) {
         if (other.column == column) Fail(key + ".column", "'" + column + "' is used for two joints");
@@ -227,6 +261,7 @@ class MapReader {
   std::string file_;
   toml::table root_;
   std::size_t joints_ = 1;
+  std::vector<std::string> names_;  // of the joints; empty: not given
 };
 
 }  // namespace

@@ -2,11 +2,13 @@
 //
 // A map is a TOML file:
 //   joints = 6
+//   names = ["base", "arm"]      # of the joints, one each, where columns have {joint}
+//   messages = ["my/msg/A.msg"]  # definitions for a recording that lacks them; paths from the map's folder
 //   [time]
-//   column = "t_s"          # name in the log
+//   column = "t_s"          # name in the log; without [time]: "__time", in s (table.hpp)
 //   unit = "s"              # s, ms, us, ns
 //   [q]                     # q and tau must be there; also qd qdd qref tauff ext temp flag
-//   column = "pos_{}_deg"   # {} stands for 1..n; or a list of n names
+//   column = "pos_{}_deg"   # {} stands for 1..n, {0} for 0..n-1, {joint} for names; or a list of n columns
 //   unit = "deg"            # one for all joints, or a list of n
 //   scale = 1               # one or n, optional; value = unit(scale x column + offset)
 //   offset = [0, -90, 90, 0, 0, 0]
@@ -45,6 +47,7 @@ struct ChannelMap {
   Channel time;
   std::vector<Quantity> quantities;
   std::string source;
+  std::vector<std::filesystem::path> definitions = {};  // files *.msg
 };
 
 // InputError with file, key and what was expected.

@@ -5,9 +5,11 @@
 #include <optional>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/bags/recording.hpp"
 #include "host_sim/data/files/csv.hpp"
 #include "host_sim/data/logs/channels.hpp"
 #include "host_sim/data/logs/rows.hpp"
+#include "host_sim/data/logs/table.hpp"
 
 namespace armcal::logs {
 namespace {
@@ -57,7 +59,7 @@ ChannelMap OurNames(const std::string& file, const std::vector<std::string>& hea
 
 class Columns {
  public:
-  Columns(std::string file, const files::NumericTable& table) : file_(std::move(file)), table_(table) {}
+  explicit Columns(const Table& table) : from_(table), table_(table.numbers) {}
 
   Eigen::Index Find(const std::string& name) const {
     const auto at = std::find(table_.names.begin(), table_.names.end(), name);
@@ -66,7 +68,9 @@ class Columns {
 
   Eigen::VectorXd Take(const Channel& channel) const {
     const Eigen::Index c = Find(channel.column);
-    if (c < 0) throw io::InputError(file_ + ":1: expected a column '" + channel.column + "'");
+    if (c < 0)
+      throw io::InputError(from_.where + ": expected a column '" + channel.column + "'" +
+                           (from_.has.empty() ? "" : "; " + from_.has));
     return (channel.gain * table_.values.col(c).array() + channel.bias).matrix();
   }
 
@@ -84,7 +88,7 @@ class Columns {
   }
 
  private:
-  std::string file_;
+  const Table& from_;
   const files::NumericTable& table_;
 };
 
@@ -114,8 +118,8 @@ void ListGaps(Log& log) {
 }
 
 // The file's rows as they stand.
-RawLog Raw(const std::string& file, files::NumericTable& table, const ChannelMap& map) {
-  const Columns columns(file, table);
+RawLog Raw(const std::string& file, Table table, const ChannelMap& map) {
+  const Columns columns(table);
   RawLog raw;
   raw.log.joints = map.joints;
   raw.log.source = file;
@@ -129,8 +133,10 @@ RawLog Raw(const std::string& file, files::NumericTable& table, const ChannelMap
     for (const Quantity& quantity : map.quantities)
       for (const Channel& channel : quantity.joint)
         if (quantity.name == name) raw.columns.push_back(channel.column);
-  raw.missing = table.values.array().isNaN().rowwise().any().cast<int>();
-  raw.log.ignored = std::move(table.ignored);
+  raw.missing = table.numbers.values.array().isNaN().rowwise().any().cast<int>();
+  raw.first_line = table.first_line;
+  raw.log.ignored = std::move(table.numbers.ignored);
+  raw.log.notes = std::move(table.notes);
   return raw;
 }
 
@@ -150,7 +156,7 @@ Log MakeLog(RawLog raw, int min_samples) {
     if (block->size() > 0) *block = (*block)(samples.row, Eigen::all).eval();
   if (raw.flags.size() > 0) log.flags = raw.flags(samples.row, Eigen::all).cast<int>();
   log.t = samples.t;
-  log.notes = std::move(samples.notes);
+  log.notes.insert(log.notes.end(), samples.notes.begin(), samples.notes.end());
   log.line.resize(log.samples());
   for (Eigen::Index k = 0; k < log.samples(); ++k)
     log.line[k] = static_cast<int>(samples.row[static_cast<std::size_t>(k)]) + raw.first_line;
@@ -164,6 +170,10 @@ Log MakeLog(RawLog raw, int min_samples) {
 }
 
 Log ReadLog(const std::filesystem::path& path, int min_samples) {
+  if (bags::IsRecording(path))
+    throw io::InputError(path.string() +
+                         ": expected a channel map (--channels), because this is a recording of topics; " +
+                         "armcal channels writes one");
   files::NumericTable table = files::ReadCsv(
       path,
       [](const std::string& name) {
@@ -172,23 +182,11 @@ Log ReadLog(const std::filesystem::path& path, int min_samples) {
       },
       files::Missing::kNan);
   const ChannelMap map = OurNames(path.string(), table.names);
-  return MakeLog(Raw(path.string(), table, map), min_samples);
+  return MakeLog(Raw(path.string(), {std::move(table), path.string() + ":1"}, map), min_samples);
 }
 
 Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_samples) {
-  files::NumericTable table = files::ReadCsv(
-      path,
-      [&map](const std::string& name) {
-        if (name == map.time.column) return true;
-        for (const Quantity& quantity : map.quantities) {
-          for (const Channel& channel : quantity.joint) {
-            if (name == channel.column) return true;
-          }
-        }
-        return false;
-      },
-      files::Missing::kNan);
-  return MakeLog(Raw(path.string(), table, map), min_samples);
+  return MakeLog(Raw(path.string(), ReadTable(path, map), map), min_samples);
 }
 
 void WriteLog(const std::filesystem::path& path, const Log& log) {

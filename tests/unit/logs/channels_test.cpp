@@ -130,6 +130,35 @@ TEST(Channels, OfTwoTorques_TheNamedOneIsRead) {
   EXPECT_DOUBLE_EQ(motors.tau(0, 1), 2);
 }
 
+TEST(Channels, NumbersFromZeroAndNames_StandForTheJoints) {
+  const TemporaryFolder folder;
+  std::string text = kMap, names = "names = [\"base\", \"arm\"]\nmessages = [\"msg/A.msg\"]\n";
+  text.replace(text.find("pos{}"), 5, "pos{0}");
+  text.replace(text.find("T{}"), 3, "{joint}/T");
+  const ChannelMap map = ReadChannelMap(folder.Write("map.toml", names + text));
+  EXPECT_EQ(map.quantities[0].joint[0].column, "pos0");
+  EXPECT_EQ(map.quantities[0].joint[1].column, "pos1");
+  EXPECT_EQ(map.quantities[2].joint[1].column, "arm/T");
+  EXPECT_EQ(map.definitions, std::vector<std::filesystem::path>{folder / "msg/A.msg"});
+  const auto error = [&](const std::string& before) {
+    const auto path = folder.Write("bad.toml", before + text);
+    return ErrorOf([&] { ReadChannelMap(path); }).substr(path.string().size());
+  };
+  EXPECT_EQ(error(""), ": temp.column: {joint} needs the joints' names, as in names = [\"base\", \"elbow\"]");
+  EXPECT_EQ(error("names = [\"a\"]\n"), ": names: expected a list of 2 names, one a joint");
+  EXPECT_EQ(error("names = \"a\"\n"), ": names: expected a list of texts");
+  EXPECT_EQ(error("messages = [1]\n"), ": messages: expected a list of texts");
+}
+
+TEST(Channels, MapWithoutTime_TakesTheColumnOfPlotJuggler) {
+  const TemporaryFolder folder;
+  std::string text = kMap;
+  text.erase(text.find("[time]"), text.find("[q]") - text.find("[time]"));
+  const ChannelMap map = ReadChannelMap(folder.Write("map.toml", text));
+  EXPECT_EQ(map.time.column, "__time");
+  EXPECT_EQ(map.time.gain, 1);
+}
+
 TEST(Channels, BadMatrixOrTorque_NamesKeyAndExpected) {
   const TemporaryFolder folder;
   const auto error = [&folder](const std::string& from, const std::string& to) {
@@ -150,7 +179,7 @@ TEST(Channels, BadMatrixOrTorque_NamesKeyAndExpected) {
             ": time.matrix: only positions, speeds, accelerations and torques take a matrix");
   EXPECT_EQ(error("\"tau\"", "\"link\""), ": torque: expected \"tau\" or \"tau_link\", the torque to use");
   EXPECT_EQ(error("[tau_link]", "[tau_sensor]"),
-            ": tau_sensor: unknown key, expected joints, title, time, torque or a quantity");
+            ": tau_sensor: unknown key, expected joints, names, title, messages, time, torque or a quantity");
   EXPECT_EQ(error("mN*m", "mN"), ": tau_link.unit: 'mN' is no unit of torque, expected N*m, mN*m, kN*m, kgf*m, N, kN");
 }
 
@@ -164,7 +193,8 @@ TEST(Channels, BadMap_NamesKeyAndExpected) {
     return message.starts_with(path.string()) ? message.substr(path.string().size()) : message;
   };
   EXPECT_EQ(error("joints = 2", "joints = 0"), ": joints: expected a number of joints, 1 to 64");
-  EXPECT_EQ(error("[time]", "[clock]"), ": clock: unknown key, expected joints, title, time, torque or a quantity");
+  EXPECT_EQ(error("[time]", "[clock]"),
+            ": clock: unknown key, expected joints, names, title, messages, time, torque or a quantity");
   EXPECT_EQ(error("unit = \"ms\"", "unit = \"min\""), ": time.unit: 'min' is no unit of time, expected s, ms, us, ns");
   EXPECT_EQ(error("\"mm\"]", "\"mm\", \"m\"]"), ": q.unit: expected one text or a list of 2");
   EXPECT_EQ(error("[1, 2]", "[1, \"two\"]"), ": q.scale: expected a list of numbers");

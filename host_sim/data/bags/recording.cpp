@@ -13,6 +13,7 @@
 #include "host_sim/data/bags/bag_folder.hpp"
 #include "host_sim/data/bags/container.hpp"
 #include "host_sim/data/bags/mapped_file.hpp"
+#include "host_sim/data/bags/one_line.hpp"
 #include "host_sim/data/bags/topic_table.hpp"
 #include "host_sim/data/bags/unpack.hpp"
 #include "host_sim/data/files/files.hpp"
@@ -22,15 +23,6 @@ namespace armcal::bags {
 namespace {
 
 namespace fs = std::filesystem;
-
-// What a file says may hold any byte; a message is one line.
-std::string OneLine(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7F') c = '?';
-  constexpr std::size_t kLongest = 500;
-  if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
-  return text;
-}
 
 // "pkg/msg/Name.msg" defines pkg/Name; a file elsewhere defines Name of any package.
 std::string DefinedBy(const fs::path& path) {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/bags/mat.hpp"
 #include "host_sim/data/bags/recording.hpp"
 #include "host_sim/data/files/csv.hpp"
 #include "host_sim/data/logs/channels.hpp"
@@ -170,10 +171,9 @@ Log MakeLog(RawLog raw, int min_samples) {
 }
 
 Log ReadLog(const std::filesystem::path& path, int min_samples) {
-  if (bags::IsRecording(path))
-    throw io::InputError(path.string() +
-                         ": expected a channel map (--channels), because this is a recording of topics; " +
-                         "armcal channels writes one");
+  if (bags::IsRecording(path) || bags::IsMat(path))
+    throw io::InputError(path.string() + ": expected a channel map (--channels), because this is no CSV file; armcal " +
+                         "channels writes one");
   files::NumericTable table = files::ReadCsv(
       path,
       [](const std::string& name) {

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/bags/mat.hpp"
 #include "host_sim/data/bags/recording.hpp"
 #include "host_sim/data/logs/resample.hpp"
 
@@ -79,6 +80,14 @@ Table FromCsv(const std::filesystem::path& path, const ChannelMap& map) {
   return table;
 }
 
+Table FromMat(const std::filesystem::path& path, const ChannelMap& map) {
+  const std::set<std::string> columns = ColumnsOf(map);
+  Table table{bags::ReadMat(path, {columns.begin(), columns.end()}), path.string()};
+  table.first_line = 1;
+  FillEmptyCells(table, map);
+  return table;
+}
+
 Series FromStream(bags::Stream& stream, std::int64_t begin_ns) {
   Series series{stream.topic, Eigen::VectorXd(static_cast<Eigen::Index>(stream.stamp_ns.size())), {}};
   for (Eigen::Index k = 0; k < series.t.size(); ++k) {
@@ -116,7 +125,8 @@ Table FromRecording(const std::filesystem::path& path, const ChannelMap& map) {
 }  // namespace
 
 Table ReadTable(const std::filesystem::path& path, const ChannelMap& map) {
-  return bags::IsRecording(path) ? FromRecording(path, map) : FromCsv(path, map);
+  if (bags::IsRecording(path)) return FromRecording(path, map);
+  return bags::IsMat(path) ? FromMat(path, map) : FromCsv(path, map);
 }
 
 }  // namespace armcal::logs

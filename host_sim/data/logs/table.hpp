@@ -23,8 +23,8 @@ struct Table {
   std::vector<std::string> notes = {};  // what reading changed or left out
 };
 
-// CSV, MCAP or rosbag2. Columns with times of their own (topics, or empty cells of a CSV) are brought to common times,
-// see resample.hpp. InputError: as the readers of the formats have it.
+// CSV, MCAP, rosbag2 or MATLAB. Columns with times of their own (topics, or empty cells of a CSV) are brought to common
+// times, see resample.hpp. InputError: as the readers of the formats have it.
 Table ReadTable(const std::filesystem::path& path, const ChannelMap& map);
 
 }  // namespace armcal::logs

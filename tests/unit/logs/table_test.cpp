@@ -49,7 +49,7 @@ TEST(RecordedLog, WithoutAMapOrAColumn_IsRefusedInOneLine) {
   const auto path = kRecordings / "plain.db3.zst";
   EXPECT_EQ(ErrorOf([&] { ReadLog(path); }),
             path.string() +
-                ": expected a channel map (--channels), because this is a recording of topics; armcal "
+                ": expected a channel map (--channels), because this is no CSV file; armcal "
                 "channels writes one");
   std::string text = kJointStates;
   text.replace(text.find("effort"), 6, "torque");

@@ -167,3 +167,13 @@ for name in ("plain", "big_endian", "types"):
 
 scipy.io.savemat(HERE / "drive_5.mat", {"t": t[:, None], "q": q, "log": {"torque": tau.T, "note": "simulated"}}, do_compression=True)
 scipy.io.savemat(HERE / "drive_4.mat", {"t": t[:, None], "q": q, "tau": tau}, format="4")
+
+# Classes of numbers, a 1 x 7 row, what is missing, and what Simulink writes: a struct of signals.
+seven = np.arange(7)
+signals = np.array([(np.stack([10 * seven, 10 * seven + 1])[:, None, :],), (100 * seven[:, None],)], dtype=[("values", object)])
+holes = seven[None, :] * 1.0
+holes[0, 2:4] = np.nan, np.inf
+kinds = {"single": (0.5 * seven[:, None]).astype(np.float32), "whole": -seven[:, None].astype(np.int16), "holes": holes,
+         "text": "no numbers", "complex": seven[:, None] * 1j, "short": seven[:3, None], "out": {"signals": signals}}
+scipy.io.savemat(HERE / "kinds.mat", kinds)
+scipy.io.savemat(HERE / "kinds_4.mat", {name: kinds[name] for name in ("single", "holes", "short")}, format="4")

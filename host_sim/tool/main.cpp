@@ -28,6 +28,8 @@ int Main(int argc, char** argv) {
   AddDiagnose(app, action);
   AddReport(app, action);
   AddImport(app, action);
+  AddChannels(app, action);
+  AddConvert(app, action);
   AddGenerate(app, action);
   AddExport(app, action);
   AddFlash(app, action);

@@ -20,6 +20,8 @@ enum ExitCode : int { kOk = 0, kBadInput = 2, kLink = 3, kRefused = 4, kMismatch
 using Action = std::function<int()>;
 
 void AddImport(CLI::App& app, Action& action);
+void AddChannels(CLI::App& app, Action& action);
+void AddConvert(CLI::App& app, Action& action);
 void AddGenerate(CLI::App& app, Action& action);
 void AddSimulate(CLI::App& app, Action& action);
 void AddExcite(CLI::App& app, Action& action);

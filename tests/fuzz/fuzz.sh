@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 seconds=${1:?how many seconds}
 shift
 targets=("$@")
-[[ ${#targets[@]} -gt 0 ]] || targets=(rtu tcp engine table vendor csv gzip robot)
+[[ ${#targets[@]} -gt 0 ]] || targets=(rtu tcp engine table vendor csv gzip robot mcap)
 mkdir -p build/fuzz
 
 # The readers are linked with the same toml++ library as armcal. In the header-only form of toml++ 3.3 an assert fails on a table
@@ -16,7 +16,8 @@ mkdir -p build/fuzz
 flags=(-std=c++20 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=undefined -I. -Ilib
   -isystem /usr/include/eigen3 -DFMT_HEADER_ONLY $(pkg-config --cflags tomlplusplus))
 wire=(tests/fuzz/wire_targets.cpp host_sim/machine/drive/vendor_block.cpp lib/armcal/link/*.cpp lib/armcal/table/*.cpp)
-readers=(tests/fuzz/reader_targets.cpp host_sim/data/files/*.cpp codegen/src/io/*.cpp
+readers=(tests/fuzz/reader_targets.cpp host_sim/data/files/*.cpp
+  host_sim/data/bags/{recording,bag_folder,mapped_file,mcap,lz4,zstd,database,topic_table,definition,cdr,json_message}.cpp codegen/src/io/*.cpp
   codegen/src/robot/{robot,payload,import_urdf,no_urdf}.cpp)
 for part in wire readers; do
   declare -n sources=$part
@@ -30,7 +31,9 @@ done
 
 for target in "${targets[@]}"; do
   part=wire libraries=()
-  case $target in csv | gzip | robot) part=readers libraries=(-lz $(pkg-config --libs tomlplusplus)) ;; esac
+  case $target in
+    csv | gzip | robot | mcap) part=readers libraries=(-lz -llz4 -lzstd -lsqlite3 $(pkg-config --libs tomlplusplus)) ;;
+  esac
   clang++ "${flags[@]}" -fsanitize=fuzzer -DARMCAL_FUZZ="${target^}" tests/fuzz/entry.cpp build/fuzz/$part/*.o \
     "${libraries[@]}" -o "build/fuzz/fuzz_$target"
   mkdir -p "build/fuzz/corpus/$target"

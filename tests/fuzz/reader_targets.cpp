@@ -7,6 +7,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "codegen/src/robot/robot.hpp"
+#include "host_sim/data/bags/recording.hpp"
 #include "host_sim/data/files/csv.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "tests/fuzz/targets.hpp"
@@ -41,6 +42,9 @@ void Gzip(const std::uint8_t* bytes, std::size_t count) {
 }
 void Robot(const std::uint8_t* bytes, std::size_t count) {
   AsFile(bytes, count, [](const std::string& path) { (void)codegen::ReadRobot(path); });
+}
+void Mcap(const std::uint8_t* bytes, std::size_t count) {
+  AsFile(bytes, count, [](const std::string& path) { (void)bags::ReadRecording(path, {}); });
 }
 
 }  // namespace armcal::fuzz

@@ -23,8 +23,10 @@ void Vendor(const std::uint8_t* bytes, std::size_t count);
 void Csv(const std::uint8_t* bytes, std::size_t count);
 void Gzip(const std::uint8_t* bytes, std::size_t count);
 void Robot(const std::uint8_t* bytes, std::size_t count);
+void Mcap(const std::uint8_t* bytes, std::size_t count);
 
-inline constexpr Target kTargets[] = {{"rtu", Rtu},       {"tcp", Tcp}, {"engine", Engine}, {"table", Table},
-                                      {"vendor", Vendor}, {"csv", Csv}, {"gzip", Gzip},     {"robot", Robot}};
+inline constexpr Target kTargets[] = {{"rtu", Rtu},     {"tcp", Tcp},       {"engine", Engine},
+                                      {"table", Table}, {"vendor", Vendor}, {"csv", Csv},
+                                      {"gzip", Gzip},   {"robot", Robot},   {"mcap", Mcap}};
 
 }  // namespace armcal::fuzz

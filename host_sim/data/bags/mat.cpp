@@ -207,6 +207,7 @@ class MatReader {
   }
 
   files::NumericTable Finish() {
+    if (columns_.empty() && ignored_.empty()) throw io::InputError("holds no vector and no matrix of numbers");
     files::NumericTable table;
     std::map<std::size_t, int> lengths;
     for (const auto& [name, values] : columns_) ++lengths[values.size()];

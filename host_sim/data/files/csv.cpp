@@ -140,6 +140,30 @@ NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool
   return table;
 }
 
+std::vector<std::string> NumericColumns(const std::filesystem::path& path) {
+  const std::string text = ReadWholeFile(path);
+  Scanner scan(path.string(), text);
+  const std::vector<std::string> header = ScanHeader(scan);
+  enum Kind { kUnknown, kNumbers, kOther };
+  std::vector<Kind> kind(header.size(), kUnknown);
+  std::size_t open = header.size();
+  while (open > 0 && scan.NextLine()) {
+    std::string_view field;
+    for (std::size_t c = 0; scan.NextField(field) && c < header.size(); ++c) {
+      field = Trim(field);
+      if (kind[c] != kUnknown || IsMissing(field)) continue;
+      double value = 0;
+      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+      kind[c] = error == std::errc() && end == field.data() + field.size() ? kNumbers : kOther;
+      --open;
+    }
+  }
+  std::vector<std::string> names;
+  for (std::size_t c = 0; c < header.size(); ++c)
+    if (kind[c] == kNumbers) names.push_back(header[c]);
+  return names;
+}
+
 void WriteCsv(const std::filesystem::path& path, const NumericTable& table, const std::vector<int>& digits) {
   std::string text;
   text.reserve(static_cast<std::size_t>(table.values.size()) * 12 + 4096);
@@ -149,8 +173,11 @@ void WriteCsv(const std::filesystem::path& path, const NumericTable& table, cons
   for (Eigen::Index r = 0; r < table.values.rows(); ++r) {
     for (Eigen::Index c = 0; c < table.values.cols(); ++c) {
       const int precision = digits.empty() ? 9 : digits[static_cast<std::size_t>(c)];
-      const auto end =
-          std::to_chars(number, number + sizeof number, table.values(r, c), std::chars_format::general, precision).ptr;
+      const double value = table.values(r, c);
+      char* const room = number + sizeof number;
+      const auto end = std::isnan(value) ? number
+                       : precision == 0 ? std::to_chars(number, room, value).ptr
+                                        : std::to_chars(number, room, value, std::chars_format::general, precision).ptr;
       text.append(number, end) += ',';
     }
     text.back() = '\n';

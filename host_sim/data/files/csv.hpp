@@ -26,7 +26,11 @@ enum class Missing { kRefused, kNan };
 NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool(const std::string& name)>& wanted = {},
                      Missing missing = Missing::kRefused);
 
-// Writes atomically, gzip if the name ends in ".gz". digits[c] significant digits in column c (9 if `digits` is empty).
+// The columns whose first field that is not empty is a number. InputError: as ReadCsv has it for the header.
+std::vector<std::string> NumericColumns(const std::filesystem::path& path);
+
+// Writes atomically, gzip if the name ends in ".gz". digits[c] significant digits in column c (9 if `digits` is empty);
+// 0 digits: as many as it takes to read the same number again. A missing number becomes an empty field.
 void WriteCsv(const std::filesystem::path& path, const NumericTable& table, const std::vector<int>& digits = {});
 
 }  // namespace armcal::files

@@ -189,7 +189,7 @@ Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_sa
   return MakeLog(Raw(path.string(), ReadTable(path, map), map), min_samples);
 }
 
-void WriteLog(const std::filesystem::path& path, const Log& log) {
+void WriteLog(const std::filesystem::path& path, const Log& log, Digits digits) {
   const Eigen::MatrixXd flags = log.flags.cast<double>();
   const std::pair<const char*, const Eigen::MatrixXd*> blocks[] = {
       {"q", &log.q},         {"qd", &log.qd},   {"qdd", &log.qdd},   {"tau", &log.tau}, {"qref", &log.qref},
@@ -206,9 +206,9 @@ void WriteLog(const std::filesystem::path& path, const Log& log) {
     if (block->cols() > 0) table.values.middleCols(at, block->cols()) = *block;
     at += block->cols();
   }
-  std::vector<int> digits(table.names.size(), 9);
-  digits.front() = 12;
-  files::WriteCsv(path, table, digits);
+  std::vector<int> counts(table.names.size(), digits == Digits::kAll ? 0 : 9);
+  if (digits == Digits::kUsual) counts.front() = 12;
+  files::WriteCsv(path, table, counts);
 }
 
 }  // namespace armcal::logs

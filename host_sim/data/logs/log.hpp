@@ -58,7 +58,8 @@ Log ReadLog(const std::filesystem::path& path, int min_samples = kMinSamples);
 Log ReadLog(const std::filesystem::path& path, const ChannelMap& map, int min_samples = kMinSamples);
 
 // Writes what the log holds under our names; gzip if the name ends in ".gz". Time with 12 significant digits, the rest
-// with 9. Atomic: a reader sees the old file or the new one.
-void WriteLog(const std::filesystem::path& path, const Log& log);
+// with 9; kAll: so many that the same numbers are read again. Atomic: a reader sees the old file or the new one.
+enum class Digits { kUsual, kAll };
+void WriteLog(const std::filesystem::path& path, const Log& log, Digits digits = Digits::kUsual);
 
 }  // namespace armcal::logs

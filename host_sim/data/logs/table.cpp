@@ -6,8 +6,6 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/bags/mat.hpp"
-#include "host_sim/data/bags/recording.hpp"
-#include "host_sim/data/logs/resample.hpp"
 
 namespace armcal::logs {
 
@@ -88,18 +86,6 @@ Table FromMat(const std::filesystem::path& path, const ChannelMap& map) {
   return table;
 }
 
-Series FromStream(bags::Stream& stream, std::int64_t begin_ns) {
-  Series series{stream.topic, Eigen::VectorXd(static_cast<Eigen::Index>(stream.stamp_ns.size())), {}};
-  for (Eigen::Index k = 0; k < series.t.size(); ++k) {
-    const std::int64_t stamp_ns = stream.stamp_ns[static_cast<std::size_t>(k)];
-    series.t[k] =
-        1e-9 * static_cast<double>(static_cast<std::uint64_t>(stamp_ns) - static_cast<std::uint64_t>(begin_ns));
-  }
-  series.numbers.names = std::move(stream.names);
-  series.numbers.values = std::move(stream.values);
-  return series;
-}
-
 Table FromRecording(const std::filesystem::path& path, const ChannelMap& map) {
   const std::set<std::string> columns = ColumnsOf(map);
   const bool recorder_time = map.time.column == kRecorderTimeColumn;
@@ -111,7 +97,7 @@ Table FromRecording(const std::filesystem::path& path, const ChannelMap& map) {
   std::int64_t begin_ns = recording.streams[0].stamp_ns[0];
   for (const bags::Stream& stream : recording.streams) begin_ns = std::min(begin_ns, stream.stamp_ns[0]);
   std::vector<Series> series;
-  for (bags::Stream& stream : recording.streams) series.push_back(FromStream(stream, begin_ns));
+  for (bags::Stream& stream : recording.streams) series.push_back(SeriesOf(stream, begin_ns));
   Common common = OnCommonTimes(series, ColumnsOf(map, {"q", "tau"}), ColumnsOf(map, {"flag"}));
   Append(table.notes, common.notes);
   const Eigen::VectorXd& t = series[common.grid].t;
@@ -123,6 +109,18 @@ Table FromRecording(const std::filesystem::path& path, const ChannelMap& map) {
 }
 
 }  // namespace
+
+Series SeriesOf(bags::Stream& stream, std::int64_t begin_ns) {
+  Series series{stream.topic, Eigen::VectorXd(static_cast<Eigen::Index>(stream.stamp_ns.size())), {}};
+  for (Eigen::Index k = 0; k < series.t.size(); ++k) {
+    const std::int64_t stamp_ns = stream.stamp_ns[static_cast<std::size_t>(k)];
+    series.t[k] =
+        1e-9 * static_cast<double>(static_cast<std::uint64_t>(stamp_ns) - static_cast<std::uint64_t>(begin_ns));
+  }
+  series.numbers.names = std::move(stream.names);
+  series.numbers.values = std::move(stream.values);
+  return series;
+}
 
 Table ReadTable(const std::filesystem::path& path, const ChannelMap& map) {
   if (bags::IsRecording(path)) return FromRecording(path, map);

@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "host_sim/data/bags/recording.hpp"
 #include "host_sim/data/files/csv.hpp"
 #include "host_sim/data/logs/channels.hpp"
+#include "host_sim/data/logs/resample.hpp"
 
 namespace armcal::logs {
 
@@ -22,6 +24,9 @@ struct Table {
   int first_line = 2;                   // the number that messages give the first row
   std::vector<std::string> notes = {};  // what reading changed or left out
 };
+
+// The columns of a topic, with times in s from `begin_ns` on. Takes them out of the stream.
+Series SeriesOf(bags::Stream& stream, std::int64_t begin_ns);
 
 // CSV, MCAP, rosbag2 or MATLAB. Columns with times of their own (topics, or empty cells of a CSV) are brought to common
 // times, see resample.hpp. InputError: as the readers of the formats have it.

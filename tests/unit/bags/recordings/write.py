@@ -1,7 +1,7 @@
 # bags tests - writes drive.csv, a part of a log of the simulated drive, in the formats that robots record, with other
 # people's libraries. The tests compare what armcal reads with drive.csv.
 #
-#   pip install mcap==1.6.0 mcap-ros2-support==0.6.0 rosbags==0.11.9 scipy==1.17.1 && python write.py
+#   pip install mcap==1.6.0 mcap-ros2-support==0.6.0 rosbags==0.11.9 scipy==1.17.1 h5py==3.16.0 && python write.py
 #   npm install @mcap/core@2.2.2 && node write.mjs
 #
 # header.stamp is the time of drive.csv, counted from STAMP. The recorder sees a message up to 3 ms later.
@@ -11,6 +11,7 @@ import random
 import shutil
 import sqlite3
 
+import h5py
 import numpy as np
 import scipy.io
 import zstandard
@@ -167,6 +168,19 @@ for name in ("plain", "big_endian", "types"):
 
 scipy.io.savemat(HERE / "drive_5.mat", {"t": t[:, None], "q": q, "log": {"torque": tau.T, "note": "simulated"}}, do_compression=True)
 scipy.io.savemat(HERE / "drive_4.mat", {"t": t[:, None], "q": q, "tau": tau}, format="4")
+
+# Version 7.3 is HDF5 behind a header of 512 bytes; a matrix lies there transposed.
+with h5py.File(HERE / "drive_73.mat", "w", userblock_size=512) as file:
+    for name, value in (("t", t[:, None]), ("q", q), ("tau", tau)):
+        kind = h5py.h5t.C_S1.copy()
+        kind.set_size(6)
+        kind.set_strpad(h5py.h5t.STR_NULLTERM)
+        dataset = file.create_dataset(name, data=value.T)
+        of_class = h5py.h5a.create(dataset.id, b"MATLAB_class", kind, h5py.h5s.create(h5py.h5s.SCALAR))
+        of_class.write(np.array(b"double", dtype="S6"), mtype=kind)
+hdf5 = bytearray((HERE / "drive_73.mat").read_bytes())
+hdf5[:128] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+(HERE / "drive_73.mat").write_bytes(hdf5)
 
 # Classes of numbers, a 1 x 7 row, what is missing, and what Simulink writes: a struct of signals.
 seven = np.arange(7)

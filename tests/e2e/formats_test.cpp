@@ -1,0 +1,53 @@
+// end-to-end tests - armcal channels and armcal convert on the formats that robots record.
+#include <fstream>
+
+#include "host_sim/data/files/csv.hpp"
+#include "tests/e2e/tool.hpp"
+
+namespace armcal::tests {
+namespace {
+
+const fs::path kLogs = "tests/unit/bags/recordings";
+
+TEST(Formats, ChannelsThenConvert_GiveTheLogOfTheDrive_ToTheLastBit) {
+  const fs::path folder = FreshFolder("formats");
+  const Eigen::MatrixXd drive = files::ReadCsv(kLogs / "drive.csv").values;  // t q1 q2 q3 tau1 tau2 tau3
+  for (const char* name : {"joint_states_lz4.mcap", "split", "drive_5.mat", "drive.csv"}) {
+    const std::string log = (kLogs / name).string(), map = (folder / "map.toml").string(),
+                      out = (folder / "out.csv.gz").string();
+    const Outcome looked = Tool({"channels", log, "-o", map, "--overwrite"});
+    ASSERT_EQ(looked.code, 0) << looked.err;
+    EXPECT_NE(looked.out.find("recognised: q, tau"), std::string::npos) << looked.out;
+    const Outcome converted = Tool({"convert", log, "--channels", map, "-o", out});
+    ASSERT_EQ(converted.code, 0) << converted.err;
+    const files::NumericTable table = files::ReadCsv(out);
+    EXPECT_EQ(table.names, (std::vector<std::string>{"t", "q1", "q2", "q3", "tau1", "tau2", "tau3"})) << name;
+    EXPECT_EQ(table.values.rightCols(6), drive.rightCols(6)) << name;
+    EXPECT_LE((table.values.col(0).array() - (drive.col(0).array() - drive(0, 0))).abs().maxCoeff(), 1e-6) << name;
+  }
+}
+
+TEST(Formats, ChosenTime_IsPrinted) {
+  const fs::path folder = FreshFolder("formats_time");
+  const std::string log = (kLogs / "plain.db3.zst").string(), map = (folder / "map.toml").string();
+  ASSERT_EQ(Tool({"channels", log, "-o", map}).code, 0);
+  EXPECT_NE(Tool({"convert", log, "--channels", map, "-o", (folder / "out.csv").string()})
+                .err.find("/joint_states: time is header.stamp"),
+            std::string::npos);
+  ExpectOneLine(Tool({"channels", log, "-o", map}), 2, "--overwrite");
+}
+
+TEST(Formats, BadLog_IsOneLine_AndLeavesNothing) {
+  const fs::path folder = FreshFolder("formats_bad");
+  const std::string map = (folder / "map.toml").string(), out = (folder / "out.csv").string();
+  ASSERT_EQ(Tool({"channels", (kLogs / "drive_4.mat").string(), "-o", map}).code, 0);
+  std::string text = ReadText(kLogs / "joint_states_lz4.mcap");
+  std::ofstream(folder / "cut.mcap", std::ios::binary) << text.substr(0, 300);
+  ExpectOneLine(Tool({"convert", (folder / "cut.mcap").string(), "--channels", map, "-o", out}), 2, "is cut short");
+  ExpectOneLine(Tool({"identify", "--robot", "er20_like", "--train", (kLogs / "drive_4.mat").string()}), 2,
+                "expected a channel map (--channels)");
+  EXPECT_FALSE(fs::exists(out));
+}
+
+}  // namespace
+}  // namespace armcal::tests

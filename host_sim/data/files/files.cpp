@@ -8,6 +8,7 @@
 #include <iterator>
 #include <memory>
 #include <new>
+#include <set>
 
 #include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
@@ -94,6 +95,15 @@ void WriteWholeFile(const fs::path& path, std::string_view text) {
 }
 
 std::string FileHash(const fs::path& path) {
+  std::error_code none;
+  if (fs::is_directory(path, none)) {
+    std::set<std::string> lines;
+    for (const auto& entry : fs::directory_iterator(path))
+      if (entry.is_regular_file()) lines.insert(entry.path().filename().string() + ' ' + FileHash(entry.path()) + '\n');
+    std::string text;
+    for (const std::string& line : lines) text += line;
+    return Sha256(text);
+  }
   RequireRegular(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw io::InputError(path.string() + ": cannot be opened");

@@ -15,7 +15,8 @@ std::string ReadWholeFile(const std::filesystem::path& path);
 // compressed; equal texts give equal bytes. Missing parent folders are made. InputError: cannot be written.
 void WriteWholeFile(const std::filesystem::path& path, std::string_view text);
 
-// SHA-256 of the file's bytes as they lie on disk, 64 hex digits. InputError: cannot be opened.
+// SHA-256 of the file's bytes as they lie on disk, 64 hex digits. Of a folder: of the names and hashes of its files.
+// InputError: cannot be opened.
 std::string FileHash(const std::filesystem::path& path);
 
 // SHA-256 of a text, 64 hex digits (FIPS 180-4).

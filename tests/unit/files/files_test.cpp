@@ -81,7 +81,15 @@ TEST(Files, ReadWholeFile_MissingOrFolder_SaysSo) {
   const TemporaryFolder folder;
   EXPECT_EQ(ErrorOf([&] { ReadWholeFile(folder / "none"); }), (folder / "none").string() + ": no such file");
   std::filesystem::create_directories(folder / "sub");
-  EXPECT_EQ(ErrorOf([&] { FileHash(folder / "sub"); }), (folder / "sub").string() + ": is a folder, expected a file");
+  EXPECT_EQ(ErrorOf([&] { ReadWholeFile(folder / "sub"); }),
+            (folder / "sub").string() + ": is a folder, expected a file");
+}
+
+TEST(Files, HashOfAFolder_IsThatOfTheNamesAndHashesOfItsFiles) {
+  const TemporaryFolder folder;
+  folder.Write("b", "two"), folder.Write("a", "one");
+  // printf 'a %s\nb %s\n' $(printf one | sha256sum | cut -c-64) $(printf two | sha256sum | cut -c-64) | sha256sum
+  EXPECT_EQ(FileHash(folder / ""), "a10d1fa05764ffc27440aa18ea4f3eea5c16e3c37f7458422dfb3d7dce4b1682");
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 #
 #   logs_test.py ARMCAL FOLDER
 # A drive is simulated and recorded. mcap, rosbags and SciPy write its log. armcal converts each file: all channels must be
-# those of the drive to the last bit, and the times equal to 1 us. identify and diagnose must tell the same of each file.
+# those of the drive to the last bit, and the times equal to 1 us. identify and diagnose must tell the same of each file that
+# holds stamps in whole nanoseconds. MATLAB and PlotJuggler hold times as double, up to 0.2 us off: there the terms must be
+# the same, parameters within a fifth of their deviation, and errors within 2 %.
 import contextlib
 import csv
 import gzip
@@ -171,10 +173,22 @@ def differences(one, other, at=""):
 
 def told(path):
     """The verdict without what names the files."""
-    skipped = {"train", "test", "sha256", "hash", "file", "notes", "held_out_log", "logs", "source", "command", "seconds"}
+    skipped = {"train", "test", "sha256", "hash", "file", "notes", "held_out_log", "logs", "source", "command", "seconds", "provenance"}
     clean = lambda value: ({k: clean(v) for k, v in value.items() if k not in skipped} if isinstance(value, dict)
                            else [clean(v) for v in value] if isinstance(value, list) else value)
     return clean(json.loads(pathlib.Path(path).read_text()))
+
+
+def essence(verb, verdict):
+    """What a person reads: terms, parameters in units of a fifth of their deviation, errors to 2 %."""
+    if verb == "diagnose":
+        return [(term["kind"], term["joints"], term["confirmed"]) for term in verdict["terms"]], np.array(verdict["after"]) / 0.02 / np.array(verdict["after"]).max()
+    return [column["name"] for column in verdict["columns"]], np.array([column["value"] / (0.2 * column["sd"]) for column in verdict["columns"] if column["sd"] > 0])
+
+
+def near(verb, one, other):
+    texts, numbers = zip(essence(verb, one), essence(verb, other))
+    return texts[0] == texts[1] and np.abs(numbers[0] - numbers[1]).max() <= 1
 
 
 def main(armcal, folder):
@@ -200,9 +214,12 @@ def main(armcal, folder):
             run(verb, "--robot", "er20_like", "--train", files[0][kind][0], "--test", files[1][kind][0], "--channels", channels,
                 "--json", folder / "out.json")
             verdict = told(folder / "out.json")
-            found = differences(reference.setdefault(verb, verdict), verdict)
-            print(f"{kind}: {verb}: {'the same' if not found else f'{len(found)} differences, such as {found[0]}'}")
-            if found:
+            first = reference.setdefault(verb, verdict)
+            found = differences(first, verdict)
+            allowed = kind in ("MATLAB", "PlotJuggler CSV") and near(verb, first, verdict)
+            what = "the same" if not found else "the same within the loss of the times" if allowed else f"{len(found)} differences, such as {found[0]}"
+            print(f"{kind}: {verb}: {what}")
+            if found and not allowed:
                 bad.append(f"{kind}: {verb}")
     return bad
 

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
+#include <optional>
 #include <string_view>
 #include <unordered_set>
 
@@ -99,10 +101,34 @@ double Number(const Scanner& scan, std::string_view field, const std::string& na
   return value;
 }
 
+// Reads large decimal numbers as differences to the first one, whole and broken part each for itself.
+class ClockColumn {
+ public:
+  double Read(const Scanner& scan, std::string_view field, const std::string& name, Missing missing) {
+    const double value = Number(scan, field, name, missing);
+    if (std::isnan(value)) return value;
+    field = Trim(field);
+    const auto point = std::min(field.find('.'), field.size());
+    std::int64_t whole = 0;
+    const auto [end, error] = std::from_chars(field.data(), field.data() + point, whole);
+    const bool plain = error == std::errc() && end == field.data() + point && whole >= 0 &&
+                       field.find_first_not_of("0123456789", std::min(point + 1, field.size())) == field.npos;
+    if (!begin_) begin_ = plain && value >= kLarge ? whole : 0;
+    if (*begin_ == 0) return value;
+    if (!plain) return value - static_cast<double>(*begin_);
+    const std::string part = "0" + std::string(field.substr(point)) + "0";
+    return static_cast<double>(whole - *begin_) + (point < field.size() ? std::strtod(part.c_str(), nullptr) : 0);
+  }
+
+ private:
+  static constexpr double kLarge = 1e8;
+  std::optional<std::int64_t> begin_;
+};
+
 }  // namespace
 
 NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool(const std::string& name)>& wanted,
-                     Missing missing) {
+                     Missing missing, const std::string& clock) {
   const std::string text = ReadWholeFile(path);
   Scanner scan(path.string(), text);
   const std::vector<std::string> header = ScanHeader(scan);
@@ -115,6 +141,10 @@ NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool
     (keep[c] ? table.names : table.ignored).push_back(header[c]);
   }
 
+  const std::size_t clock_at =
+      clock.empty() ? columns
+                    : static_cast<std::size_t>(std::find(header.begin(), header.end(), clock) - header.begin());
+  ClockColumn times;
   std::vector<double> flat;  // row after row
   flat.reserve(table.names.size() * static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n') + 1));
   Eigen::Index rows = 0;
@@ -128,7 +158,9 @@ NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool
     std::string_view field;
     std::size_t c = 0;
     for (; scan.NextField(field); ++c) {
-      if (c < columns && keep[c]) flat.push_back(Number(scan, field, header[c], missing));
+      if (c >= columns || !keep[c]) continue;
+      flat.push_back(c == clock_at ? times.Read(scan, field, header[c], missing)
+                                   : Number(scan, field, header[c], missing));
     }
     if (c != columns) {
       scan.Fail("has " + std::to_string(c) + " fields, expected " + std::to_string(columns) + " as in the header");

@@ -73,7 +73,7 @@ void FillEmptyCells(Table& table, const ChannelMap& map) {
 Table FromCsv(const std::filesystem::path& path, const ChannelMap& map) {
   const std::set<std::string> columns = ColumnsOf(map);
   const auto wanted = [&columns](const std::string& name) { return columns.contains(name); };
-  Table table{files::ReadCsv(path, wanted, files::Missing::kNan), path.string() + ":1"};
+  Table table{files::ReadCsv(path, wanted, files::Missing::kNan, map.time.column), path.string() + ":1"};
   FillEmptyCells(table, map);
   return table;
 }

@@ -121,11 +121,30 @@ unit = "degC"
     const double row = 4.0 * static_cast<double>(k + 1);
     ASSERT_EQ(log.q(k, 0), 0.5 * row);
     ASSERT_NEAR(log.tau(k, 0), std::sin(0.1 * row), 1e-9);  // as many digits as the file has
-    ASSERT_NEAR(log.temp(k, 0), 20 + 0.25 * row, 1e-4);     // stamps near 1.7e9 s have 0.24 us
+    ASSERT_NEAR(log.temp(k, 0), 20 + 0.25 * row, 1e-8);
     ASSERT_NEAR(log.t[k] - log.t[0], 0.001 * (row - 4), 1e-6);
   }
   EXPECT_EQ(log.notes.at(0),
             "column '/temp' (250 Hz): interpolated at the times of column '/js/a/position' and 1 more (250 Hz)");
+}
+
+TEST(TimeSince1970, KeepsItsNanoseconds) {
+  const TemporaryFolder folder;
+  std::string seconds = "stamp,p,f\n", nanoseconds = seconds;
+  for (int k = 0; k < 9; ++k) {
+    const std::string part = std::to_string(900000001 + 40000003 * k);  // ns, of which the last ones pass a second
+    const bool next = part.size() == 10;
+    seconds += (next ? "1700000001." : "1700000000.") + part.substr(next) + ",0,0\n";
+    nanoseconds += (next ? "1700000001" : "1700000000") + part.substr(next) + ",0,0\n";
+  }
+  for (const auto& [text, unit] : {std::pair{seconds, "s"}, {nanoseconds, "ns"}}) {
+    const std::string map = "joints = 1\n[time]\ncolumn = \"stamp\"\nunit = \"" + std::string(unit) +
+                            "\"\n[q]\ncolumn = \"p\"\nunit = \"rad\"\n[tau]\ncolumn = \"f\"\nunit = \"N*m\"\n";
+    const Log log = ReadLog(folder.Write("log.csv", text), ReadChannelMap(folder.Write("map.toml", map)), 2);
+    ASSERT_EQ(log.samples(), 9);
+    for (Eigen::Index k = 0; k < 9; ++k)
+      EXPECT_NEAR(log.t[k] - log.t[0], 0.040000003 * static_cast<double>(k), 1e-12) << unit;  // a double near 1 s
+  }
 }
 
 Series Line(const std::string& name, std::vector<double> t, double slope) {

@@ -15,7 +15,7 @@ constexpr QuantityInfo kTable[] = {
     {Quantity::kTime, "t", "t", Indexing::kNone, false, false, "s", "time since the table was adopted, or of the log"},
     {Quantity::kTimeStep, "dt", "dt", Indexing::kNone, false, false, "s", "time since the sample before"},
     {Quantity::kRigidTorque, "tau_rigid", "tau_rigid", Indexing::kJoint, true, false, "N*m or N",
-     "torque of the links"},
+     "torque of the links, without the rotors of the robot file: what the gear carries"},
     {Quantity::kGravityTorque, "tau_gravity", "tau_gravity", Indexing::kJoint, true, false, "N*m or N",
      "gravity's part of it"},
     {Quantity::kBodyColumn, "Y", "Y", Indexing::kBody, false, false, "per unit of the parameter",

@@ -127,7 +127,10 @@ TEST(EffectsInAModel, JointCompliance_MovesTheLinksUnderGravity) {
     const MatrixXd column = arm.Column("joint_compliance.C2", {});
     for (int k = 0; k < WithEffect::kSamples; ++k) {
       const VectorXd q = arm.signals().q.row(k);
-      const double load = kdl.Torque(q, arm.signals().qd.row(k), arm.signals().qdd.row(k))[1];
+      // The gear carries the links, and not the motor's rotor.
+      const codegen::Motor& motor = arm.robot().joint[1].motor;
+      const double rotor = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2 * arm.signals().qdd(k, 1);
+      const double load = kdl.Torque(q, arm.signals().qd.row(k), arm.signals().qdd.row(k))[1] - rotor;
       const VectorXd lower = q - kCompliance * load * VectorXd::Unit(6, 1);
       const VectorXd change = (kdl.Torque(lower, kRest, kRest) - kdl.Torque(q, kRest, kRest)) / kCompliance;
       for (int i = 0; i < 6; ++i) EXPECT_NEAR(column(k, i), change[i], 1e-4 * change.norm() + 1e-4) << name << " " << k;

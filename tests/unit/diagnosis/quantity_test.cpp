@@ -108,7 +108,11 @@ class EveryQuantity : public testing::Test {
         return data_.s.t[sample];
       case Quantity::kTimeStep:
         return kStep_s;
-      case Quantity::kRigidTorque:
+      case Quantity::kRigidTorque: {  // the rotor of the file is no load of the gear
+        const codegen::Motor& motor = arm_.model().robot().joint[static_cast<std::size_t>(joint)].motor;
+        const double rotor = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2;
+        return Rigid(sample)[joint] - rotor * data_.s.qdd(sample, joint);
+      }
       case Quantity::kModelTorque:  // the model of this test has no friction
         return Rigid(sample)[joint];
       case Quantity::kDelayedTorque:  // by one sample

@@ -34,7 +34,9 @@ TEST(EffectPoint, FrictionThatGrowsWithTheLoad_ReadsTheBodiesAsKdlHasThem) {
     point.Set(0, at.q, at.qd, at.qdd, {}, z);
     const VectorXd torque = point.Torque(), rigid = kdl.Torque(at.q, at.qd, at.qdd);
     for (int j = 0; j < 2; ++j) {
-      const double sign = at.qd[j] > 0 ? 1 : -1, load = mu[j] * std::abs(rigid[j]) * sign;
+      const codegen::Motor& motor = robot.joint[static_cast<std::size_t>(j)].motor;  // its rotor is no load of the gear
+      const double rotor = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2 * at.qdd[j];
+      const double sign = at.qd[j] > 0 ? 1 : -1, load = mu[j] * std::abs(rigid[j] - rotor) * sign;
       ASSERT_GT(std::abs(load), 0.01);
       EXPECT_NEAR(torque[j], arm.Friction("Fc", j) * sign + arm.Friction("Fv", j) * at.qd[j] + load, 1e-9)
           << "joint " << j + 1;

@@ -15,7 +15,8 @@ namespace armcal::bags {
 
 namespace {
 
-enum Outcome : int { kDone = 0, kBad = 1, kFailed = 2 };
+// Exit codes that nothing else in the child uses: a library or a sanitizer that ends the process leaves 0 or 1.
+enum Outcome : int { kDone = 70, kBad, kFailed };
 
 bool WriteAll(int file, const std::string& bytes) {
   for (std::size_t done = 0; done < bytes.size();) {

@@ -48,7 +48,7 @@ const Edges kEdges = {
     {"codegen/src/generate",   {kCode + "io", kCode + "generator"}},
 
     // Data: what is read and what is shown.
-    {"host_sim/data/files",    {kCode + "io"}},
+    {"host_sim/data/files",    {kCode + "io", kLib + "core"}},
     {"host_sim/data/bags",     {kCode + "io", kHost + "data/files"}},
     {"host_sim/data/logs",     {kCode + "io", kHost + "data/files", kHost + "data/bags"}},
     {"host_sim/data/trajectory", {kCode + "io", kHost + "data/files"}},

@@ -10,6 +10,7 @@
 #include <new>
 #include <set>
 
+#include "armcal/core/sha256.hpp"
 #include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
 
@@ -94,6 +95,29 @@ void WriteWholeFile(const fs::path& path, std::string_view text) {
   else io::AtomicWrite(path, text);
 }
 
+namespace {
+
+std::string Hex(core::Sha256& hash) {
+  std::uint8_t digest[core::Sha256::kDigestBytes];
+  hash.Finish(digest);
+  std::string out;
+  for (const std::uint8_t byte : digest) out += {"0123456789abcdef"[byte >> 4], "0123456789abcdef"[byte & 0xF]};
+  return out;
+}
+
+void Add(std::string_view text, core::Sha256& hash) {
+  hash.Add(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+}
+
+}  // namespace
+
+std::string Sha256(std::string_view text) {
+  core::Sha256 hash;
+  hash.Begin();
+  Add(text, hash);
+  return Hex(hash);
+}
+
 std::string FileHash(const fs::path& path) {
   std::error_code none;
   if (fs::is_directory(path, none)) {
@@ -107,7 +131,14 @@ std::string FileHash(const fs::path& path) {
   RequireRegular(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw io::InputError(path.string() + ": cannot be opened");
-  return Sha256(std::string(std::istreambuf_iterator<char>(in), {}));
+  core::Sha256 hash;
+  hash.Begin();
+  std::string part(std::size_t{1} << 16, '\0');
+  do {
+    in.read(part.data(), static_cast<std::streamsize>(part.size()));
+    Add(std::string_view(part).substr(0, static_cast<std::size_t>(in.gcount())), hash);
+  } while (in);
+  return Hex(hash);
 }
 
 }  // namespace armcal::files

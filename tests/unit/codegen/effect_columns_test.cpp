@@ -99,6 +99,16 @@ TEST(Effects, LoadAndTemperatureColumns_EqualFormulasWrittenByHand) {
     EXPECT_NEAR(At("temp_viscous", 0, {{"qd2", v}, {"temp2", 41.0}}, {{"Tc", 25}}), v * std::exp(-11.0 / 25), 1e-13);
     EXPECT_NEAR(At("temp_coulomb", 0, {{"qd2", v}, {"temp2", 41.0}}), 11 * Sign(v), 1e-13);
   }
+  for (const double load : {-70.0, -12.0, 3.0, 95.0})  // the range is narrower: two of them are clamped
+    for (const double v : {-0.7, 0.2})
+      for (int i = 1; i < 8; ++i) {
+        const double s = Spline(load, -50, 60, i, 8);
+        EXPECT_NEAR(At("curve_load_viscous", i - 1, {{"qd2", v}, {"tau_rigid2", load}}, {{"lo", -50}, {"hi", 60}}),
+                    s * v, 1e-12);
+        EXPECT_NEAR(
+            At("curve_cross_load", i - 1, {{"qd5", v}, {"tau_rigid3", load}}, {{"lo", -50}, {"hi", 60}}, {4, 2}, 4),
+            s * Sign(v), 1e-12);
+      }
   // a payload's torque: mass times the unit mass's column plus first moments times theirs
   EXPECT_NEAR(At("load_linear", 0, {{"Y1_5_0", 3.0}, {"Y1_5_1", 0.5}, {"Y1_5_2", -0.7}, {"Y1_5_3", 11.0}},
                  {{"mass", 8}, {"cx", 0.1}, {"cy", 0.02}, {"cz", 0.25}}),

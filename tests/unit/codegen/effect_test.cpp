@@ -27,7 +27,7 @@ const char* const kKinds[] = {
     "external_contact",    "coulomb_viscous",      "friction_exponential", "friction_sech_tanh", "stribeck_basis",
     "friction_table",      "curve_speed",          "curve_friction",       "curve_load",         "curve_load_friction",
     "curve_temp_friction", "curve_cross_position", "curve_cross_friction", "curve_cross_speed",  "hysteresis",
-    "joint_compliance"};
+    "joint_compliance",    "curve_cross_load",     "curve_load_viscous"};
 
 TEST(Catalogue, HasARecordForEveryKind_AndNoOther) {
   std::set<std::string> expected(std::begin(kKinds), std::end(kKinds)), found;

@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/diagnosis/limits.hpp"
+#include "host_sim/diagnose/diagnosis/run_state.hpp"
 #include "host_sim/diagnose/diagnosis/selector.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 #include "host_sim/identify/calibration/channel.hpp"
@@ -145,58 +147,12 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
 Diagnosis::~Diagnosis() = default;
 
 namespace {
-// Of the walk that would have a drift's changes: its path is smoother than a walk's. Over exponentials of 2 to 20 s, up
-// to 25 noises high, a tenth left the least on another run.
-constexpr double kSmooth = 0.1;
-}  // namespace
 
-RunState MakeRunState(const Candidate& candidate, const std::vector<double>& eta, const VectorXd& amplitude,
-                      double train_s) {
-  RunState out{&candidate, eta, amplitude, 0, 1, 0};
-  if (candidate.record().search.how == codegen::SearchWay::kOnset) {  // there or not: one step up, perhaps one down
-    out.time_s = 0.5 * (eta[0] + eta[1]);
-    out.variance_ps = 1 / train_s;
-    return out;
-  }
-  // A spline over time: its coefficients are the level's path from zero on. At the end the splines but the first sum up
-  // to one.
-  const VectorXd& path = amplitude;
-  double changes = path[0] * path[0];
-  for (int k = 1; k < path.size(); ++k) changes += (path[k] - path[k - 1]) * (path[k] - path[k - 1]);
-  out.time_s = eta[1];
-  out.level_sd = path.cwiseAbs().maxCoeff();
-  out.variance_ps = kSmooth * changes / train_s;
-  out.amplitude = VectorXd::Ones(path.size());
-  return out;
-}
+constexpr double kWorse = 1.005;        // what gets worse by more refutes a term
+constexpr double kOfThePromise = 0.15;  // of the gain that training promises: what gains less is not on this log
+constexpr double kShows = 25;           // a gain that a term without any freedom never has by chance
 
-MatrixXd Track(const RunState& state, const Quantities& q, const MatrixXd& residual, const VectorXd& sigma) {
-  std::vector<std::vector<VectorXd>> value;
-  state.candidate->Evaluate(q, state.eta, value, state.time_s);
-  const auto& rows = state.candidate->rows();
-  MatrixXd shape = MatrixXd::Zero(residual.rows(), residual.cols());
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    for (int c = 0; c < state.candidate->columns(state.eta); ++c)
-      if (value[c][r].size()) shape.col(rows[r]) += state.amplitude[c] * value[c][r];
-  MatrixXd predicted = MatrixXd::Zero(residual.rows(), residual.cols());
-  double level = 0, variance = state.level_sd * state.level_sd;
-  for (Eigen::Index k = 0; k < residual.rows(); ++k) {
-    if (k > 0) variance += state.variance_ps * q.dt[k];
-    predicted.row(k) = level * shape.row(k);
-    for (const int j : rows) {
-      const double h = shape(k, j);
-      if (!q.data->used(k, j) || h == 0) continue;
-      const double gain = variance * h / (variance * h * h + sigma[j] * sigma[j]);
-      level += gain * (residual(k, j) - h * level);
-      variance *= 1 - gain * h;
-    }
-  }
-  return predicted;
-}
-
-namespace {
-
-constexpr double kWorse = 1.005;  // what gets worse by more refutes a term
+bool IsOfTheRun(const Chosen& c) { return c.candidate->record().effect_class == codegen::EffectClass::kRunState; }
 
 // A log as the confirmed terms say that it was measured.
 calibration::Dataset AsTermsSay(const Diagnosis::Work& w, const calibration::Dataset& log) {
@@ -222,9 +178,8 @@ MatrixXd LeavesAtEstimate(const Diagnosis::Work& w, const std::vector<const Chos
   for (const bool run_states : {false, true})
     for (std::size_t k = 0; k < terms.size(); ++k) {
       const Chosen& c = *terms[k];
-      const bool is_run_state = c.candidate->record().effect_class == codegen::EffectClass::kRunState;
-      if (c.candidate->is_event() || is_run_state != run_states) continue;
-      if (!is_run_state) {
+      if (c.candidate->is_event() || IsOfTheRun(c) != run_states) continue;
+      if (!run_states) {
         left -= CandidateTorque(*c.candidate, q, c.eta, w.estimate.amplitude[k]);
         continue;
       }
@@ -293,18 +248,79 @@ std::optional<Refutation> Worse(const Chosen& term, const Errors& with, const Er
   return Worse(term, with.fitted, without.fitted);
 }
 
+// The rows of a term's joints, and the square of its torque in them.
+struct Share {
+  double rows = 0, square = 0;
+};
+
+Share ShareOf(const Diagnosis::Work& w, const Chosen& c, const VectorXd& amplitude,
+              const std::vector<const calibration::Dataset*>& logs) {
+  Share out;
+  for (const auto* log : logs) {
+    const MatrixXd torque = CandidateTorque(*c.candidate, AtEstimate(w, {&c}, *log), c.eta, amplitude);
+    for (const int j : c.candidate->rows()) {
+      const RowIndex rows = UsedRows({log}, j);
+      VectorXd own(rows.size());
+      rows.Take(0, torque.col(j), own);
+      out.rows += rows.size(), out.square += own.squaredNorm();
+    }
+  }
+  return out;
+}
+
+// How much more likely a log is with a term than without it, twice the logarithm, over the term's joints. The larger
+// one of two figures: with white noise, and with noise of the colour of what is left. What the base model does not
+// predict of another motion is slow, and whitening takes slow terms for it.
+double GainOn(const calibration::Dataset& log, const Candidate& candidate, const MatrixXd& without,
+              const MatrixXd& with) {
+  double white = 0, coloured = 0;
+  for (const int j : candidate.rows()) {
+    const RowIndex rows = UsedRows({&log}, j);
+    VectorXd before(rows.size()), after(rows.size());
+    rows.Take(0, without.col(j), before), rows.Take(0, with.col(j), after);
+    const NoiseModel noise = FitNoise(rows, after);
+    const auto gain = [&](double of, double to) { return to > 0 ? rows.size() * std::log(of / to) : 0; };
+    white += gain(before.squaredNorm(), after.squaredNorm());
+    coloured += gain(Whiten(noise, rows, before).squaredNorm(), Whiten(noise, rows, after).squaredNorm());
+  }
+  return std::max(white, coloured);
+}
+
 // The weakest term that predicts one of its joints, or all joints together, worse than the declared model does, or
 // worse than the other terms do without it. A delay is not compared with the other terms: they were found on logs that
-// it had aligned.
+// it had aligned. A state of a run may also be refuted by the way that it takes there, another term by gaining much
+// less than its torque on this log and its gain in training promise.
 Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calibration::Carried& payload,
-                const Errors& before, const Errors& after, std::optional<Refutation>& why) {
+                const MatrixXd& before, const MatrixXd& after, std::optional<Refutation>& why) {
+  const Errors error_before = ErrorsOf(w, log, before), error_after = ErrorsOf(w, log, after);
+  calibration::Dataset seen = AsTermsSay(w, log);
+  for (int j = 0; j < w.model.joints(); ++j)
+    if (w.turns[static_cast<std::size_t>(j)]) calibration::UseTurns(seen, j);
+  std::map<const Chosen*, VectorXd> amplitude;
+  for (const Chosen* c : Confirmed(w.chosen)) amplitude.emplace(c, w.estimate.amplitude[amplitude.size()]);
   for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
     if (!c->confirmed || c->candidate->is_event()) continue;
-    if ((why = Worse(*c, after, before))) return &*c;
+    if ((why = Worse(*c, error_after, error_before))) return &*c;
     const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
-    if (others.empty() || c->delay_s != 0) continue;
-    if ((why = Worse(*c, after, ErrorsOf(w, log, Leaves(w, others, log, payload))))) {
+    if (c->delay_s != 0) continue;
+    const MatrixXd without = Leaves(w, others, log, payload);
+    if (!others.empty() && (why = Worse(*c, error_after, ErrorsOf(w, log, without)))) {
       why->beside_others = true;
+      return &*c;
+    }
+    if (GoesToAndFroOn(*c->candidate, amplitude.at(&*c), AtEstimate(w, others, seen), without)) {
+      c->unconfirmed = "on the held-out log it goes to and fro, which a state of a run does not";
+      return &*c;
+    }
+    if (IsOfTheRun(*c)) continue;
+    const Share trained = ShareOf(w, *c, amplitude.at(&*c), w.train),
+                shown = ShareOf(w, *c, amplitude.at(&*c), {&seen});
+    const double promised = GainOf(c->found) * std::min(shown.square / trained.square, shown.rows / trained.rows),
+                 gained = GainOn(seen, *c->candidate, without, after);
+    if (gained < std::min(kOfThePromise * promised, kShows)) {
+      c->unconfirmed =
+          fmt::format("the held-out log gains {:.0f} by it, where {:.0f} was to be expected from the training logs",
+                      gained, promised);
       return &*c;
     }
   }
@@ -340,22 +356,21 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test, double gain_tolerance
   out.before = declared(w.declared.x);
   const MatrixXd with_terms = Leaves(w, Confirmed(w.chosen), test, {});
   out.payload = calibration::FindCarried(model_, w.declared, w.estimate.sigma, test, with_terms, gain_tolerance);
-  const Errors before =
-      ErrorsOf(w, test, out.payload.named ? OnOtherHalves(model_, out.payload, w.declared.x, declared) : out.before);
+  const MatrixXd before = out.payload.named ? OnOtherHalves(model_, out.payload, w.declared.x, declared) : out.before;
   std::vector<std::optional<Refutation>> why;
   for (const Term& t : finding_.terms) why.push_back(t.refuted);
   for (;;) {
     out.after = Leaves(w, Confirmed(w.chosen), test, out.payload, &out.tracking);
     Work::Estimate with_all = w.estimate;
     std::optional<Refutation> reason;
-    Chosen* refuted = Refuted(w, test, out.payload, before, ErrorsOf(w, test, out.after), reason);
+    Chosen* refuted = Refuted(w, test, out.payload, before, out.after, reason);
     w.estimate = std::move(with_all);
     if (!refuted) break;
     const auto at = refuted - w.chosen.data();
     refuted->confirmed = false;
     why[static_cast<std::size_t>(at)] = reason;
     w.AlignLogs();
-    if (Chosen instead; OfTheRunInstead(w, *refuted, instead)) {
+    if (Chosen instead; !IsOfTheRun(*refuted) && OfTheRunInstead(w, *refuted, instead)) {
       w.chosen.insert(w.chosen.begin() + at + 1, instead);
       why.insert(why.begin() + at + 1, std::nullopt);
     }

@@ -52,7 +52,7 @@ Found Searcher::Finish(const Found& rough) {
 Found Searcher::Scored() const {
   Found f = best_;
   f.penalty = PenaltyOf(f.gain.rank + f.searched, c_, e_);
-  if (f.gain.gain > 0 && c_.is_curve() && c_.record().search.how == codegen::SearchWay::kSpline)
+  if (f.gain.gain > 0 && c_.record().search.how == codegen::SearchWay::kSpline)
     f.penalty = f.gain.gain - metric().CurveEvidence(seen_, &f.precision);
   f.score = Score(f, f.gain.gain);
   f.log_chance = LogChance(f, f.gain.gain);
@@ -203,6 +203,8 @@ double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evi
 double Score(const Found& found, double gain) {
   return gain - found.penalty - 2 * std::log(found.tried) - found.candidate->record().generic_penalty;
 }
+
+double GainOf(const Found& found) { return found.score - Score(found, 0); }
 
 double LogUpperTail(int degrees, double x) {
   const double half = 0.5 * x;

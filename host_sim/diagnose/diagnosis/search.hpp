@@ -32,6 +32,8 @@ struct Found {
 
 // gain - penalty - 2 ln(tried) - the record's own penalty.
 double Score(const Found& found, double gain);
+// The gain that its score stands for.
+double GainOf(const Found& found);
 // Natural logarithm of the chance that noise alone gains so much, at most, wherever a search of this kind looks. Of a
 // curve it is the odds against it: its coefficients are averaged over, not fitted.
 double LogChance(const Found& found, double gain);

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "host_sim/diagnose/diagnosis/determined.hpp"
+#include "host_sim/diagnose/diagnosis/run_state.hpp"
 #include "host_sim/identify/methods/exogeneity.hpp"
 
 namespace armcal::diagnosis {
@@ -34,33 +35,10 @@ constexpr double kNothing = 6;          // a gain that chance often has
 constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms differ a little from any record
 constexpr int kFewTurns = 100;          // rows
 constexpr double kTurnShare = 0.03;     // of a joint's rows
-constexpr double kTurnsBack = 0.2;      // of what a state of a run spans: less is no turn
 constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
 
 // Neither noise nor one term too many explains the gain.
 bool IsRare(const Found& f) { return f.log_chance < kLogRare && f.score > 0; }
-
-// What changes during a run, such as a sensor's zero or a lubricant, goes one way, or there and back. A curve over time
-// that goes to and fro follows the motion instead. amplitude: of cubic B-splines on even knots, without the first one.
-bool GoesToAndFro(const Candidate& c, const VectorXd& amplitude) {
-  const codegen::EffectRecord& record = c.record();
-  if (record.effect_class != codegen::EffectClass::kRunState || record.search.how != codegen::SearchWay::kSpline)
-    return false;
-  VectorXd spline(amplitude.size() + 1);
-  spline << 0, amplitude;
-  const Eigen::Index knots = spline.size() - 2;
-  const VectorXd value = (spline.head(knots) + 4 * spline.segment(1, knots) + spline.tail(knots)) / 6;
-  const double least = kTurnsBack * (value.maxCoeff() - value.minCoeff());
-  int turns = 0, way = 0;
-  for (double furthest = value[0]; const double now : value) {
-    const double step = now - furthest;
-    if (way * step <= 0 && std::abs(step) < least) continue;
-    const int next = step > 0 ? 1 : -1;
-    turns += way != 0 && next != way;
-    way = next, furthest = now;
-  }
-  return turns > 1;
-}
 
 }  // namespace
 
@@ -81,6 +59,8 @@ class Grounds {
 
   Ground ground() const { return {work_.evidence, *thinned_, *metric_, *thin_metric_}; }
   const Metric& metric() const { return *metric_; }
+  // The rows whitened by what they leave; null where that has no colour.
+  std::unique_ptr<Metric> Whitened() const;
   // Deviance of these joints with no further column.
   double DevianceWithout(const std::vector<int>& joints) const;
   // Takes as noise what the fit with these columns leaves; true if it is clearly less.
@@ -132,6 +112,19 @@ void Grounds::MakeMetrics(const std::vector<NoiseModel>& noise) {
   thin_rows_ = thinned_->Average(work_.rows, noise, averaged);
   thin_metric_ = std::make_unique<Metric>(thin_rows_, averaged);
   without_.clear();
+}
+
+std::unique_ptr<Metric> Grounds::Whitened() const {
+  std::vector<NoiseModel> noise = metric_->noise();
+  bool clearly = false;
+  for (int j = 0; j < work_.rows.joints(); ++j) {
+    if (!IsWhite(noise[j]) || work_.rows.index[j].size() == 0) continue;
+    const NoiseModel own = FitNoise(work_.rows.index[j], metric_->RawResidual(j));
+    if (own.innovation > kClearly * noise[j].innovation) continue;
+    noise[j] = own;
+    clearly = true;
+  }
+  return clearly ? std::make_unique<Metric>(work_.rows, noise) : nullptr;
 }
 
 double Grounds::DevianceWithout(const std::vector<int>& joints) const {
@@ -243,6 +236,13 @@ bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others
 
 std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds) {
   std::vector<Found> ranked;
+  // Noise with a colour gives what it resembles a large gain, and what is there may not be among the best. So those
+  // that are best in whitened rows are scored again, too. Not where the torque passed a filter: only its rough form is
+  // known, and whitening would weigh what is left of it.
+  const calibration::Dataset& log = *w_.train[0];
+  const bool filtered = !log.channel.empty() || (log.saved_Hz.size() && log.saved_Hz.array().isFinite().any());
+  const std::unique_ptr<Metric> whitened = filtered ? nullptr : grounds.Whitened();
+  std::vector<std::pair<double, Found>> screened;  // by that score
   std::map<std::pair<std::string, std::vector<int>>, Found> something;
   for (Candidate* c : candidates) {
     const std::string& simpler = c->record().search.after;
@@ -250,6 +250,10 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
     if (!simpler.empty() && before == something.end()) continue;
     const Found f = SearchCandidate(*c, grounds.ground(), simpler.empty() ? nullptr : &before->second);
     gain_[c] = std::max(gain_[c], f.gain.gain);
+    if (whitened && f.gain.gain > kNothing && !c->is_curve() && !c->is_event()) {
+      const double gain = whitened->Try(GatherColumns(*c, w_.evidence, f.eta)).gain;
+      if (LogChance(f, gain) < kLogLikely) screened.emplace_back(Score(f, gain), f);
+    }
     if (f.log_chance > kLogLikely) continue;
     ranked.push_back(f);
     something.insert({{c->record().name, c->joints()}, f});
@@ -261,6 +265,11 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
     return f.candidate->is_curve() && ++curves[f.candidate->rows()] > kCurvesOfAJoint;
   });
   if (ranked.size() > kRescored) ranked.resize(kRescored);
+  std::sort(screened.begin(), screened.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  if (screened.size() > kRescored) screened.resize(kRescored);
+  for (const auto& [score, f] : screened)
+    if (std::none_of(ranked.begin(), ranked.end(), [&](const Found& r) { return r.candidate == f.candidate; }))
+      ranked.push_back(f);
   for (Found& f : ranked) f = Finish(f, grounds.ground());
   std::erase_if(ranked, [](const Found& f) { return f.gain.gain <= 0; });  // out of bounds on all rows
   std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
@@ -360,8 +369,8 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
         100 * folds.sum() / gain.gain, 100 * kKeepsOutOfFold, (folds.array() > 0).count(), kFolds, kFoldsThatImprove);
     return false;
   }
-  if (GoesToAndFro(*f.candidate, gain.amplitude)) {
-    refused_[f.candidate] = "over time it goes to and fro, which a state of a run does not";
+  if (const std::string why = WhyNoState(*f.candidate, gain.amplitude); !why.empty()) {
+    refused_[f.candidate] = why;
     return false;
   }
   if (!StaysAtLowerBandwidth(f, terms, gain, noise)) {
@@ -389,7 +398,9 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     const bool said = std::find(out.also_fits.begin(), out.also_fits.end(), kind) != out.also_fits.end();
     if (!SharesJoint(o, *f.candidate) || kind == f.candidate->record().kind || kind != o.record().name || said)
       continue;
-    const auto [taken, own] = metric.Imitates(GatherColumns(o, w_.evidence, ranked[other].eta), c, gain.amplitude);
+    const Columns of_other = GatherColumns(o, w_.evidence, ranked[other].eta);
+    if (!WhyNoState(o, metric.Try(of_other).amplitude).empty()) continue;
+    const auto [taken, own] = metric.Imitates(of_other, c, gain.amplitude);
     const double left = own - taken;
     const bool same = left < kIndistinguishable && left < kImitated * own;
     // At its bound a term becomes another one: a limit below all torques is a wrong gain.

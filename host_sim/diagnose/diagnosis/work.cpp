@@ -27,7 +27,7 @@ constexpr double kTurnWeight = 0.25;
 constexpr int kPasses = 3;
 constexpr double kTakesOver = 0.9;  // share of a named column that a curve can give
 constexpr double kHeld = 1e6;       // weight of a curve's part along a named column, over that of the rows
-constexpr double kSettled = 1e-3;  // relative change of the residuals' spread after which nothing else moves
+constexpr double kSettled = 1e-3;   // relative change of the residuals' spread after which nothing else moves
 }  // namespace
 
 std::vector<const Chosen*> Confirmed(const std::vector<Chosen>& chosen, const Chosen* without) {
@@ -121,32 +121,35 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
   IndexRows();
 }
 
-void Diagnosis::Work::IndexRows() {
-  evidence.index.assign(model.joints(), {});
-  for (int j = 0; j < model.joints(); ++j) {
-    RowIndex& index = evidence.index[j];
-    for (std::size_t log = 0; log < train.size(); ++log) {
-      const calibration::Dataset& data = *train[log];
-      index.average.push_back(data.averaged(j) ? &data.average[static_cast<std::size_t>(j)] : nullptr);
-      int previous = -2;
-      const auto add = [&](int sample, bool follows) {
-        index.dataset.push_back(static_cast<int>(log));
-        index.sample.push_back(sample);
-        index.segment_begin.push_back(!follows);
-        previous = sample;
-      };
-      if (const RowIndex::Average* average = index.average.back()) {
-        const double apart_s = 0.5 / data.band_Hz[j];
-        for (int row = 0; row < average->rows(); ++row) {
-          const int middle = MiddleSample(*average, row);
-          add(middle, previous >= 0 && data.s.t[middle] - data.s.t[previous] < 1.5 * apart_s);
-        }
-      } else {
-        for (int k = 0; k < data.samples(); ++k)
-          if (data.used(k, j)) add(k, k == previous + 1);
+RowIndex UsedRows(const std::vector<const calibration::Dataset*>& logs, int joint) {
+  RowIndex index;
+  for (std::size_t log = 0; log < logs.size(); ++log) {
+    const calibration::Dataset& data = *logs[log];
+    index.average.push_back(data.averaged(joint) ? &data.average[static_cast<std::size_t>(joint)] : nullptr);
+    int previous = -2;
+    const auto add = [&](int sample, bool follows) {
+      index.dataset.push_back(static_cast<int>(log));
+      index.sample.push_back(sample);
+      index.segment_begin.push_back(!follows);
+      previous = sample;
+    };
+    if (const RowIndex::Average* average = index.average.back()) {
+      const double apart_s = 0.5 / data.band_Hz[joint];
+      for (int row = 0; row < average->rows(); ++row) {
+        const int middle = MiddleSample(*average, row);
+        add(middle, previous >= 0 && data.s.t[middle] - data.s.t[previous] < 1.5 * apart_s);
       }
+    } else {
+      for (int k = 0; k < data.samples(); ++k)
+        if (data.used(k, joint)) add(k, k == previous + 1);
     }
   }
+  return index;
+}
+
+void Diagnosis::Work::IndexRows() {
+  evidence.index.clear();
+  for (int j = 0; j < model.joints(); ++j) evidence.index.push_back(UsedRows(train, j));
   WeighRows();
 }
 
@@ -427,13 +430,12 @@ void Diagnosis::Work::KeepCausesApart(const std::vector<const Chosen*>& terms) {
     if (!curve.is_curve() || terms[t]->found.precision.size() == 0) continue;
     const int j = curve.rows()[0], count = curve.columns(terms[t]->eta);
     const auto& own = rows.columns[j];
-    const auto place = [&](int coordinate) {
-      return std::find(own.begin(), own.end(), coordinate) - own.begin();
-    };
+    const auto place = [&](int coordinate) { return std::find(own.begin(), own.end(), coordinate) - own.begin(); };
     const Eigen::Index first = place(begin[t]);
     for (std::size_t u = 0; u < terms.size(); ++u) {
       const Candidate& cause = *terms[u]->candidate;
-      if (cause.is_curve() || cause.record().signals != curve.record().signals || cause.joints() != curve.joints()) continue;
+      if (cause.is_curve() || cause.record().signals != curve.record().signals || cause.joints() != curve.joints())
+        continue;
       for (int c = 0; c < cause.columns(terms[u]->eta); ++c) {
         const Eigen::Index named = place(begin[u] + c);
         if (named == static_cast<Eigen::Index>(own.size())) continue;

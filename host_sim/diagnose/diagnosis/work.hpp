@@ -28,7 +28,7 @@ struct Chosen {
   bool coloured = false;  // it was found in rows whose noise had been whitened
   bool earns = true;      // its place beside the others, as last seen
   bool confirmed = true;
-  std::string unconfirmed;  // why it is not, where no held-out log refuted it
+  std::string unconfirmed;  // why it is not, where no error of the held-out log refuted it
   double delay_s = 0;       // of a term that delays the measurement: as it has been applied to the logs
 };
 
@@ -122,29 +122,11 @@ Quantities MakeQuantities(const codegen::Model& model, const calibration::Datase
 void Follow(const codegen::Model& model, const codegen::ArmTorque& arm, const Eigen::VectorXd& x,
             const std::vector<double>& eta, const std::set<codegen::InputId>& reads, Quantities& quantities);
 
+// The rows of one joint that may be used.
+RowIndex UsedRows(const std::vector<const calibration::Dataset*>& logs, int joint);
+
 // Torque of a candidate with given parameters on a dataset, N x n.
 Eigen::MatrixXd CandidateTorque(const Candidate& candidate, const Quantities& quantities,
                                 const std::vector<double>& eta, const Eigen::VectorXd& amplitude);
-
-// A run-state term on another run: a level that wanders, followed as the samples come. (diagnose.cpp)
-// A term whose shape over the joints is known from training, times one level that is not known.
-struct RunState {
-  const Candidate* candidate = nullptr;
-  std::vector<double> eta;
-  Eigen::VectorXd amplitude;  // of the columns at level one
-  double time_s = 0;          // at this time of the training run all of the term was there
-  double level_sd = 1;        // how large the level may be at the start
-  double variance_ps = 0;     // of the level's random walk, per second
-};
-
-// From the term as fitted to a training run of this length: its level's squared changes over the run's length,
-// less where it is smooth.
-RunState MakeRunState(const Candidate& candidate, const std::vector<double>& eta, const Eigen::VectorXd& amplitude,
-                      double train_s);
-
-// Torque [N x n] that a Kalman filter of the level predicts one sample ahead, from the residuals before. sigma: [n]
-// noise of a residual.
-Eigen::MatrixXd Track(const RunState& state, const Quantities& quantities, const Eigen::MatrixXd& residual,
-                      const Eigen::VectorXd& sigma);
 
 }  // namespace armcal::diagnosis

@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <functional>
+#include <numbers>
 
+#include "host_sim/diagnose/diagnosis/run_state.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
 
@@ -131,6 +134,45 @@ TEST(RunStateTracker, ForgetsALevelThatHasGone) {
   EXPECT_NEAR(tracked(half - 1, 0), 2, 0.01);
   EXPECT_NEAR(tracked(half, 0), 2, 0.01);  // one sample ahead: it cannot know yet
   EXPECT_NEAR(tracked(half + 40, 0), 0, 0.01);
+}
+
+// Coefficients of six splines; before them the torque is zero.
+VectorXd Path(std::initializer_list<double> values) {
+  VectorXd out(6);
+  std::copy(values.begin(), values.end(), out.begin());
+  return out;
+}
+
+TEST(StateOfARun, GoesOneWay_OrThereAndBack) {
+  const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
+  const Candidate drift(tests::Records().at("torque_drift"), robot, {0});
+  for (const VectorXd& path : {Path({0.2, 0.4, 0.6, 0.8, 0.9, 1}), Path({-0.5, -0.9, -1, -0.7, -0.2, 0})})
+    EXPECT_EQ(WhyNoState(drift, path), "") << path.transpose();
+  EXPECT_EQ(WhyNoState(drift, Path({1, -1, 1, -1, 1, -1})),
+            "over time it goes to and fro, which a state of a run does not");
+  EXPECT_EQ(WhyNoState(drift, Path({1, 1, 1, 1, 1, 1})), "it does not change during the run");
+  // what is there in windows of time may come as often as it likes
+  const Candidate payload(tests::Records().at("payload_step"), robot, {});
+  EXPECT_EQ(WhyNoState(payload, VectorXd::Ones(10)), "");
+}
+
+// The training run drifted by 1 N m. Another run may drift by as much, or not at all, from any level on.
+TEST(StateOfARun, ThatFollowsTheMotionOfAnotherRun_IsNone) {
+  ShortRun run(4);
+  const Candidate drift(tests::Records().at("torque_drift"), run.arm.model().robot(), {0});
+  const VectorXd trained = Path({0.2, 0.4, 0.6, 0.8, 0.9, 1});
+  const auto wanders = [&](const std::function<double(double)>& torque) {
+    MatrixXd residual = run.Zero();
+    for (int k = 0; k < run.data.samples(); ++k)
+      residual(k, 0) = torque(run.data.s.t[k] / 4) + 0.05 * std::cos(40.7 * k);
+    return GoesToAndFroOn(drift, trained, run.q, residual);
+  };
+  EXPECT_TRUE(wanders([](double u) { return 0.8 * std::sin(3 * std::numbers::pi * u); }));
+  EXPECT_TRUE(wanders([](double u) { return 5 + 0.8 * std::sin(3 * std::numbers::pi * u); }));
+  EXPECT_FALSE(wanders([](double u) { return 0.2 * std::sin(3 * std::numbers::pi * u); }));  // small beside the drift
+  EXPECT_FALSE(wanders([](double u) { return 3 - 0.9 * u; }));
+  EXPECT_FALSE(wanders([](double u) { return 0.8 * std::sin(std::numbers::pi * u); }));
+  EXPECT_FALSE(wanders([](double) { return 0.0; }));
 }
 
 }  // namespace

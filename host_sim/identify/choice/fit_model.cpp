@@ -7,25 +7,39 @@
 namespace armcal::choice {
 
 namespace {
+
 constexpr int kRounds = 3;  // of a model with columns that read the load: the first one takes the load as zero
+
+const calibration::Method& MethodFor(const codegen::Model& model) {
+  return calibration::FindMethod(model.nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse");
+}
+
+}  // namespace
+
+calibration::Solution SolveInRounds(calibration::Problem problem) {
+  const codegen::Model& model = *problem.model;
+  const calibration::Method& method = MethodFor(model);
+  const bool intervals = problem.intervals;
+  const int rounds = model.depends_on_estimate() ? kRounds : 1;
+  for (int round = 1;; ++round) {
+    problem.intervals = intervals && round == rounds;
+    calibration::Solution solution = calibration::Solve(method, problem);
+    if (round == rounds || !solution.z.allFinite()) return solution;
+    problem.start.segment(model.front(), model.rigid()) = solution.z.segment(model.front(), model.rigid());
+  }
 }
 
 ModelFit FitModel(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
                   const std::atomic<bool>* stop) {
-  ModelFit fit;
-  const calibration::Method& method =
-      calibration::FindMethod(model.nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse");
   calibration::Problem problem = calibration::MakeProblem(model, std::move(train));
   problem.covariance.resize(0, 0);
   problem.stop = stop;
-  fit.method = method.title;
+  ModelFit fit;
+  fit.method = MethodFor(model).title;
   try {
-    for (int round = 0; round < (model.depends_on_estimate() ? kRounds : 1); ++round) {
-      const calibration::Solution solution = calibration::Solve(method, problem);
-      if (!solution.z.allFinite()) return fit.z = Eigen::VectorXd(), fit.why = solution.remark, fit;
-      fit.z = solution.z;
-      problem.start.segment(model.front(), model.rigid()) = fit.z.segment(model.front(), model.rigid());
-    }
+    const calibration::Solution solution = SolveInRounds(std::move(problem));
+    if (solution.z.allFinite()) fit.z = solution.z;
+    else fit.why = solution.remark;
   } catch (const io::InputError& error) {
     fit.why = error.what();
   }

@@ -5,9 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/identify/calibration/dataset.hpp"
+#include "host_sim/identify/methods/method.hpp"
 
 namespace armcal::choice {
+
+// Weighted least squares for a linear model, variable projection for a nonlinear one. Variable projection has least
+// squares inside, so a model never fits worse than one that it contains at fixed eta. Where columns read the load, the
+// fit is made again with the load of the last one. The problem must not have a prior.
+calibration::Solution SolveInRounds(calibration::Problem problem);
 
 struct ModelFit {
   Eigen::VectorXd z;   // [columns + eta]; empty: `why`
@@ -15,8 +20,6 @@ struct ModelFit {
   std::string why;
 };
 
-// Weighted least squares for a linear model, variable projection for a nonlinear one. Variable projection has least
-// squares inside, so a model never fits worse than one that it contains at fixed eta.
 ModelFit FitModel(const codegen::Model& model, std::vector<const calibration::Dataset*> train,
                   const std::atomic<bool>* stop = nullptr);
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 
+#include "host_sim/identify/choice/fit_model.hpp"
 #include "host_sim/identify/methods/shared_steps.hpp"
 #include "host_sim/study/survey/law_draw.hpp"
 #include "host_sim/study/survey/tables.hpp"
@@ -15,7 +16,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kTwoSided = 1.96;
-constexpr int kRounds = 3;  // where columns read the load: the first fit takes it from the CAD values
 
 // What one draw gives for one joint.
 struct OfJoint {
@@ -30,20 +30,6 @@ struct OfDraw {
 
 double HalfSquares(const calibration::Linearised& at) { return 0.5 * at.residual.squaredNorm(); }
 
-calibration::Solution Fit(calibration::Problem& problem) {
-  const codegen::Model& model = *problem.model;
-  const calibration::Method& method =
-      calibration::FindMethod(model.nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse");
-  calibration::Solution solution;
-  const int rounds = model.depends_on_estimate() ? kRounds : 1;
-  for (int round = 0; round < rounds; ++round) {
-    problem.intervals = round + 1 == rounds;
-    solution = calibration::Solve(method, problem);
-    problem.start.segment(model.front(), model.rigid()) = solution.z.segment(model.front(), model.rigid());
-  }
-  return solution;
-}
-
 OfDraw Recover(const Settings& settings, const LawDraw& draw) {
   const codegen::Model model = LawModel(settings, draw);
   const calibration::Dataset log = calibration::Prepare(model, draw.train);
@@ -52,7 +38,8 @@ OfDraw Recover(const Settings& settings, const LawDraw& draw) {
   problem.sigma_Nm = SampleNoise(settings.robot);
   problem.stop = settings.stop;
   const VectorXd truth = LawTruth(model, draw);
-  const calibration::Solution found = Fit(problem);
+  problem.intervals = true;
+  const calibration::Solution found = choice::SolveInRounds(problem);
   OfDraw out;
   out.joint.resize(static_cast<std::size_t>(model.joints()));
   if (!found.z.allFinite()) return out;

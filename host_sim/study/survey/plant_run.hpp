@@ -16,12 +16,14 @@ struct PlantSettings {
   // Half widths by which the true arm differs from the robot file. The true bodies are those of the file.
   double friction = 0.5, torque_constant = 0.03;
   double seconds = 10;
+  double noise = 1;                                    // of the torque, over the robot file's
   std::vector<plant::PlacedJointEffect> effects = {};  // beside Coulomb and viscous friction
 };
 
 // The plant starts at rest, reaches the series' pace within two seconds and is then recorded for `seconds`. A PD law
-// with feed-forward of the file's bodies (KDL) drives it by the gains in robot.control. A sample of the log is the
-// average of robot.sample_ticks readings of encoder and current. io::InputError: the plant cannot read the robot file;
+// with feed-forward of the file's bodies (KDL) drives it by the gains in robot.control. The current goes on a straight
+// line from one tick's command to the next one's. A sample of the log is the average of robot.sample_ticks readings of
+// encoder and current. io::InputError: the plant cannot read the robot file;
 // the file has no [control] table.
 logs::Log RunPlant(const codegen::Robot& robot, const excitation::Series& series, const PlantSettings& settings);
 

@@ -104,9 +104,11 @@ run_ctest "tests ($scope)" build/host "$labels"
 
 if [[ $scope != fast ]]; then
   step "cross packages" toolchains/install.sh cross
+  on_board='^target$'
+  [[ $scope == long ]] && on_board='^(target|long)$'
   for image in cortex-m4f cortex-m7; do
     if step "image $image" configure_and_build "$image"; then
-      run_ctest "target tests $image" "build/$image" '^target$'
+      run_ctest "target tests $image" "build/$image" "$on_board"
       cat "build/$image/budgets.txt"
     fi
   done

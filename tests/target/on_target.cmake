@@ -41,6 +41,18 @@ add_test(NAME Firmware_OverItsSerialLine_TakesATableAndLearns
           ${PROJECT_SOURCE_DIR}/build/host/armcal)
 set_tests_properties(Firmware_OverItsSerialLine_TakesATableAndLearns PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300 LABELS target)
 
+# The public rules of Modbus, asked of the same firmware: a few of them, and all with the long tests.
+set(rules ${PROJECT_SOURCE_DIR}/build/host/tests/e2e/test_e2e_modbus_rules)
+foreach(part "Firmware_OverItsSerialLine_KeepsRulesOfModbus|*.AReply_*:*/Requests.ReadingRegisters/serial|target"
+             "Firmware_OverItsSerialLine_KeepsAllRulesOfModbus|Serial.*:*/serial|long")
+  string(REPLACE "|" ";" words ${part})
+  list(GET words 0 name)
+  list(GET words 1 filter)
+  list(GET words 2 label)
+  add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/on_line.sh ${ARMCAL_BOARD} $<TARGET_FILE:armcal_firmware> ${rules} --gtest_filter=${filter})
+  set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300 LABELS ${label})
+endforeach()
+
 # cmake --build --preset cortex-m4f --target budgets
 set(core cortex-m4f)
 if(ARMCAL_BOARD STREQUAL mps2-an500)

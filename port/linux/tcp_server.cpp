@@ -1,4 +1,4 @@
-// port_linux - poll() over a listener and four sockets.
+// port_linux - poll() over a listener and the sockets of its connections.
 #include "port/linux/tcp_server.hpp"
 
 #include <arpa/inet.h>
@@ -54,7 +54,7 @@ Status TcpServer::Listen(const std::string& address, std::uint16_t port) {
   if (listener_ < 0) return Fail(Status::kBadAddress, name);
   const int on = 1;
   ::setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  if (::bind(listener_, reinterpret_cast<sockaddr*>(&where), sizeof where) != 0 || ::listen(listener_, kSlots) != 0)
+  if (::bind(listener_, reinterpret_cast<sockaddr*>(&where), sizeof where) != 0 || ::listen(listener_, SOMAXCONN) != 0)
     return Fail(errno == EADDRINUSE ? Status::kBusy : Status::kBadAddress, name);
   socklen_t size = sizeof where;
   if (::getsockname(listener_, reinterpret_cast<sockaddr*>(&where), &size) != 0) return Fail(Status::kBadAddress, name);
@@ -76,26 +76,29 @@ Status TcpServer::Poll(int timeout_ms) {
     // A socket with an unsent reply is only written to, so a client that does not read cannot pile up requests here.
     const short wanted = slots_[i].out.empty() ? POLLIN : POLLOUT;
     watched[1 + i] = {slots_[i].socket, wanted, 0};
-    if (Asked(i)) timeout_ms = 0;
+    if (Waits(i)) timeout_ms = 0;
   }
   const bool some = ::poll(watched, 1 + kSlots, timeout_ms) > 0;
   for (int i = 0; i < kSlots; ++i)
-    if (slots_[i].socket >= 0 && ((some && watched[1 + i].revents != 0) || Asked(i))) Serve(i);
-  if (some && watched[0].revents != 0) Accept();
+    if (slots_[i].socket >= 0 && ((some && watched[1 + i].revents != 0) || Waits(i))) Serve(i);
+  if (some && watched[0].revents != 0)
+    for (int k = 0; k < limits_.slots && Accept(); ++k) {
+    }
   for (Slot& slot : slots_) CloseLate(slot);
   return Status::kOk;
 }
 
-void TcpServer::Accept() {
+// False: nobody is waiting to be accepted.
+bool TcpServer::Accept() {
   sockaddr_in from{};
   socklen_t size = sizeof from;
   const int socket = ::accept4(listener_, reinterpret_cast<sockaddr*>(&from), &size, SOCK_NONBLOCK | SOCK_CLOEXEC);
-  if (socket < 0) return;
+  if (socket < 0) return false;
   const std::uint32_t address = from.sin_addr.s_addr;
   const int i = FreeSlot(address);
   if (i < 0) {
     ::close(socket);
-    return;
+    return true;
   }
   const int on = 1;
   ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
@@ -104,11 +107,12 @@ void TcpServer::Accept() {
   slots_[i].address = address;
   slots_[i].active_ms = clock_.Ms();
   service_.open(service_.context, i);
+  return true;
 }
 
 // -1: there is none for this address.
 int TcpServer::FreeSlot(std::uint32_t address) {
-  for (int i = 0; i < kSlots; ++i)
+  for (int i = 0; i < limits_.slots; ++i)
     if (slots_[i].socket < 0) return i;
   return MakeRoom(address);
 }
@@ -117,7 +121,7 @@ int TcpServer::FreeSlot(std::uint32_t address) {
 int TcpServer::MakeRoom(std::uint32_t address) {
   const auto held = [&](std::uint32_t by) {
     int count = 0;
-    for (const Slot& slot : slots_) count += slot.address == by;
+    for (const Slot& slot : slots_) count += slot.socket >= 0 && slot.address == by;
     return count;
   };
   const bool has_some = held(address) > 0;
@@ -125,7 +129,7 @@ int TcpServer::MakeRoom(std::uint32_t address) {
   for (const Slot& slot : slots_) most = held(slot.address) > most ? held(slot.address) : most;
   const std::uint32_t now = clock_.Ms();
   int goes = -1;
-  for (int i = 0; i < kSlots; ++i) {
+  for (int i = 0; i < limits_.slots; ++i) {
     const Slot& slot = slots_[i];
     const bool may_go =
         has_some ? slot.address == address && now - slot.active_ms >= limits_.unused_ms : held(slot.address) >= most;
@@ -136,7 +140,7 @@ int TcpServer::MakeRoom(std::uint32_t address) {
   return goes;
 }
 
-// Sends what waits. Then receives and answers until no request is there, or the socket takes no more of a reply.
+// Sends what waits. Then answers one request, of those that are there or have just come.
 void TcpServer::Serve(int index) {
   Slot& slot = slots_[index];
   if (!Send(slot)) return Close(slot);
@@ -156,27 +160,21 @@ void TcpServer::Receive(Slot& slot) {
   }
 }
 
-// Requests are taken one by one, and only while their replies find room in the socket.
+// Takes at most one request, and only while the last reply has found room in the socket. False: the connection is gone.
 bool TcpServer::Answer(int index) {
   Slot& slot = slots_[index];
-  std::size_t taken = 0;
-  for (bool asked = Asked(index); (asked || taken < slot.in.size()) && slot.out.empty();) {
-    std::size_t used = 0;
-    std::size_t reply_bytes = 0;
-    slot.out.resize(service_.max_reply);
-    const bool sound = service_.receive(service_.context, index, slot.in.data() + taken, slot.in.size() - taken, &used,
-                                        slot.out.data(), &reply_bytes);
-    slot.out.resize(reply_bytes);
-    taken += used;
-    const bool mid_frame = service_.mid_frame(service_.context, index);
-    if (mid_frame && !(slot.mid_frame && reply_bytes == 0)) slot.frame_ms = clock_.Ms();
-    slot.mid_frame = mid_frame;
-    if (!sound || !Send(slot)) return false;
-    asked = false;
-    if (Asked(index)) break;
-  }
-  slot.in.erase(slot.in.begin(), slot.in.begin() + static_cast<std::ptrdiff_t>(taken));
-  return true;
+  if (!slot.out.empty() || (slot.in.empty() && !Asked(index))) return true;
+  std::size_t used = 0;
+  std::size_t reply_bytes = 0;
+  slot.out.resize(service_.max_reply);
+  const bool sound =
+      service_.receive(service_.context, index, slot.in.data(), slot.in.size(), &used, slot.out.data(), &reply_bytes);
+  slot.out.resize(reply_bytes);
+  slot.in.erase(slot.in.begin(), slot.in.begin() + static_cast<std::ptrdiff_t>(used));
+  const bool mid_frame = service_.mid_frame(service_.context, index);
+  if (mid_frame && !(slot.mid_frame && reply_bytes == 0)) slot.frame_ms = clock_.Ms();
+  slot.mid_frame = mid_frame;
+  return sound && Send(slot);
 }
 
 // False: the connection is gone.

@@ -31,16 +31,18 @@ struct TcpLimits {
   std::uint32_t idle_ms = 60000;          // a connection without any byte is closed; 0: never
   std::uint32_t partial_frame_ms = 2000;  // and one whose frame is not complete after this time
   std::uint32_t unused_ms = 10000;        // one without a byte for so long makes room for the next of its address
+  int slots = 16;                         // connections at once; 1 to TcpServer::kSlots
 };
 
 // It has fixed slots and one thread, and it never waits for a client. From a client that does not read its replies it
-// reads no requests. While slots are free, any address gets one. When all are taken, one is kept for an address that
+// reads no requests. In each turn a connection gets one request answered, so one that floods does not hold up the
+// others. While slots are free, any address gets one. When all are taken, one is kept for an address that
 // has none: the address with the most connections then loses the one that has been silent longest. An address that has
 // some may replace an unused one of its own. A connection that the service keeps is never closed for another one. A
 // connection for which there is no slot is accepted and closed. Context of every call: background.
 class TcpServer {
  public:
-  static constexpr int kSlots = 4;
+  static constexpr int kSlots = 16;
 
   TcpServer(const ByteService& service, const hardware::Clock& clock, const TcpLimits& limits = {});
   ~TcpServer();
@@ -70,12 +72,14 @@ class TcpServer {
   };
 
   core::Status Fail(core::Status status, const std::string& what);
-  void Accept();
+  bool Accept();
   int FreeSlot(std::uint32_t address);
   int MakeRoom(std::uint32_t address);
   void Serve(int slot);
   void Receive(Slot& slot);
   bool Asked(int index) const { return service_.asked != nullptr && service_.asked(service_.context, index); }
+  // There is something to do that the socket does not tell.
+  bool Waits(int index) const { return Asked(index) || (slots_[index].out.empty() && !slots_[index].in.empty()); }
   bool Answer(int index);
   bool Send(Slot& slot);
   void Close(Slot& slot);

@@ -6,12 +6,12 @@
 namespace armcal::link {
 
 // A session is a TCP connection, or a serial line for as long as the power is on. Session numbers repeat only after
-// some 2^28 sessions. Session 0 is the firmware itself, which asks without a connection. Another session may take over
+// some 2^27 sessions. Session 0 is the firmware itself, which asks without a connection. Another session may take over
 // what a session owns (the seat, a recording) when that session has ended, or when it has sent no request during the
 // last kPatience_ms. Context of every call: background.
 class Sessions {
  public:
-  static constexpr int kMost = 12;
+  static constexpr int kMost = 20;
   static constexpr std::uint32_t kPatience_ms = 10000;
   static constexpr std::uint32_t kNobody = 0xFFFFFFFF;
 
@@ -20,8 +20,8 @@ class Sessions {
   std::uint32_t Begin() {
     for (std::uint32_t slot = 0; slot < kMost; ++slot) {
       if (open_[slot] != 0) continue;
-      begun_ = begun_ % 0x0FFFFFFEu + 1;
-      open_[slot] = begun_ * 16 + slot;
+      begun_ = begun_ % 0x07FFFFFEu + 1;
+      open_[slot] = begun_ * kRoom + slot;
       seen_ms_[slot] = now_ms_;
       return open_[slot];
     }
@@ -29,23 +29,23 @@ class Sessions {
   }
   // The session's connection is gone. A session that is not open is ignored.
   void End(std::uint32_t session) {
-    if (IsOpen(session) && session != 0) open_[session % 16] = 0;
+    if (IsOpen(session) && session != 0) open_[session % kRoom] = 0;
   }
   // From now on until the next call, requests are this session's.
   void Ask(std::uint32_t session) {
     asking_ = session;
-    if (IsOpen(session) && session != 0) seen_ms_[session % 16] = now_ms_;
+    if (IsOpen(session) && session != 0) seen_ms_[session % kRoom] = now_ms_;
   }
   // The present time. Call it in every turn of the background.
   void Tell(std::uint32_t now_ms) { now_ms_ = now_ms; }
 
   std::uint32_t asking() const { return asking_; }
   bool IsOpen(std::uint32_t session) const {
-    return session == 0 || (session % 16 < kMost && open_[session % 16] == session);
+    return session == 0 || (session % kRoom < kMost && open_[session % kRoom] == session);
   }
   // Open, and it has asked a short while ago. The firmware itself never keeps others from anything.
   bool IsPresent(std::uint32_t session) const {
-    return session != 0 && IsOpen(session) && now_ms_ - seen_ms_[session % 16] < kPatience_ms;
+    return session != 0 && IsOpen(session) && now_ms_ - seen_ms_[session % kRoom] < kPatience_ms;
   }
 
   // The seat: the one session that has unlocked, or kNobody.
@@ -54,6 +54,7 @@ class Sessions {
   void SetWriter(std::uint32_t session) { writer_ = session; }
 
  private:
+  static constexpr std::uint32_t kRoom = 32;  // a session's number modulo kRoom is its place in the lists
   std::uint32_t open_[kMost] = {}, seen_ms_[kMost] = {};
   std::uint32_t begun_ = 0, asking_ = 0, writer_ = kNobody, now_ms_ = 0;
 };

@@ -46,10 +46,12 @@ class TcpService {
 
   explicit TcpService(PduEngine& engine, Rights rights = Rights::kReadWrite) : engine_(engine), rights_(rights) {}
 
-  // A new connection has taken the slot. If all sessions are in use, it is served as session 0 (see Sessions::Begin).
+  // A new connection has taken the slot. A connection that may only read owns nothing, so it needs no session. If all
+  // sessions are in use, it is served as session 0 (see Sessions::Begin).
   static void Open(void* context, int slot) {
     Self(context).framers_[slot].Reset();
-    Self(context).Restart(slot, Self(context).engine_.sessions().Begin());
+    const bool writes = Self(context).rights_ == Rights::kReadWrite;
+    Self(context).Restart(slot, writes ? Self(context).engine_.sessions().Begin() : 0);
   }
   // The slot's connection is gone.
   static void Close(void* context, int slot) { Self(context).Restart(slot, 0); }

@@ -182,7 +182,7 @@ TEST(TcpServer, ClientThatDoesNotRead_StallsOnlyItself) {
   })) << "the deaf connection is idle, too";
 }
 
-TEST(TcpServer, FifthConnection_IsTurnedAway_AndSlotsAreReused) {
+TEST(TcpServer, ConnectionBeyondTheSlots_IsTurnedAway_AndSlotsAreReused) {
   test::TestServer server;
   {
     RawClient a(server.port()), b(server.port()), c(server.port()), d(server.port());
@@ -260,6 +260,41 @@ TEST(TcpServer, AnUnusedConnection_MakesRoomForTheNextOfItsAddress) {
   RawClient e(server.port());
   EXPECT_TRUE(Answers(e));
   EXPECT_TRUE(a.Closed());
+}
+
+// A service whose requests are single bytes. It writes down whose request it takes.
+struct TakenTurns {
+  std::vector<int> slots;
+
+  static void Open(void*, int) {}
+  static bool Receive(void* self, int slot, const std::uint8_t*, std::size_t count, std::size_t* used, std::uint8_t*,
+                      std::size_t* reply_bytes) {
+    *used = count > 0, *reply_bytes = 0;
+    if (count > 0) static_cast<TakenTurns*>(self)->slots.push_back(slot);
+    return true;
+  }
+  static bool MidFrame(void*, int) { return false; }
+};
+
+TEST(TcpServer, ClientsTakeTurns_HoweverMuchOneHasSent) {
+  TakenTurns turns;
+  const auto stopped = [](void*) { return std::uint32_t{0}; };
+  port_linux::TcpServer server({&turns, 1, &TakenTurns::Open, &TakenTurns::Receive, &TakenTurns::MidFrame},
+                               {nullptr, stopped, stopped});
+  ASSERT_EQ(server.Listen("127.0.0.1", 0), core::Status::kOk);
+  RawClient flooding(server.port()), modest(server.port());
+  while (server.connections() < 2) ASSERT_EQ(server.Poll(10), core::Status::kOk);
+  flooding.Send(Bytes(100, 7));
+  while (turns.slots.empty()) ASSERT_EQ(server.Poll(10), core::Status::kOk);
+  modest.Send(Bytes(3, 7));
+  while (turns.slots.size() < 103) ASSERT_EQ(server.Poll(10), core::Status::kOk);
+  int modest_done = 0, at = 0;
+  for (const int slot : turns.slots) {
+    ++at;
+    modest_done += slot == 1;
+    if (modest_done == 3) break;
+  }
+  EXPECT_LE(at, 10) << "three requests of the modest client came to their turn late";
 }
 
 TEST(TcpServer, PortInUse_IsSaidClearly) {

@@ -61,7 +61,8 @@ class TestServer {
   std::atomic<std::uint32_t> jumped_ms_{0};
   port_linux::TcpServer server_{{&service_, Service::kMaxReply, &Service::Open, &Service::Receive, &Service::MidFrame,
                                  &Service::Close, &Service::Keep, &Service::Asked},
-                                {this, &Ticks, &Ms}};
+                                {this, &Ticks, &Ms},
+                                {.slots = 4}};
   std::atomic<int> connections_{0};
   std::atomic<bool> stop_{false};
   std::thread thread_;

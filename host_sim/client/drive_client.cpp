@@ -113,7 +113,11 @@ void DriveClient::AfterFailure(bool late) {
   connection_.reset();
 }
 
-void DriveClient::Request(const std::string& what, const std::function<int(_modbus*)>& call, Patience patience) {
+// reads: it changes nothing. Modbus TCP has no checksum of its own, and a request that was damaged on the way is
+// refused; so a refusal to read is believed when it comes twice.
+void DriveClient::Request(const std::string& what, const std::function<int(_modbus*)>& call, Patience patience,
+                          bool reads) {
+  int refused = 0;  // the exception of the attempt before
   const auto start = std::chrono::steady_clock::now();
   for (int attempt = 0;; ++attempt) {
     const bool over = std::chrono::steady_clock::now() - start >= kBudget;
@@ -122,7 +126,11 @@ void DriveClient::Request(const std::string& what, const std::function<int(_modb
       if (!connection_) Connect();
       SetTimeout(patience, attempt);
       if (call(connection_.get()) >= 0) return;
-      if (const int exception = ExceptionCode(errno)) Refused(what, exception);
+      if (const int exception = ExceptionCode(errno)) {
+        if (!reads || exception == refused || attempt + 1 >= kTcpAttempts) Refused(what, exception);
+        refused = exception;
+        continue;
+      }
       failure = fmt::format("{}: {}: {}", name_, what, modbus_strerror(errno));
       AfterFailure(errno == ETIMEDOUT);
     } catch (const LinkError& error) {  // it cannot connect; a line that was pulled out may be plugged in again
@@ -153,10 +161,11 @@ std::vector<std::uint16_t> DriveClient::ReadWords(bool input, int first, int cou
     const int part = std::min(kChunk, count - done);
     const std::string what =
         fmt::format("reading {} registers from {} 0x{:04X}", part, input ? "input" : "holding", first + done);
-    Request(what, [&](modbus_t* c) {
+    const auto read = [&](modbus_t* c) {
       return input ? modbus_read_input_registers(c, first + done, part, words.data() + done)
                    : modbus_read_registers(c, first + done, part, words.data() + done);
-    });
+    };
+    Request(what, read, Patience::kNormal, true);
   }
   return words;
 }

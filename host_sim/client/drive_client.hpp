@@ -112,8 +112,8 @@ class DriveClient {
 
   DriveClient(std::string name, int unit, std::function<_modbus*()> open);
   void Connect();
-  void Request(const std::string& what, const std::function<int(_modbus*)>& call,
-               Patience patience = Patience::kNormal);
+  void Request(const std::string& what, const std::function<int(_modbus*)>& call, Patience patience = Patience::kNormal,
+               bool reads = false);
   void SetTimeout(Patience patience, int attempt);
   void AfterFailure(bool late);
   int QuietMs() const;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <thread>
+#include <tuple>
 
 #include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
@@ -26,7 +27,7 @@ constexpr auto kPatience = std::chrono::seconds(60);      // twice the drive's o
 constexpr auto kSeatPatience = std::chrono::seconds(15);  // longer than a silent writer keeps its seat
 constexpr auto kSeatPoll = std::chrono::milliseconds(200);
 constexpr int kRounds = 5;    // a broken connection or a damaged word costs one
-constexpr int kReadings = 3;  // of a register that reads back differently
+constexpr int kReadings = 5;  // of what reads back differently
 
 // The PC's part of bringing a table in force: by a save, or on trial.
 class Flash {
@@ -83,6 +84,15 @@ class Flash {
     }
   }
 
+  // The end of a command that was taken, with the table read back.
+  DriveStatus Proven() {
+    return Sent([&] {
+      const DriveStatus s = AwaitEnd();
+      Verify(s);
+      return s;
+    });
+  }
+
  private:
   // Signed with the next counter if the drive asks for it. A counter is used once, so each round takes another one.
   std::vector<std::uint16_t> AsTheDriveWants(std::span<const std::uint16_t> words) {
@@ -112,7 +122,7 @@ class Flash {
   template <class Commands>
   void Repeat(Commands commands) {
     for (int round = 1;; ++round) try {
-        sequence_ = drive_.ReadStatus().command_sequence;
+        sequence_ = ReadTwice().command_sequence;
         finishing_ = 0;
         TakeSeat();
         return commands();
@@ -140,10 +150,21 @@ class Flash {
       }
   }
 
+  // Once the table is sent, a refusal to read something does not mean that the table was refused.
+  template <class Look>
+  DriveStatus Sent(Look look) {
+    try {
+      return look();
+    } catch (const RefusedError& error) {
+      if (error.exception == 0) throw;
+      throw LinkError(fmt::format("{}: the table was sent and cannot be read back: {}", drive_.name(), error.what()));
+    }
+  }
+
   // A command whose reply was damaged or lost may be under way, or done.
   bool IsCarriedOut() {
     if (finishing_ == 0) return false;
-    const DriveStatus s = drive_.ReadStatus();
+    const DriveStatus s = Sent([&] { return ReadTwice(); });
     return s.command_sequence == sequence_ && (s.transaction_state == link::TransactionState::kCommitting ||
                                                s.transaction_state == link::TransactionState::kActive ||
                                                s.transaction_state == link::TransactionState::kOnTrial);
@@ -185,11 +206,10 @@ class Flash {
     }
   }
 
- public:
   DriveStatus AwaitEnd() {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
     while (std::chrono::steady_clock::now() < deadline) {
-      const DriveStatus s = drive_.ReadStatus();
+      const DriveStatus s = ReadTwice();
       if (s.transaction_state == link::TransactionState::kActive ||
           s.transaction_state == link::TransactionState::kOnTrial)
         return s;
@@ -203,22 +223,30 @@ class Flash {
   }
 
   void Verify(const DriveStatus& s) {
-    const std::vector<std::uint16_t> back = drive_.Read(SpanOf(reg::kActiveTable, static_cast<int>(words_.size())));
-    for (std::size_t k = 0; k < words_.size(); ++k)
-      if (back[k] != words_[k] && !ReadsBack(k))
-        throw VerifyError(fmt::format("{}: register 0x{:04X} of the active table reads back differently", drive_.name(),
-                                      reg::kActiveTable + static_cast<int>(k)));
-    if (s.active_crc != crc_ || s.table_status != core::Status::kOk)
-      throw VerifyError(fmt::format("{}: active table has CRC 0x{:08X} ({}), expected 0x{:08X}", drive_.name(),
-                                    s.active_crc, StatusName(s.table_status), crc_));
+    const std::vector<std::uint16_t> back = ReadActiveTable(drive_);
+    const auto differs = std::mismatch(back.begin(), back.end(), words_.begin(), words_.end()).first - back.begin();
+    if (back != words_)
+      throw VerifyError(fmt::format("{}: register 0x{:04X} of the active table reads back differently", drive_.name(),
+                                    reg::kActiveTable + static_cast<int>(differs)));
+    if (s.table_status != core::Status::kOk)
+      throw VerifyError(fmt::format("{}: the table reads back, but the drive says of it: {}", drive_.name(),
+                                    StatusName(s.table_status)));
   }
 
- private:
-  // Damage on the way does not come back at the same place.
-  bool ReadsBack(std::size_t word) {
-    for (int k = 0; k < kReadings; ++k)
-      if (drive_.ReadHolding(reg::kActiveTable + static_cast<int>(word), 1)[0] == words_[word]) return true;
-    return false;
+  // Modbus TCP has no checksum of its own. So what is decided on is read until two answers in a row say the same. They
+  // never do only if the transaction goes on meanwhile; then the last one counts.
+  DriveStatus ReadTwice() {
+    DriveStatus s = drive_.ReadStatus();
+    for (int k = 0; k < kReadings; ++k) {
+      const DriveStatus before = s;
+      s = drive_.ReadStatus();
+      const auto decisive = [](const DriveStatus& d) {
+        return std::tuple(d.transaction_state, d.transaction_status, d.table_status, d.generation, d.active_crc,
+                          d.command_sequence, d.store_sequence);
+      };
+      if (decisive(s) == decisive(before)) break;
+    }
+    return s;
   }
 
   DriveClient& drive_;
@@ -237,17 +265,17 @@ namespace {
 template <class Send>
 FlashReport Carry(DriveClient& drive, const Key* key, Send send) {
   Flash flash(drive, key);
-  DriveStatus s;
   try {
     send(flash);
-    s = flash.AwaitEnd();
-  } catch (const RefusedError&) {
+    const DriveStatus s = flash.Proven();
+    flash.LeaveSeat();
+    return {s.active_crc, s.generation, s.store_sequence};
+  } catch (const LinkError&) {
+    throw;
+  } catch (const std::runtime_error&) {
     flash.LeaveSeat();
     throw;
   }
-  flash.LeaveSeat();
-  flash.Verify(s);
-  return {s.active_crc, s.generation, s.store_sequence};
 }
 
 void Expect(DriveClient& drive, const char* what) {
@@ -299,8 +327,15 @@ FlashReport Rollback(DriveClient& drive, const Key* key) {
 
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive) {
   const Identity id = drive.ReadIdentity();
-  const int words = id.map_minor < kMinorOfLayout2 ? id.table_words : drive.ReadValue<reg::kActiveWords>();
-  return drive.Read(SpanOf(reg::kActiveTable, words));
+  for (int k = 1;; ++k) {
+    const int count = id.map_minor < kMinorOfLayout2 ? id.table_words : drive.ReadValue<reg::kActiveWords>();
+    const std::vector<std::uint16_t> words = drive.Read(SpanOf(reg::kActiveTable, count));
+    const std::uint32_t crc = core::Crc32Words(words.data(), words.size()), told = drive.ReadValue<reg::kActiveCrc>();
+    if (crc == told) return words;
+    if (k == kReadings)
+      throw VerifyError(fmt::format("{}: the active table reads with CRC 0x{:08X}, the drive says 0x{:08X}",
+                                    drive.name(), crc, told));
+  }
 }
 
 }  // namespace armcal::client

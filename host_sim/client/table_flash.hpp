@@ -42,7 +42,7 @@ void EndTrial(DriveClient& drive);
 // Stores and adopts the table that was stored before the one in force. Throws as FlashTable.
 FlashReport Rollback(DriveClient& drive, const Key* key = nullptr);
 
-// The table in force.
+// The table in force, which the drive's own checksum of it confirms. Throws VerifyError if it never does.
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive);
 
 }  // namespace armcal::client

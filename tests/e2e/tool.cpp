@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <fstream>
 
@@ -48,7 +49,7 @@ int WaitFor(pid_t child) {
 }
 
 Outcome RunProgram(const std::vector<std::string>& words) {
-  static int run = 0;
+  static std::atomic<int> run{0};
   const std::string base = ARMCAL_E2E_FOLDER "/run_" + std::to_string(getpid()) + "_" + std::to_string(++run);
   fs::create_directories(ARMCAL_E2E_FOLDER);
   const int out = open((base + ".out").c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0644),

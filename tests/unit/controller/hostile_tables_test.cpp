@@ -19,6 +19,7 @@
 #include "codegen/generated/two_link/model.hpp"
 #include "codegen/generated/ur10/model.hpp"
 #include "codegen/src/robot/robot.hpp"
+#include "tests/target/hostile_tables.hpp"
 #include "tests/unit/table/nor_flash.hpp"
 
 namespace armcal::hostile_tables {
@@ -27,27 +28,7 @@ namespace {
 using core::Status;
 using Words = std::vector<std::uint16_t>;
 
-// What Controller does with a table at the command check; a test below compares the two.
-template <class Model>
-class Judge {
- public:
-  core::Refusal operator()(const Words& words) {
-    core::Refusal r = model::CheckWords(model::View(Model::kCeilings), true, words.data());
-    if (core::IsOk(r.status)) r.status = model::Decode(words.data(), Model::kSchema, table_);
-    if (core::IsOk(r.status)) r.status = estimator::BuildAdoptedTable(table_, 1, rigid_, adopted_);
-    if (core::IsOk(r.status))
-      r = model::CheckFriction(adopted_.committed, model::View(Model::kCeilings), memory_, rows_);
-    return r;
-  }
-  const model::Committed<Model>& committed() const { return adopted_.committed; }
-
- private:
-  estimator::Table<Model> table_;
-  physical::RigidPrior<Model, float> rigid_;
-  estimator::AdoptedTable<Model> adopted_;
-  model::Memory<Model> memory_;
-  model::Rows<Model> rows_;
-};
+using target::Judge;
 
 template <class Model>
 Words DefaultWords() {
@@ -63,7 +44,7 @@ void ExpectDefaultWithinCeilings() {
   const core::Refusal r = model::CheckWords(model::View(Model::kCeilings), false, words.data());
   EXPECT_EQ(r.status, Status::kOk) << Model::kName << ", word " << r.word << ": " << r.value << ", bound " << r.bound;
   const auto judge = std::make_unique<Judge<Model>>();
-  const core::Refusal all = (*judge)(words);
+  const core::Refusal all = (*judge)(words.data());
   EXPECT_TRUE(all.status == Status::kOk || all.status == Status::kUnphysical)
       << Model::kName << ", status " << static_cast<int>(all.status) << ", word " << all.word << ": " << all.value;
 }
@@ -78,11 +59,11 @@ TEST(Ceilings, EveryDefaultTable_IsAccepted) {
   ExpectDefaultWithinCeilings<generated::TwoLink>();
 }
 
-using Model = generated::Er20Like;
+using Model = target::HostileTables::Model;
 constexpr int n = Model::kJoints, kParameters = Model::kParameters;
 
-int JointWord(int joint, int part) { return model::kHeaderWords + 8 * joint + 2 * part; }
-int ParameterWord(int k, int part) { return model::kHeaderWords + 8 * n + 8 * k + 2 * part; }
+int JointWord(int joint, int part) { return target::HostileTables::JointWord(joint, part); }
+int ParameterWord(int k, int part) { return target::HostileTables::ParameterWord(k, part); }
 int GateWord(int joint) { return ParameterWord(kParameters, 0) + 2 * joint; }
 float At(const Words& words, int word) { return core::GetF32(&words[word]); }
 void Put(Words& words, int word, float value) { core::PutF32(&words[word], value); }
@@ -90,66 +71,12 @@ void Put(Words& words, int word, float value) { core::PutF32(&words[word], value
 class Hostile {
  public:
   Words Next() {
-    Words words = DefaultWords<Model>();
-    const bool near = Draw() % 2 == 0;
-    const unsigned changes = 1 + Draw() % 3;
-    for (unsigned k = 0; k < changes; ++k) near ? Near(words) : Far(words);
-    if (Draw() % 2 == 0) {
-      words[5] = 1;
-      core::PutU32(&words[6], static_cast<std::uint32_t>(Around(500.0f)));
-    }
-    return words;
+    const std::uint16_t* const words = tables_.Next();
+    return {words, words + target::HostileTables::kWords};
   }
 
  private:
-  unsigned Draw() { return static_cast<unsigned>(random_()); }
-  double Share() { return Draw() / 4294967296.0; }
-  // Within 1 % of the bound.
-  float Around(float bound) { return static_cast<float>(bound * (0.99 + 0.02 * Share())); }
-
-  void Near(Words& words) {
-    const model::Ceilings<n, kParameters>& c = Model::kCeilings;
-    if (Draw() % 2 == 0) {
-      const int j = static_cast<int>(Draw() % n), part = static_cast<int>(Draw() % 4);
-      const model::JointCeiling& joint = c.joint[j];
-      const float low[] = {joint.sigma_low_Nm, joint.v_min_low_radps, joint.torque_Nm, joint.scale_low};
-      const float high[] = {joint.sigma_high_Nm, joint.v_min_high_radps, joint.torque_Nm, joint.scale_high};
-      return Put(words, JointWord(j, part), Around(Draw() % 2 ? low[part] : high[part]));
-    }
-    const int front = Model::kBodyParameters + static_cast<int>(Draw() % Model::kFront);
-    const int k = Draw() % 2 ? front : static_cast<int>(Draw() % kParameters);
-    const model::ParameterCeiling& p = c.parameter[k];
-    const float bound[] = {Draw() % 2 ? p.low : p.high, p.sd, p.process_noise};
-    const int part = static_cast<int>(Draw() % 3);
-    Put(words, ParameterWord(k, part), Around(bound[part]));
-    // Coulomb friction close to the least that brakes, with viscous friction of either sign.
-    if (k >= Model::kBodyParameters && Draw() % 2) {
-      const int j = static_cast<int>(Draw() % n), Fc = Model::kBodyParameters + Model::kFrontBegin[j];
-      const float push = Around(c.joint[j].feed_Nm), speed = c.joint[j].speed_radps;
-      Put(words, ParameterWord(Fc, 0), Draw() % 2 ? -push : Around(c.joint[j].torque_Nm) * 0.5f);
-      Put(words, ParameterWord(Fc + 1, 0), (Draw() % 2 ? -1.0f : 1.0f) * Around(c.joint[j].torque_Nm) * 0.5f / speed);
-    }
-  }
-
-  void Far(Words& words) {
-    const float odd[] = {std::numeric_limits<float>::infinity(), std::nanf(""), 1e30f, -1e30f, -1e6f, 1e-42f, 0.0f};
-    const int word = static_cast<int>(5 + Draw() % (words.size() - 5));
-    switch (Draw() % 4) {
-      case 0:
-        words[word] = static_cast<std::uint16_t>(Draw());
-        return;
-      case 1:
-        return Put(words, word - word % 2, odd[Draw() % 7]);
-      case 2: {
-        const double size = std::pow(10.0, 12.0 * Share() - 4.0);
-        return Put(words, word - word % 2, static_cast<float>(Draw() % 2 ? size : -size));
-      }
-      default:
-        return Put(words, word - word % 2, At(words, word - word % 2) * static_cast<float>(4.0 * Share()));
-    }
-  }
-
-  std::mt19937 random_{12345};
+  target::HostileTables tables_;
 };
 
 // The same judgement from the robot file and by hand, for the friction law and offset of the example arm.
@@ -237,7 +164,7 @@ TEST(Ceilings, OfHostileTables_NoneIsAcceptedBeyondThem_AndEachAcceptedOneKeepsX
   int accepted = 0, refused_by_friction = 0, fades = 0;
   for (int k = 0; k < Count() && !HasFatalFailure(); ++k) {
     const Words words = hostile.Next();
-    const core::Refusal refusal = (*judge)(words);
+    const core::Refusal refusal = (*judge)(words.data());
     refused_by_friction +=
         refusal.status == Status::kFeedsEnergy ||
         (refusal.status == Status::kBeyondCeiling && refusal.bound == Model::kCeilings.joint[0].friction_Nm);
@@ -317,7 +244,7 @@ TEST(Ceilings, TheController_RefusesTheSameTables_AndNamesTheWord) {
     };
     ASSERT_EQ(command(reg::kOpen), Status::kOk);
     ASSERT_EQ(drive->map().Write(reg::kStagedTable.address, kWords, words.data()), Status::kOk);
-    const core::Refusal expected = (*judge)(words);
+    const core::Refusal expected = (*judge)(words.data());
     EXPECT_EQ(command(reg::kCheck), expected.status) << k;
     link::Words<reg::kWritingBlock> told;
     const link::Span block = SpanOf(reg::kWritingBlock);
@@ -333,7 +260,7 @@ TEST(Ceilings, EachKindOfWord_IsRefusedByItsNumber) {
   const auto expect = [&](int word, float value, Status status) {
     Words words = DefaultWords<Model>();
     Put(words, word, value);
-    const core::Refusal r = (*judge)(words);
+    const core::Refusal r = (*judge)(words.data());
     EXPECT_EQ(r.status, status) << "word " << word << ": " << value;
     EXPECT_EQ(r.word, word) << value;
     EXPECT_TRUE(r.value == value || std::isnan(value)) << r.value;
@@ -420,7 +347,7 @@ TEST(Ceilings, ANegativeCoefficient_IsAcceptedAsLongAsTheSumBrakes) {
     Words words = DefaultWords<Model>();
     Put(words, ParameterWord(Model::kBodyParameters, 0), static_cast<float>(Fc));
     Put(words, ParameterWord(Model::kBodyParameters + 1, 0), static_cast<float>((at_top - Fc) / top_radps));
-    return (*judge)(words);
+    return (*judge)(words.data());
   };
   EXPECT_EQ(judged(60, 20).status, Status::kOk);
   EXPECT_EQ(judged(60, 0).status, Status::kOk);

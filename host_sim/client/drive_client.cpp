@@ -113,6 +113,11 @@ void DriveClient::AfterFailure(bool late) {
   connection_.reset();
 }
 
+void DriveClient::DropLateReplies() {
+  errno = 0;
+  AfterFailure(true);
+}
+
 // reads: it changes nothing. Modbus TCP has no checksum of its own, and a request that was damaged on the way is
 // refused; so a refusal to read is believed when it comes twice.
 void DriveClient::Request(const std::string& what, const std::function<int(_modbus*)>& call, Patience patience,

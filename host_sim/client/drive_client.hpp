@@ -73,6 +73,9 @@ class DriveClient {
   std::vector<std::uint16_t> WriteThenRead(int write_first, std::span<const std::uint16_t> words, int read_first,
                                            int count, Patience patience);
 
+  // The last answer belonged to an earlier request. Drops what else comes late, until a serial line is silent.
+  void DropLateReplies();
+
   // A block or a register by its declaration (registers.hpp). `trace`: 0 or 1, for registers that exist twice.
   template <const auto& kBlock>
   link::Words<kBlock> Read(int trace = 0) {

@@ -12,7 +12,7 @@ namespace reg = link::reg;
 
 namespace {
 constexpr auto kTracePoll = std::chrono::milliseconds(2);
-constexpr int kLateReplies = 3;
+constexpr int kLateReplies = 10;
 }  // namespace
 
 void StartTrace(DriveClient& drive, int trace, const TraceRequest& request) {
@@ -98,7 +98,10 @@ std::size_t TraceReader::TakeWindow(TraceRecords& records) {
     const std::uint32_t first = w.Get<reg::kWindowFirstRecord>(), first_tick = w.Get<reg::kWindowFirstTick>();
     const std::uint16_t count = w.Get<reg::kWindowCount>();
     const bool late = w.Get<reg::kWindowRecording>() == recording_ && static_cast<std::int32_t>(first - next_) < 0;
-    if (late && look < kLateReplies) continue;  // the answer to an earlier request, whose repeat was answered in time
+    if (late && look < kLateReplies) {  // the answer to an earlier request; the answers to its repeats may follow
+      drive_.DropLateReplies();
+      continue;
+    }
     records.lost = w.Get<reg::kWindowLost>();
     records.state = static_cast<TraceState>(w.Get<reg::kWindowState>());
     if (!IsNext(records, w.Get<reg::kWindowRecording>(), first, first_tick, count)) return 0;

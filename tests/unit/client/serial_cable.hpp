@@ -41,6 +41,11 @@ struct Cable {
   double latency_s = 0.016;    // an adapter keeps fewer bytes than kPacket so long
   double error_rate = 0;       // of a byte: one of its bits flips
   unsigned seed = 1;
+  // May change what the drive sends, portion by portion.
+  void (*change)(char* bytes, std::size_t count) = nullptr;
+  // Once the drive has sent so many bytes, nothing of it arrives for stall_s; then all of it arrives at once.
+  int stall_at = 0;
+  double stall_s = 0;
 };
 
 class SerialCable {
@@ -55,8 +60,6 @@ class SerialCable {
   const std::string& client() const { return client_.path; }
   const std::string& drive() const { return drive_.path; }
   int errors() const { return errors_; }
-  // While it is pulled out, nothing passes.
-  void PullOut(bool out) { out_ = out; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -83,20 +86,26 @@ class SerialCable {
     }
   }
 
+  static Clock::duration Seconds(double s) {
+    return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(s));
+  }
+
   void Carry(Way& way) {
-    const auto byte_time =
-        std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1 / cable_.bytes_per_s));
-    const auto latency = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(cable_.latency_s));
+    const auto byte_time = Seconds(1 / cable_.bytes_per_s), latency = Seconds(cable_.latency_s);
     const Time now = Clock::now();
     char bytes[256];
-    for (ssize_t k = 0, count = ::read(way.from, bytes, sizeof bytes); k < count; ++k) {
+    const ssize_t count = ::read(way.from, bytes, sizeof bytes);
+    if (way.adapter && cable_.change != nullptr && count > 0) cable_.change(bytes, static_cast<std::size_t>(count));
+    for (ssize_t k = 0; k < count; ++k) {
       way.free = std::max(way.free, now) + byte_time;
       if (std::uniform_real_distribution<>(0, 1)(random_) < cable_.error_rate) {
         bytes[k] = static_cast<char>(bytes[k] ^ (1 << random_() % 8));
         ++errors_;
       }
-      if (!out_) way.wire.emplace_back(way.free, bytes[k]);
+      way.wire.emplace_back(way.free, bytes[k]);
+      if (way.adapter && ++sent_ == cable_.stall_at) stalled_until_ = now + Seconds(cable_.stall_s);
     }
+    if (way.adapter && now < stalled_until_) return;
     while (!way.wire.empty() && way.wire.front().first <= now) {
       if (way.packet.empty()) way.packet_since = way.wire.front().first;
       way.packet.push_back(way.wire.front().second);
@@ -115,7 +124,9 @@ class SerialCable {
   std::mt19937 random_;
   Terminal client_, drive_;
   std::atomic<int> errors_{0};
-  std::atomic<bool> stop_{false}, out_{false};
+  int sent_ = 0;  // bytes of the drive
+  Time stalled_until_{};
+  std::atomic<bool> stop_{false};
   std::thread thread_;
 };
 

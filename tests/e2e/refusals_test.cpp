@@ -6,6 +6,7 @@
 
 #include "host_sim/client/drive_client.hpp"
 #include "host_sim/client/vendor_registers.hpp"
+#include "host_sim/data/files/files.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "tests/e2e/tool.hpp"
 
@@ -49,6 +50,22 @@ class BadFiles : public testing::Test {
   }
   fs::path folder_ = FreshFolder("bad_files");
 };
+
+// 1.6 GB in a file of 1.6 MB, and a log of 200,000 columns.
+TEST_F(BadFiles, MadeToFillTheMemory_AreRefusedWithinTwoHundredMegabytes) {
+  files::WriteWholeFile(folder_ / "part.gz", std::string(std::size_t{64} << 20, '0'));
+  const std::string part = ReadText(folder_ / "part.gz");
+  std::string bomb, columns = "t";
+  for (int k = 0; k < 24; ++k) bomb += part;  // gzip data may follow gzip data
+  for (int k = 0; k < 200000; ++k) columns += ",c" + std::to_string(k);
+  for (const auto& [log, named] : {std::pair{Write("bomb.csv.gz", bomb), "more than 60 times its size"},
+                                   std::pair{Write("columns.csv", columns + "\n"), "more than 4096 columns"}}) {
+    const Outcome o = Tool({"identify", "--robot", "er20_like", "--train", log.string()});
+    ExpectOneLine(o, kBadInput, named);
+    EXPECT_LT(o.peak_kB, 200000) << named;
+    std::printf("%s: %ld kB\n", named, o.peak_kB);
+  }
+}
 
 TEST_F(BadFiles, RobotFiles_AreRefused) {
   const fs::path log = Write("good.csv", LogText(400));

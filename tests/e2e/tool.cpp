@@ -3,6 +3,7 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -42,9 +43,11 @@ pid_t Start(std::vector<std::string> words, int out, int err) {
   return child;
 }
 
-int WaitFor(pid_t child) {
+int WaitFor(pid_t child, long* peak_kB) {
   int status = 0;
-  waitpid(child, &status, 0);
+  rusage used{};
+  wait4(child, &status, 0, &used);
+  if (peak_kB != nullptr) *peak_kB = used.ru_maxrss;
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
@@ -56,7 +59,9 @@ Outcome RunProgram(const std::vector<std::string>& words) {
             err = open((base + ".err").c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0644);
   const pid_t child = Start(words, out, err);
   close(out), close(err);
-  Outcome o{WaitFor(child), ReadText(base + ".out"), ReadText(base + ".err")};
+  Outcome o;
+  o.code = WaitFor(child, &o.peak_kB);
+  o.out = ReadText(base + ".out"), o.err = ReadText(base + ".err");
   fs::remove(base + ".out"), fs::remove(base + ".err");
   return o;
 }

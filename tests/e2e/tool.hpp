@@ -21,11 +21,13 @@ fs::path FreshFolder(const std::string& name);
 
 // Starts a program with its output where it is told; a null device otherwise.
 pid_t Start(std::vector<std::string> words, int out, int err);
-int WaitFor(pid_t child);
+// Returns the exit code. peak_kB: the most memory that the program held at once.
+int WaitFor(pid_t child, long* peak_kB = nullptr);
 
 struct Outcome {
   int code = -1;
   std::string out, err;
+  long peak_kB = 0;  // of memory
 };
 
 Outcome RunProgram(const std::vector<std::string>& words);

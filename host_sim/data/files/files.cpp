@@ -68,10 +68,11 @@ std::string ReadWholeFile(const fs::path& path) {
   GzHandle in(gzopen(path.c_str(), "rb"));
   if (!in) throw io::InputError(path.string() + ": cannot be opened");
   gzbuffer(in.get(), 1u << 18);
-  const std::size_t most = kExpansion * static_cast<std::size_t>(fs::file_size(path)) + kExpansionFree_bytes;
   std::string content;
   std::size_t used = 0;
   for (;;) {
+    // Judged by what has been read of the file, so that the memory stays small.
+    const std::size_t most = kExpansion * static_cast<std::size_t>(gzoffset(in.get())) + kExpansionFree_bytes;
     if (used > most)
       throw io::InputError(path.string() + ": grows to more than " + std::to_string(kExpansion) +
                            " times its size when it is decompressed, which no log does");

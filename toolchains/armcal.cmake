@@ -1,14 +1,16 @@
 # Language level, warnings and floating-point rules of every target; one place.
 option(ARMCAL_SANITIZE "address and undefined-behaviour sanitizers (host)" OFF)
+# The presets set it. A user who builds the generator or the Python package may have a compiler that warns of something else.
+option(ARMCAL_WARNINGS_ARE_ERRORS "a warning ends the build" OFF)
 
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
 add_library(armcal_rules INTERFACE)
+set(armcal_warnings -Wall -Wextra -Wpedantic $<$<BOOL:${ARMCAL_WARNINGS_ARE_ERRORS}>:-Werror> -Wshadow)
 # Contraction would make host and target differ in the last bit; fast-math would remove the NaN checks.
-target_compile_options(armcal_rules INTERFACE -Wall -Wextra -Wpedantic -Werror -Wshadow -ffp-contract=off -fno-fast-math
-                       -fno-math-errno)
+target_compile_options(armcal_rules INTERFACE ${armcal_warnings} -ffp-contract=off -fno-fast-math -fno-math-errno)
 get_filename_component(ARMCAL_TOP ${CMAKE_CURRENT_LIST_DIR} DIRECTORY)  # the checkout
 target_include_directories(armcal_rules INTERFACE ${ARMCAL_TOP}/lib)
 if(CMAKE_CROSSCOMPILING)

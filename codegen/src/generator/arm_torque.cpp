@@ -8,12 +8,13 @@ namespace armcal::codegen {
 
 ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
   const Robot& robot = model.robot();
+  const auto keep = [&](const InputId& id, Expr value) { part_.push_back({id, value}); };
   const auto add = [&](const BodyRows& rows, const auto& id) {
-    for (int i = 0; i < joints_; ++i) part_.push_back({id(i), BaseTorque(graph_, rows, model.base_columns(), i)});
+    for (int i = 0; i < joints_; ++i) keep(id(i), BaseTorque(graph_, rows, model.base_columns(), i));
   };
   const BodyRows moving = BodyRegressor(graph_, robot);
   for (int i = 0; i < joints_; ++i)
-    part_.push_back({{Quantity::kRigidTorque, i}, LoadTorque(graph_, moving, model.base_columns(), robot, i)});
+    keep({Quantity::kRigidTorque, i}, LoadTorque(graph_, moving, model.base_columns(), robot, i));
   add(BodyRegressor(graph_, robot, false), [](int i) { return InputId{Quantity::kGravityTorque, i}; });
   for (int j = 0; j < joints_; ++j)
     add(AccelerationRows(graph_, robot, j), [j](int i) { return InputId{Quantity::kMassMatrix, i, j}; });
@@ -26,8 +27,7 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
   for (int j = 0; j < joints_; ++j)
     for (int i = 0; i < joints_; ++i) {
       const Expr gravity = part_[static_cast<std::size_t>(joints_ + i)].value;
-      part_.push_back(
-          {{Quantity::kGravityStiffness, i, j}, Derivative(gravity, graph_.Input({Quantity::kPosition, j}))});
+      keep({Quantity::kGravityStiffness, i, j}, Derivative(gravity, graph_.Input({Quantity::kPosition, j})));
     }
 }
 

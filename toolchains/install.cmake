@@ -9,6 +9,7 @@ install(DIRECTORY codegen/robots codegen/effects codegen/generated DESTINATION $
 install(DIRECTORY port/template port/linux DESTINATION ${home}/port PATTERN CMakeLists.txt EXCLUDE)
 install(FILES port/PORTING.md DESTINATION ${home}/port)
 install(FILES toolchains/armcal_add_model.cmake toolchains/armcal_targets.cmake DESTINATION ${home}/toolchains)
+install(FILES package.xml DESTINATION ${home})  # where ROS looks for it
 install(FILES toolchains/armcalConfig.cmake DESTINATION ${home}/cmake)
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/armcalConfigVersion.cmake COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/armcalConfigVersion.cmake DESTINATION ${home}/cmake)

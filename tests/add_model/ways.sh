@@ -31,13 +31,16 @@ way fetch -DWAY=fetch -DARMCAL="$checkout"
 "$build/fetch/consumer"
 way subdirectory -DWAY=subdirectory -DARMCAL="$checkout"
 "$build/subdirectory/consumer"
-unset ARMCAL_GENERATE
-if command -v arm-none-eabi-g++ >/dev/null; then
-  for core in m4 m7; do
-    folder=$([[ $core == m4 ]] && echo cortex-m4f || echo cortex-m7)
-    way "$folder" -DWAY=package -DCMAKE_PREFIX_PATH="$build/prefix" -DCMAKE_TOOLCHAIN_FILE="$checkout/toolchains/$folder.cmake"
-    grep -q "FLAGS = .*-mcpu=cortex-$core" "$build/$folder/build.ninja"
-  done
-else
+if ! command -v arm-none-eabi-g++ >/dev/null; then
   echo "arm-none-eabi-g++ is not there: the Cortex-M is left out"
+  exit 0
 fi
+# for_core NAME CORE OPTIONS...
+for_core() {
+  way "$1" -DCMAKE_TOOLCHAIN_FILE="$checkout/toolchains/cortex-$2.cmake" "${@:3}"
+  grep -q "FLAGS = .*-mcpu=cortex-${2%f}" "$build/$1/build.ninja"
+}
+for_core fetch-m4f m4f -DWAY=fetch -DARMCAL="$checkout"
+for_core subdirectory-m4f m4f -DWAY=subdirectory -DARMCAL="$checkout"
+unset ARMCAL_GENERATE
+for core in m4f m7; do for_core package-$core $core -DWAY=package -DCMAKE_PREFIX_PATH="$build/prefix"; done

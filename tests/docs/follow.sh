@@ -2,15 +2,18 @@
 # tests - does what a page of docs says, block by block, in a copy of the tree.
 #   follow.sh PAGE FOLDER ARMCAL
 # A block whose first line is a comment with a path is that file; "sh" is run; "text" and "diff" are what the last "sh"
-# printed. FOLDER is emptied; ARMCAL stands for build/host/armcal.
+# printed. FOLDER is emptied; ARMCAL stands for build/host/armcal. A program that a page leaves running is named by a file *.pid.
 set -euo pipefail
 page=$(realpath "$1") folder=$2 armcal=$(realpath "$3") top=$PWD
 
 rm -rf "$folder"
+# A page that fails leaves no drive behind.
+trap 'find "$folder/build" -name "*.pid" 2>/dev/null | while read -r pid; do kill "$(cat "$pid")" 2>/dev/null || true; done' EXIT
 mkdir -p "$folder/build/host" "$folder/blocks"
 cp -r "$top"/{codegen,lib,port,host_sim,toolchains,docs,CMakeLists.txt,LICENSE,*.md} "$folder"
 ln -s "$armcal" "$folder/build/host/armcal"
 cd "$folder"
+export XDG_CACHE_HOME=$PWD/build/cache  # nothing is compiled yet
 git init -q . && git add codegen && git -c user.name=test -c user.email=test commit -qm before
 
 # blocks/01.sh, blocks/02.toml, ...
@@ -27,7 +30,7 @@ for block in blocks/*; do
     *.text | *.diff)
       diff -u "$block" out.txt || { echo "FAILED: the page shows another output (left) than its commands print (right)"; exit 1; } ;;
     *)
-      path=$(sed -n '1s,^\(#\|//\) \([A-Za-z0-9_/.]*\).*,\2,p' "$block")
+      path=$(sed -n '1s,^\(#\|//\|<!--\) \([A-Za-z0-9_/.]*\).*,\2,p' "$block")
       [[ -n $path ]] || { echo "FAILED: $block: its first line names no file"; exit 1; }
       mkdir -p "$(dirname "$path")"
       cp "$block" "$path" ;;

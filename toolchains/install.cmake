@@ -14,7 +14,7 @@ install(FILES toolchains/armcalConfig.cmake DESTINATION ${home}/cmake)
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/armcalConfigVersion.cmake COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/armcalConfigVersion.cmake DESTINATION ${home}/cmake)
 install(FILES README.md CHANGELOG.md SPEC.md SECURITY.md DESIGN.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs PATTERN findings* EXCLUDE)
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs PATTERN findings* EXCLUDE PATTERN site EXCLUDE)
 
 if(TARGET armcal)
   set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)  # an installation needs its programs and no test

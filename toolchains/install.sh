@@ -4,6 +4,7 @@
 #   toolchains/install.sh cross   compiler of the Cortex-M images
 #   toolchains/install.sh fuzz    clang with libFuzzer, for the long tests
 #   toolchains/install.sh peers   Python, its headers, pip, a browser and colcon, for tests/run.sh peers
+#   toolchains/install.sh docs    Sphinx and Doxygen, for the target docs_site
 # Does nothing when all is there. Needs root or sudo only when something is missing.
 set -euo pipefail
 
@@ -15,13 +16,15 @@ cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libs
   qemu-system-arm python3)
 fuzz_packages=(clang libclang-rt-dev)
 peers_packages=(python3 python3-dev python3-venv python3-pip chromium colcon python3-colcon-cmake python3-colcon-ros)
+docs_packages=(python3 python3-sphinx python3-myst-parser doxygen)
 
 case "${1:-}" in
   host) wanted=("${host_packages[@]}") ;;
   cross) wanted=("${cross_packages[@]}") ;;
   fuzz) wanted=("${fuzz_packages[@]}") ;;
   peers) wanted=("${peers_packages[@]}") ;;
-  *) sed -n '2,7p' "$0" >&2; exit 2 ;;
+  docs) wanted=("${docs_packages[@]}") ;;
+  *) sed -n '2,8p' "$0" >&2; exit 2 ;;
 esac
 
 missing=()

@@ -31,11 +31,10 @@ TableTransaction::TableTransaction(const TableApplication& application, table::T
       active_words_(static_cast<std::uint16_t>(store.shortest())),
       signing_(signing),
       rate_(rate),
-      saves_left_(rate.burst) {
-  active_crc_ = core::Crc32Words(active_, active_words_);
-}
+      saves_left_(rate.burst) {}
 
 Status TableTransaction::Boot() {
+  active_crc_ = core::Crc32Words(active_, active_words_);  // the application has put its defaults there by now
   table_status_ = store_.Load(staged_);
   ReadCounters();
   if (core::IsOk(table_status_)) BootFromStore();

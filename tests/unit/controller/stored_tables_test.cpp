@@ -113,6 +113,7 @@ TEST(StoredTables, AnOlderClient_ReadsTheDefaultsAndFlashesThem) {
   const std::uint16_t size = drive->Value<link::reg::kTableWords>();
   std::vector<std::uint16_t> words = drive->Read(SpanOf(link::reg::kActiveTable, size));
   EXPECT_EQ(words[2], 1);
+  EXPECT_EQ(drive->Value<link::reg::kActiveCrc>(), core::Crc32Words(words.data(), words.size()));
   core::PutF32(&words[16], 1.5f * core::GetF32(&words[16]));  // sigma of joint 1
   ASSERT_EQ(drive->Flash(words), Status::kOk);
   EXPECT_EQ(drive->Read(SpanOf(link::reg::kActiveTable, size)), words);

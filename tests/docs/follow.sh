@@ -10,7 +10,7 @@ rm -rf "$folder"
 # A page that fails leaves no drive behind.
 trap 'find "$folder/build" -name "*.pid" 2>/dev/null | while read -r pid; do kill "$(cat "$pid")" 2>/dev/null || true; done' EXIT
 mkdir -p "$folder/build/host" "$folder/blocks"
-cp -r "$top"/{codegen,lib,port,host_sim,toolchains,docs,CMakeLists.txt,LICENSE,*.md} "$folder"
+cp -r "$top"/{codegen,lib,port,host_sim,toolchains,docs,CMakeLists.txt,LICENSE,package.xml,*.md} "$folder"
 ln -s "$armcal" "$folder/build/host/armcal"
 cd "$folder"
 export XDG_CACHE_HOME=$PWD/build/cache  # nothing is compiled yet

@@ -18,23 +18,23 @@ class Sha256 {
     constexpr std::uint32_t kStart[8] = {0x6A09E667, 0xBB67AE85, 0x3C6EF372, 0xA54FF53A,
                                          0x510E527F, 0x9B05688C, 0x1F83D9AB, 0x5BE0CD19};
     for (int k = 0; k < 8; ++k) state_[k] = kStart[k];
-    bytes_ = 0;
-    fill_ = 0;
+    bytes_ = 0, carry_ = 0;
   }
-  // bytes [count]
+  // bytes [count], count: below 2^32
   void Add(const std::uint8_t* bytes, std::size_t count) {
-    bytes_ += count;
+    const std::uint32_t before = bytes_;
     for (std::size_t k = 0; k < count; ++k) {
-      block_[fill_++] = bytes[k];
-      if (fill_ == kBlockBytes) Compress();
+      block_[bytes_++ % kBlockBytes] = bytes[k];
+      if (bytes_ % kBlockBytes == 0) Compress();
     }
+    if (bytes_ < before) ++carry_;
   }
   // digest [kDigestBytes]. Begin before the next use.
   void Finish(std::uint8_t* digest) {
-    const std::uint64_t bits = bytes_ * 8;
+    const std::uint64_t bits = (std::uint64_t{carry_} << 32 | bytes_) * 8;
     const std::uint8_t end = 0x80, zero = 0;
     Add(&end, 1);
-    while (fill_ != kBlockBytes - 8) Add(&zero, 1);
+    while (bytes_ % kBlockBytes != kBlockBytes - 8) Add(&zero, 1);
     std::uint8_t length[8];
     PutBytes32(length, static_cast<std::uint32_t>(bits >> 32));
     PutBytes32(length + 4, static_cast<std::uint32_t>(bits));
@@ -72,12 +72,10 @@ class Sha256 {
     }
     const std::uint32_t sum[8] = {a, b, c, d, e, f, g, h};
     for (int k = 0; k < 8; ++k) state_[k] += sum[k];
-    fill_ = 0;
   }
 
-  std::uint64_t bytes_ = 0;  // in all
   std::uint32_t state_[8];
-  std::uint32_t fill_ = 0;  // bytes in the block
+  std::uint32_t bytes_ = 0, carry_ = 0;  // low and high half of their number
   std::uint8_t block_[kBlockBytes];
 };
 

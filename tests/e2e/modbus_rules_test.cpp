@@ -65,6 +65,12 @@ std::vector<int> Words(int quantity, int seed) {
   for (int k = 0; k < quantity; ++k) words.push_back((seed + k * 40503) & 0xFFFF);
   return words;
 }
+// A write whose byte count, and so many bytes, follow.
+Bytes Filled(Bytes pdu, int bytes) {
+  pdu.push_back(static_cast<std::uint8_t>(bytes));
+  pdu.insert(pdu.end(), static_cast<std::size_t>(bytes), 0x5A);
+  return pdu;
+}
 Bytes ReplyToRead(int function, const std::vector<int>& words) {
   return Join({static_cast<std::uint8_t>(function), static_cast<std::uint8_t>(2 * words.size())}, words);
 }
@@ -214,12 +220,7 @@ TEST_P(Requests, WritingRegisters) {
   MustRefuse(line(), WriteMany(kScratch + kScratchCount - 1, {1, 2}), 2, "AP 6.12: a range of which a part exists");
   unchanged("AP 6.12: a range of which a part exists");
   // Quantity and byte count that do not fit each other. The number of bytes that follow fits the byte count.
-  const auto odd = [&](int quantity, int bytes) {
-    Bytes pdu = Join({16}, {kScratch, quantity});
-    pdu.push_back(static_cast<std::uint8_t>(bytes));
-    pdu.insert(pdu.end(), static_cast<std::size_t>(bytes), 0x5A);
-    return pdu;
-  };
+  const auto odd = [&](int quantity, int bytes) { return Filled(Join({16}, {kScratch, quantity}), bytes); };
   MustRefuse(line(), odd(0, 0), 3, "AP 6.12: quantity 0");
   MustRefuse(line(), odd(1, 1), 3, "AP 6.12: an odd byte count");
   MustRefuse(line(), odd(1, 4), 3, "AP 6.12: a byte count that is too large");
@@ -271,10 +272,7 @@ TEST_P(Requests, WritingAndReadingAtOnce) {
   MustRefuse(line(), WriteThenRead(kScratch, 1, kNoHolding, {1}), 2, "AP 6.17: no such register to write");
   unchanged("AP 6.17: a wrong range");
   const auto odd = [&](int quantity, int bytes) {
-    Bytes pdu = Join({23}, {kScratch, 1, kScratch, quantity});
-    pdu.push_back(static_cast<std::uint8_t>(bytes));
-    pdu.insert(pdu.end(), static_cast<std::size_t>(bytes), 0x5A);
-    return pdu;
+    return Filled(Join({23}, {kScratch, 1, kScratch, quantity}), bytes);
   };
   MustRefuse(line(), odd(0, 0), 3, "AP 6.17: nothing to write");
   MustRefuse(line(), odd(122, 242), 3, "AP 6.17: 122 registers to write");

@@ -313,11 +313,12 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
       return &*c;
     }
     if (IsOfTheRun(*c)) continue;
+    const double gained = GainOn(seen, *c->candidate, without, after);
+    if (gained >= kShows) continue;
     const Share trained = ShareOf(w, *c, amplitude.at(&*c), w.train),
                 shown = ShareOf(w, *c, amplitude.at(&*c), {&seen});
-    const double promised = GainOf(c->found) * std::min(shown.square / trained.square, shown.rows / trained.rows),
-                 gained = GainOn(seen, *c->candidate, without, after);
-    if (gained < std::min(kOfThePromise * promised, kShows)) {
+    const double promised = GainOf(c->found) * std::min(shown.square / trained.square, shown.rows / trained.rows);
+    if (gained < kOfThePromise * promised) {
       c->unconfirmed =
           fmt::format("the held-out log gains {:.0f} by it, where {:.0f} was to be expected from the training logs",
                       gained, promised);

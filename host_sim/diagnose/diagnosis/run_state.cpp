@@ -39,6 +39,18 @@ int Turns(const VectorXd& value) {
   return turns;
 }
 
+// The candidate's torque at a time of the run, [N x n], whatever the samples' own times.
+MatrixXd TorqueAt(double time_s, const Candidate& c, const Quantities& q, const std::vector<double>& eta,
+                  const VectorXd& amplitude) {
+  std::vector<std::vector<VectorXd>> value;
+  c.Evaluate(q, eta, value, time_s);
+  MatrixXd torque = MatrixXd::Zero(q.data->samples(), q.data->joints());
+  for (std::size_t r = 0; r < c.rows().size(); ++r)
+    for (int column = 0; column < c.columns(eta); ++column)
+      if (value[column][r].size()) torque.col(c.rows()[r]) += amplitude[column] * value[column][r];
+  return torque;
+}
+
 bool IsOverTime(const Candidate& c) {
   const codegen::EffectRecord& record = c.record();
   return record.effect_class == codegen::EffectClass::kRunState && record.search.how == codegen::SearchWay::kSpline;
@@ -66,13 +78,8 @@ RunState MakeRunState(const Candidate& candidate, const std::vector<double>& eta
 }
 
 MatrixXd Track(const RunState& state, const Quantities& q, const MatrixXd& residual, const VectorXd& sigma) {
-  std::vector<std::vector<VectorXd>> value;
-  state.candidate->Evaluate(q, state.eta, value, state.time_s);
   const auto& rows = state.candidate->rows();
-  MatrixXd shape = MatrixXd::Zero(residual.rows(), residual.cols());
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    for (int c = 0; c < state.candidate->columns(state.eta); ++c)
-      if (value[c][r].size()) shape.col(rows[r]) += state.amplitude[c] * value[c][r];
+  const MatrixXd shape = TorqueAt(state.time_s, *state.candidate, q, state.eta, state.amplitude);
   MatrixXd predicted = MatrixXd::Zero(residual.rows(), residual.cols());
   double level = 0, variance = state.level_sd * state.level_sd;
   for (Eigen::Index k = 0; k < residual.rows(); ++k) {
@@ -102,21 +109,20 @@ bool GoesToAndFroOn(const Candidate& c, const VectorXd& amplitude, const Quantit
   const std::vector<double> over_all{t[0], t[t.size() - 1]};
   const auto columns = static_cast<Eigen::Index>(c.columns(over_all));
   // It may begin at any level: at the end of the run the splines but the first sum up to one.
-  std::vector<std::vector<VectorXd>> value, level;
+  const MatrixXd level = TorqueAt(over_all[1], c, q, over_all, VectorXd::Ones(columns));
+  std::vector<std::vector<VectorXd>> value;
   c.Evaluate(q, over_all, value);
-  c.Evaluate(q, over_all, level, over_all[1]);
   MatrixXd gram = MatrixXd::Zero(columns + 1, columns + 1);
   VectorXd right = VectorXd::Zero(columns + 1), row(columns + 1);
   for (std::size_t r = 0; r < c.rows().size(); ++r) {
     const int j = c.rows()[r];
     for (Eigen::Index k = 0; k < residual.rows(); ++k) {
       if (!q.data->used(k, j)) continue;
-      row[columns] = 0;
       for (Eigen::Index i = 0; i < columns; ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        row[i] = value[at][r].size() ? value[at][r][k] : 0;
-        row[columns] += level[at][r].size() ? level[at][r][k] : 0;
+        const VectorXd& own = value[static_cast<std::size_t>(i)][r];
+        row[i] = own.size() ? own[k] : 0;
       }
+      row[columns] = level(k, j);
       gram += row * row.transpose(), right += residual(k, j) * row;
     }
   }

@@ -399,7 +399,9 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     if (!SharesJoint(o, *f.candidate) || kind == f.candidate->record().kind || kind != o.record().name || said)
       continue;
     const Columns of_other = GatherColumns(o, w_.evidence, ranked[other].eta);
-    if (!WhyNoState(o, metric.Try(of_other).amplitude).empty()) continue;
+    if (o.record().effect_class == codegen::EffectClass::kRunState &&
+        !WhyNoState(o, metric.Try(of_other).amplitude).empty())
+      continue;
     const auto [taken, own] = metric.Imitates(of_other, c, gain.amplitude);
     const double left = own - taken;
     const bool same = left < kIndistinguishable && left < kImitated * own;

@@ -75,7 +75,7 @@ class Sha256 {
   }
 
   std::uint32_t state_[8];
-  std::uint32_t bytes_ = 0, carry_ = 0;  // low and high half of their number
+  std::uint32_t bytes_ = 0, carry_ = 0;  // how many bytes came: low and high word
   std::uint8_t block_[kBlockBytes];
 };
 

@@ -42,7 +42,8 @@ void EndTrial(DriveClient& drive);
 // Stores and adopts the table that was stored before the one in force. Throws as FlashTable.
 FlashReport Rollback(DriveClient& drive, const Key* key = nullptr);
 
-// The table in force, which the drive's own checksum of it confirms. Throws VerifyError if it never does.
+// The table in force, which the drive's own checksum of it confirms. Throws VerifyError if it never does, unless the
+// drive has no valid table and shows its defaults: older firmware tells no checksum of them.
 std::vector<std::uint16_t> ReadActiveTable(DriveClient& drive);
 
 }  // namespace armcal::client

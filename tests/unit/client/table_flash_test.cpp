@@ -51,6 +51,19 @@ TEST(Flash, OfAGoodTable_IsActiveStoredAndReadBack) {
   EXPECT_EQ(drive.ReadStatus().table_status, Status::kOk);
 }
 
+// Older firmware takes the checksum before its defaults are in place.
+TEST(Flash, OfABlankDriveThatTellsAnotherChecksum_Succeeds) {
+  test::TestServer server;
+  server.drive.active = MakeTable(7);
+  auto drive = server.Connect();
+  ASSERT_NE(drive.ReadStatus().active_crc, core::Crc32Words(MakeTable(7).data(), test::kTableWords));
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(7));
+  EXPECT_NO_THROW(FlashTable(drive, MakeTable(1)));
+  EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(1));
+  server.drive.active[3] ^= 1;  // a table in force is never believed without its checksum
+  EXPECT_THROW(client::ReadActiveTable(drive), client::VerifyError);
+}
+
 TEST(Flash, OnTrial_IsInForceAndNotStored_UntilItIsConfirmed) {
   test::TestServer server;
   auto drive = server.Connect();

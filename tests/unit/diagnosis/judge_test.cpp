@@ -171,7 +171,7 @@ TEST(HeldOutLog, ShowsWhatTrainingPromises_OrRefutesIt) {
   EXPECT_FALSE(absent.terms()[0].confirmed);
   EXPECT_FALSE(absent.terms()[0].refuted);
   EXPECT_NE(absent.terms()[0].unconfirmed.find("to be expected"), std::string::npos) << absent.terms()[0].unconfirmed;
-  for (const double test_s : {80.0, 8.0}) {
+  for (const double test_s : {80.0, 8.0, 1.5}) {
     const Judged there(offset(0.25), offset(0.25), 80, test_s);
     ASSERT_EQ(there.terms().size(), 1u);
     EXPECT_TRUE(there.terms()[0].confirmed) << there.terms()[0].unconfirmed;

@@ -8,6 +8,7 @@
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
+#include "host_sim/identify/calibration/table_ceilings.hpp"
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -78,6 +79,8 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
                      {"sha256_before_test", model_hash},
                      {"schema", codegen::Schema(next)},
                      {"by_table", codegen::Schema(next) == codegen::Schema(model)}};
+    if (const std::string beyond = calibration::BeyondCeiling(next, calibration::DefaultTable(next)); !beyond.empty())
+      fmt::print(stderr, "armcal: {}: a drive would refuse this model's own table: {}\n", o.model_out, beyond);
   }
   Print(*run, o);
   WriteJson(o.json, json);

@@ -165,6 +165,10 @@ void SaveTable(const std::string& path, const codegen::Model& model, const calib
     fmt::print(stderr, "armcal: {}: a drive would refuse this table: {}\n", path, beyond);
 }
 
+void PrintHeld(const analysis::IdentifiedBodies& read) {
+  for (const std::string& sentence : read.held) fmt::print("{}\n", sentence);
+}
+
 // The declared model fitted to the runs without payload in true torque; the gains become the table's torque scales.
 void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vector<calibration::Dataset> without,
                 const std::vector<DriveGain>& gains) {
@@ -182,7 +186,10 @@ void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vecto
   const calibration::Fit all = calibration::WeightedFit(known, calibration::Pointers(without));
   const calibration::Fit held =
       calibration::WeightedFit(known, calibration::Pointers(without), calibration::HardlyDetermined(known, all));
-  calibration::TableFile table = analysis::ReadBodies(known, all, held, without[0].s.t[1] - without[0].s.t[0]).table;
+  const analysis::IdentifiedBodies read =
+      analysis::ReadBodies(known, all, held, without[0].s.t[1] - without[0].s.t[0]);
+  PrintHeld(read);
+  calibration::TableFile table = read.table;
   for (std::size_t j = 0; j < scale.size(); ++j) table.joint[j].torque_scale *= scale[j];
   SaveTable(o.table, model, table);
 }
@@ -340,6 +347,7 @@ int RunIdentify(const IdentifyOptions& o) {
         "standard parameters: {} of {} rest mostly on the prior (posterior / prior sd above {}); bodies physical: {}\n",
         found.read.FromPrior(), found.read.table.row.size(), calibration::kFromPrior,
         calibration::IsPhysical(found.read.bodies.bodies) ? "yes" : "no");
+    PrintHeld(found.read);
     if (!o.table.empty()) SaveTable(o.table, model, found.read.table);
   } else if (!o.table.empty()) {
     throw io::InputError(o.robot + ": prior = \"none\": a table needs standard parameters, and those need a prior");

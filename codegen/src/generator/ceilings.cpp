@@ -16,6 +16,8 @@ constexpr double kWiderSd = 10;          // a prior may be so many times wider t
 constexpr double kSmallestShare = 1e-6;  // of the torque ceiling: the least torque noise
 constexpr double kFrictionToTorque = 3;  // a law that fits warm oil is extrapolated to cold oil at full speed
 constexpr double kWiderStandstill = 10;  // friction is not fed forward below v_min
+constexpr double kLoadDistance_m = 0.3;  // of a load's centre from the last link's frame, along each axis
+constexpr double kGravity_mps2 = 9.81;
 constexpr unsigned kReadsPose = 1, kReadsTemperature = 2, kReadsHistory = 4;
 
 double Own(const std::vector<double>& given, int joint, double otherwise) {
@@ -40,7 +42,23 @@ Ceilings::OfJoint OfJoint(const Robot& r, int i) {
           j.position_limit_rad[1]};
 }
 
-// The ten parameters of a link whose mass, centre and inertia about the centre all lie kPriorSpreads away at once.
+// The heaviest load beyond the last link that every joint holds on a stretched arm that weighs nothing. A log of a laden
+// arm shows the load as a part of the last link, whose own mass says nothing of it.
+double LargestLoad_kg(const Robot& r) {
+  double load_kg = INFINITY, reach_m = kLoadDistance_m;
+  for (int i = r.joints() - 1; i >= 0; --i) {
+    const Joint& j = r.joint[i];
+    const bool slides = j.kinematics.type == JointType::kPrismatic;
+    const double held_N = Own(r.ceilings.torque_Nm, i, j.torque_limit_Nm) / (slides ? 1 : reach_m);
+    load_kg = std::min(load_kg, held_N / kGravity_mps2);
+    reach_m += std::hypot(j.kinematics.a_m, j.kinematics.d_m);
+    if (slides) reach_m += std::max(std::abs(j.position_limit_rad[0]), std::abs(j.position_limit_rad[1]));
+  }
+  return load_kg;
+}
+
+// The ten parameters of a link whose mass, centre and inertia about the centre all lie kPriorSpreads away at once, and
+// of the last link with the largest load.
 void BoundLink(const Model& m, int link, std::vector<Ceilings::OfParameter>& out) {
   const TableParameter* p = &m.table()[kBodyBlock * link];
   double low[10], high[10];
@@ -55,6 +73,12 @@ void BoundLink(const Model& m, int link, std::vector<Ceilings::OfParameter>& out
     high[0] = mass;
     for (int k = 0; k < 3; ++k) high[1 + k] = mass * centre[k];
     for (int k = 0; k < 6; ++k) high[4 + k] = about_origin;
+    if (link == m.joints() - 1) {
+      const double load_kg = LargestLoad_kg(m.robot());
+      high[0] += load_kg;
+      for (int k = 0; k < 3; ++k) high[1 + k] += load_kg * kLoadDistance_m;
+      for (int k = 0; k < 6; ++k) high[4 + k] += 3 * load_kg * kLoadDistance_m * kLoadDistance_m;
+    }
   } else {
     for (int k = 0; k < 10; ++k) high[k] = std::abs(p[k].mean) + kPriorSpreads * p[k].sd;
   }

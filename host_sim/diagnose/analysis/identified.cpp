@@ -4,12 +4,15 @@
 #include "host_sim/diagnose/verdict/curves.hpp"
 #include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/identify/calibration/information.hpp"
+#include "host_sim/identify/calibration/table_ceilings.hpp"
 
 namespace armcal::analysis {
 
 using nlohmann::ordered_json;
 
 namespace {
+
+constexpr int kMostRounds = 8;  // of fits within ceilings; two are usual
 
 ordered_json Columns(const codegen::Model& model, const calibration::Fit& fit) {
   ordered_json out = ordered_json::array();
@@ -56,6 +59,16 @@ IdentifiedBodies ReadBodies(const codegen::Model& model, const calibration::Fit&
   out.widths = calibration::EstimateLinkWidths(model, used);
   out.bodies = calibration::ReadOutWithWidths(model, used, out.widths);
   out.table = calibration::IdentifiedTable(model, all, used, out.bodies, step_s);
+  // A fit within limits may cross others, and friction that depends on the load changes with the bodies.
+  std::vector<calibration::Limit> limits;
+  for (int round = 0; round < kMostRounds; ++round) {
+    calibration::Ceiled beyond = calibration::BeyondCeilings(model, out.table);
+    if (beyond.limits.empty()) break;
+    limits.insert(limits.end(), beyond.limits.begin(), beyond.limits.end());
+    out.held.insert(out.held.end(), beyond.said.begin(), beyond.said.end());
+    out.bodies = calibration::ReadOutWithWidths(model, used, out.widths, limits);
+    out.table = calibration::IdentifiedTable(model, all, used, out.bodies, step_s);
+  }
   for (int k = 0; k < model.body_parameters(); ++k) {
     calibration::TableRow& row = out.table.row[static_cast<std::size_t>(k)];
     row.from_prior = row.sd > 0 && row.posterior_sd > calibration::kFromPrior * out.widths.sd[k];
@@ -107,6 +120,7 @@ ordered_json Identified::ToJson() const {
                              {"sd", row.sd},
                              {"posterior_sd", row.posterior_sd},
                              {"from_prior", row.from_prior}});
+  json["held_to_ceilings"] = read.held;
   for (int j = 0; j < model.joints(); ++j) json["table_gain"].push_back(1 + x()[model.columns() + j]);
   json["physical"] = calibration::IsPhysical(read.bodies.bodies);
   json["from_prior"] = read.FromPrior();

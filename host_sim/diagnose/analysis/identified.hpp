@@ -17,11 +17,13 @@ namespace armcal::analysis {
 inline constexpr const char* kLacksTerm = "the model lacks a term: armcal diagnose";
 
 // Bodies read out with the widths that the logs themselves show, and the table that follows. A link's parameter rests
-// on the prior where the logs narrow these widths little.
+// on the prior where the logs narrow these widths little. Where a drive would refuse the table, the bodies and the
+// friction are fitted once more, within what the drive accepts.
 struct IdentifiedBodies {
   calibration::LinkWidths widths;
   calibration::PhysicalReadOut bodies;
   calibration::TableFile table;
+  std::vector<std::string> held;  // what the fit gave beyond the ceilings, a sentence for each
   int FromPrior() const;  // so many rows of the table rest mostly on the prior
 };
 // all: every parameter free; used: those held that the logs hardly determine. step_s: the logs' sample time.

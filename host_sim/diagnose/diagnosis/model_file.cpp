@@ -27,6 +27,38 @@ std::string Declared(const std::filesystem::path& path) {
   return text;
 }
 
+bool IsFrictionLaw(const codegen::EffectInstance& e) { return e.record->friction_law || !e.record->replaces.empty(); }
+
+// Terms stand beside the declared friction as it was fitted with them. Beside other friction their sum may push. So the
+// fitted friction of their joints is written, too, unless a term takes its place.
+std::string FrictionBeside(const codegen::Model& model, const Finding& finding) {
+  std::string text;
+  for (const codegen::EffectInstance& e : model.effects()) {
+    if (!IsFrictionLaw(e)) continue;
+    const auto written = [&](const Term& t) { return t.confirmed && t.record->on_target; };
+    const bool beside = std::any_of(finding.terms.begin(), finding.terms.end(), [&](const Term& t) {
+      return written(t) && std::find(t.joints.begin(), t.joints.end(), e.joints[0]) != t.joints.end();
+    });
+    const bool replaced = std::any_of(finding.terms.begin(), finding.terms.end(), [&](const Term& t) {
+      return written(t) && t.record->replaces == e.record->name && t.joints == e.joints;
+    });
+    if (!beside || replaced) continue;
+    std::string mean;
+    for (const codegen::EffectColumn& column : e.columns)
+      for (int c = 0; c < model.columns(); ++c)
+        if (!model.is_rigid(c) && model.column_name(c) == column.name &&
+            model.table()[static_cast<std::size_t>(model.table_index(c))].state == "estimated")
+          mean += fmt::format("{}{} = {:.9e}", mean.empty() ? "" : ", ", column.key,
+                              std::clamp(finding.x[c], column.lower, column.upper));
+    if (!mean.empty())
+      text += fmt::format(
+          "\n# The friction that was fitted beside what was found.\n[[effect]]\nname = \"{}\"\njoints = [{}]\nmean = {{ {} "
+          "}}\n",
+          e.record->name, e.joints[0] + 1, mean);
+  }
+  return text;
+}
+
 // The declared law's own value of this column, as fitted: a law that takes its place has to do its work, too.
 double DeclaredShare(const codegen::Model& model, const Finding& finding, const Term& t, const std::string& key) {
   for (const codegen::EffectInstance& e : model.effects()) {
@@ -86,7 +118,7 @@ std::string ModelFile(const codegen::Model& model, const Finding& finding, const
     text += t.record->on_target ? EffectTable(model, finding, t)
                                 : fmt::format("# No model can hold it: {}.\n", t.record->remedy);
   }
-  return text;
+  return text + FrictionBeside(model, finding);
 }
 
 }  // namespace armcal::diagnosis

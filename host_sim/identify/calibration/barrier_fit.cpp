@@ -89,6 +89,11 @@ class TableFit {
       cost -= 0.5 * eps * std::log(bodies[11 * j + 10]);
     }
     const VectorXd x = X(t);
+    for (const Limit& limit : problem_.limits) {
+      const double left = Left(limit, bodies, x);
+      if (!(left > 0)) return INFINITY;
+      cost -= 0.5 * eps * std::log(left);
+    }
     if (!problem_.quadratic) return cost + problem_.data(x, false).cost;
     const VectorXd d = Shift(bodies, x);
     return cost + at_.gradient.dot(d) + 0.5 * d.dot(at_.hessian * d);
@@ -105,13 +110,19 @@ class TableFit {
       gy = std::move(here.gradient);
       linearised = std::move(here.hessian);
     }
-    const MatrixXd& hy = problem_.quadratic ? at_.hessian : linearised;
     VectorXd gt = gy;
-    MatrixXd ht = hy;
+    MatrixXd ht = problem_.quadratic ? at_.hessian : linearised;
+    for (const Limit& limit : problem_.limits) {
+      VectorXd slope(start_.size());
+      slope << limit.bodies, limit.x;
+      slope /= Left(limit, bodies, x);
+      gt -= 0.5 * eps * slope;
+      ht += 0.5 * eps * slope * slope.transpose();
+    }
     std::vector<MatrixXd> J(static_cast<std::size_t>(n_));
     for (int j = 0; j < n_; ++j) {
       J[j] = OriginJacobian(t.segment(11 * j, 10));
-      gt.segment(11 * j, 10) = J[j].transpose() * gy.segment(11 * j, 10);
+      gt.segment(11 * j, 10) = (J[j].transpose() * gt.segment(11 * j, 10)).eval();
       ht.middleRows(11 * j, 10) = (J[j].transpose() * ht.middleRows(11 * j, 10)).eval();
     }
     for (int j = 0; j < n_; ++j) ht.middleCols(11 * j, 10) = (ht.middleCols(11 * j, 10) * J[j]).eval();
@@ -157,6 +168,9 @@ class TableFit {
   }
 
  private:
+  static double Left(const Limit& limit, const VectorXd& bodies, const VectorXd& x) {
+    return limit.base + limit.bodies.dot(bodies) + limit.x.dot(x);
+  }
   // y minus the y of the prior.
   VectorXd Shift(const VectorXd& bodies, const VectorXd& x) const {
     VectorXd d(start_.size());

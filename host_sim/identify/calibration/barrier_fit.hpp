@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 #include <atomic>
 #include <functional>
+#include <vector>
 
 #include "codegen/src/generator/model.hpp"
 
@@ -24,12 +25,19 @@ struct DataTerm {
   Eigen::MatrixXd hessian;   // [x x x]
 };
 
+// This sum stays positive: base + bodies' (bodies about link origins) + x' x. x counts only where it is not rigid.
+struct Limit {
+  double base = 0;
+  Eigen::VectorXd bodies, x;  // [11 n], [x]
+};
+
 struct BarrierProblem {
   const codegen::Model* model = nullptr;
   Eigen::VectorXd bodies;        // [11 n] prior mean about link origins, physical
   Eigen::VectorXd bodies_sd;     // [11 n] of (m, c, I about the centre, rotor); 0: held
   Eigen::VectorXd x, x_sd;       // [x] prior of the coordinates that are not rigid; sd 0: held, infinite: no prior
   Eigen::VectorXd lower, upper;  // [x] or empty: a step ends there
+  std::vector<Limit> limits;
   // derivatives = false: cost alone is read.
   std::function<DataTerm(const Eigen::VectorXd& x, bool derivatives)> data;
   bool quadratic = true;  // the data term is quadratic; it is then asked once

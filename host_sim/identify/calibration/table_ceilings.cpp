@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "armcal/model/friction_grid.hpp"
@@ -49,10 +50,24 @@ std::string InWords(const TableFile& t, const core::Refusal& r) {
   }
 }
 
-// Friction on the grid, where the firmware looks.
-core::Refusal JudgeGrid(const codegen::Model& m, const Ceilings& c, const model::CeilingView& view,
-                        const TableFile& t) {
-  const auto amplitude = [](const TableRow& row) { return row.state == "standby" ? 0.0 : row.mean; };
+// The friction of one joint at one point of the firmware's grid.
+struct GridFriction {
+  int joint = 0;
+  double speed_radps = 0;
+  Eigen::VectorXd braking;  // [columns] against the motion, per unit of each column that counts
+  double sum_Nm = 0;
+  int column = 0;  // the one with the largest torque
+
+  core::Status Judge(const model::CeilingView& view) const {
+    return model::JudgeFriction(view.joint[joint], static_cast<float>(sum_Nm));
+  }
+};
+
+double Amplitude(const TableRow& row) { return row.state == "standby" ? 0.0 : row.mean; }
+
+// In the firmware's order.
+std::vector<GridFriction> FrictionOnGrid(const codegen::Model& m, const Ceilings& c, const model::CeilingView& view,
+                                         const TableFile& t) {
   const bool history = (c.friction_reads & model::kReadsHistory) != 0;
   const int n = m.joints(), points = model::GridPoints(c.friction_reads), each = history ? 2 : 1;
   codegen::Signals s;
@@ -70,33 +85,103 @@ core::Refusal JudgeGrid(const codegen::Model& m, const Ceilings& c, const model:
     }
   }
   Eigen::VectorXd bodies(m.body_parameters());
-  for (int k = 0; k < bodies.size(); ++k) bodies[k] = amplitude(t.row[k]);
+  for (int k = 0; k < bodies.size(); ++k) bodies[k] = Amplitude(t.row[k]);
   const Eigen::VectorXd base = m.base_map() * bodies;
   std::vector<double> committed(m.columns()), eta;
   for (int k = 0; k < m.columns(); ++k)
-    committed[k] = m.is_rigid(k) ? base[k - m.front()] : amplitude(t.row[m.table_index(k)]);
+    committed[k] = m.is_rigid(k) ? base[k - m.front()] : Amplitude(t.row[m.table_index(k)]);
   for (int k = m.parameters() - m.nonlinear(); k < m.parameters(); ++k) eta.push_back(t.row[k].mean);
   std::vector<Eigen::MatrixXd> rows;
   m.Regressor(s, committed, eta, rows);
+  std::vector<GridFriction> out;
   for (int p = 0; p < points; ++p)
     for (int i = 0; i < n; ++i) {
       const int row = p * each + each - 1;
-      double sum = 0, greatest = -1;
-      int column = m.front_begin(i);
+      GridFriction at{i, s.qd(row, i), Eigen::VectorXd::Zero(m.columns()), 0, m.front_begin(i)};
+      double greatest = -1;
       for (int k = m.front_begin(i); k < m.front_begin(i + 1); ++k) {
-        if (!c.friction[k] || committed[k] == 0) continue;
-        const double part = committed[k] * rows[i](row, k);
-        sum += part;
-        if (std::abs(part) > greatest) greatest = std::abs(part), column = k;
+        if (!c.friction[k] || t.row[m.table_index(k)].state == "standby") continue;
+        at.braking[k] = at.speed_radps < 0 ? -rows[i](row, k) : rows[i](row, k);
+        const double part = committed[k] * at.braking[k];
+        at.sum_Nm += part;
+        if (std::abs(part) > greatest) greatest = std::abs(part), at.column = k;
       }
-      const auto braking = static_cast<float>(s.qd(row, i) < 0 ? -sum : sum);
-      const core::Status judged = model::JudgeFriction(view.joint[i], braking);
-      if (core::IsOk(judged)) continue;
-      const model::JointCeiling& ceiling = view.joint[i];
-      return {judged, model::WordOfParameter(n, m.table_index(column)), braking,
-              judged == core::Status::kFeedsEnergy ? -ceiling.feed_Nm : ceiling.friction_Nm};
+      out.push_back(std::move(at));
     }
+  return out;
+}
+
+core::Refusal JudgeGrid(const codegen::Model& m, const Ceilings& c, const model::CeilingView& view,
+                        const TableFile& t) {
+  for (const GridFriction& at : FrictionOnGrid(m, c, view, t)) {
+    const core::Status judged = at.Judge(view);
+    if (core::IsOk(judged)) continue;
+    const model::JointCeiling& ceiling = view.joint[at.joint];
+    return {judged, model::WordOfParameter(m.joints(), m.table_index(at.column)), static_cast<float>(at.sum_Nm),
+            judged == core::Status::kFeedsEnergy ? -ceiling.feed_Nm : ceiling.friction_Nm};
+  }
   return {};
+}
+
+// A limit lies inside its ceiling by this share of the way to the model's own value. Floats then round to the right
+// side.
+constexpr double kInside = 1e-3;
+
+Limit NoLimit(const codegen::Model& m) {
+  return {0, Eigen::VectorXd::Zero(m.body_parameters()), Eigen::VectorXd::Zero(m.columns() + m.joints())};
+}
+
+void AddMeans(const codegen::Model& m, const Ceilings& c, const TableFile& t, Ceiled& out) {
+  const auto add = [&](int k, Eigen::VectorXd Limit::*part, int place) {
+    const TableRow& row = t.row[k];
+    const auto& [low, high, sd, process_noise] = c.parameter[k];
+    if (row.state != "estimated" || (row.mean >= low && row.mean <= high)) return;
+    const double ceiling = row.mean < low ? low : high;
+    Limit limit = NoLimit(m);
+    const double towards = row.mean < low ? 1 : -1;  // the sum grows away from the ceiling
+    (limit.*part)[place] = towards;
+    limit.base = -towards * (ceiling + kInside * (m.table()[k].mean - ceiling));
+    out.limits.push_back(std::move(limit));
+    out.said.push_back(fmt::format("{}: the fit gives {:.6g}; a drive takes {} {:.6g}, so it was held there",
+                                   row.name, row.mean, row.mean < low ? "at least" : "at most", ceiling));
+  };
+  for (int k = 0; k < m.body_parameters(); ++k) add(k, &Limit::bodies, k);
+  for (int k = 0; k < m.columns(); ++k)
+    if (!m.is_rigid(k)) add(m.table_index(k), &Limit::x, k);
+}
+
+void AddFriction(const codegen::Model& m, const Ceilings& c, const model::CeilingView& view, const TableFile& t,
+                 Ceiled& out) {
+  const std::vector<GridFriction> grid = FrictionOnGrid(m, c, view, t);
+  Eigen::VectorXd own = Eigen::VectorXd::Zero(m.columns());
+  for (int k = 0; k < m.columns(); ++k)
+    if (!m.is_rigid(k)) own[k] = m.table()[m.table_index(k)].mean;
+  for (int j = 0; j < m.joints(); ++j) {
+    const Ceilings::OfJoint& ceiling = c.joint[j];
+    const GridFriction* worst = nullptr;
+    const auto excess = [&](const GridFriction& at) {
+      return std::max(-at.sum_Nm / ceiling.feed_Nm, at.sum_Nm / ceiling.friction_Nm);
+    };
+    for (const GridFriction& at : grid)
+      if (at.joint == j && !core::IsOk(at.Judge(view)) && (!worst || excess(at) > excess(*worst))) worst = &at;
+    if (!worst) continue;
+    const bool pushes = worst->sum_Nm < 0;
+    out.said.push_back(
+        fmt::format("joint {}: at {:.3g} rad/s (m/s) the fitted friction would {} by {:.4g} N m (N); a drive takes at most "
+                    "{:.4g}, so it was held there",
+                    j + 1, worst->speed_radps, pushes ? "push" : "brake", std::abs(worst->sum_Nm),
+                    pushes ? ceiling.feed_Nm : ceiling.friction_Nm));
+    for (const GridFriction& at : grid) {
+      if (at.joint != j) continue;
+      const double before = at.braking.dot(own);
+      Limit brakes = NoLimit(m), bounded = NoLimit(m);
+      brakes.x.head(m.columns()) = at.braking, bounded.x.head(m.columns()) = -at.braking;
+      brakes.base = ceiling.feed_Nm - kInside * (ceiling.feed_Nm + before);
+      bounded.base = ceiling.friction_Nm - kInside * (ceiling.friction_Nm - before);
+      out.limits.push_back(std::move(brakes));
+      out.limits.push_back(std::move(bounded));
+    }
+  }
 }
 
 }  // namespace
@@ -118,6 +203,15 @@ std::string WordName(const TableFile& t, int word) {
     return fmt::format("joint {}: {}", k / model::kJointWords + 1, part[k % model::kJointWords / 2]);
   }
   return word == 5 ? "flags (bumpless)" : word < 8 ? "blend_ms" : fmt::format("forgetting of group {}", (word - 8) / 2);
+}
+
+Ceiled BeyondCeilings(const codegen::Model& m, const TableFile& t) {
+  const Ceilings ceilings = codegen::MakeCeilings(m);
+  const Compiled compiled(ceilings);
+  Ceiled out;
+  AddMeans(m, ceilings, t, out);
+  AddFriction(m, ceilings, compiled.View(), t, out);
+  return out;
 }
 
 std::string BeyondCeiling(const codegen::Model& m, const TableFile& t) {

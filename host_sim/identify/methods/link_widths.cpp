@@ -169,7 +169,8 @@ LinkWidths EstimateLinkWidths(const codegen::Model& model, const Fit& fit) {
   return widths;
 }
 
-PhysicalReadOut ReadOutWithWidths(const codegen::Model& model, const Fit& fit, const LinkWidths& widths) {
+PhysicalReadOut ReadOutWithWidths(const codegen::Model& model, const Fit& fit, const LinkWidths& widths,
+                                  const std::vector<Limit>& limits) {
   RequirePhysicalPrior(model);
   const Prior prior = MakePrior(model);
   BarrierProblem problem;
@@ -181,6 +182,7 @@ PhysicalReadOut ReadOutWithWidths(const codegen::Model& model, const Fit& fit, c
   problem.x = prior.mean;
   problem.x_sd = VectorXd::Zero(prior.mean.size());
   for (const int c : fit.active) problem.x_sd[c] = std::sqrt(prior.covariance(c, c));
+  problem.limits = limits;
   problem.data = [&](const VectorXd& x, bool) { return LogsAbout(fit, x); };
   BarrierFit found = FitWithBarrier(problem);
   return {std::move(found.bodies), std::move(found.bodies_sd), std::move(found.x), found.iterations, found.converged};

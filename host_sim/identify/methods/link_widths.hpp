@@ -21,7 +21,9 @@ struct LinkWidths {
 // about the bodies found, twice. The file's own widths are not read. Throws io::InputError as ReadOutPhysical does.
 LinkWidths EstimateLinkWidths(const codegen::Model& model, const Fit& fit);
 
-// ReadOutPhysical with these widths in the place of the table's. A body parameter that the table holds is held.
-PhysicalReadOut ReadOutWithWidths(const codegen::Model& model, const Fit& fit, const LinkWidths& widths);
+// ReadOutPhysical with these widths in the place of the table's, and within these limits. A body parameter that the
+// table holds is held.
+PhysicalReadOut ReadOutWithWidths(const codegen::Model& model, const Fit& fit, const LinkWidths& widths,
+                                  const std::vector<Limit>& limits = {});
 
 }  // namespace armcal::calibration

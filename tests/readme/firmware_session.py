@@ -56,10 +56,13 @@ class Line:
             data += os.read(self.file, count - len(data))
         return data
 
-    def ask_once(self, pdu):
+    def post(self, pdu):
         frame = b"\x01" + pdu
         termios.tcflush(self.file, termios.TCIFLUSH)
         os.write(self.file, frame + crc16(frame))
+
+    def ask_once(self, pdu):
+        self.post(pdu)
         deadline = time.monotonic() + REPLY_SECONDS
         reply = self.take(3, deadline)
         if reply[1] & 0x80:

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "codegen/src/generator/ceilings.hpp"
 #include "codegen/src/generator/emit.hpp"
 #include "tests/unit/calibration/laden_arm.hpp"
@@ -46,6 +49,49 @@ TEST(TableCeilings, WhatIsBeyond_IsNamedWithItsBound) {
   EXPECT_EQ(beyond([](TableFile& t) { t.row[0].mean = 1e30; }).substr(0, 12), "m1: mean is ");
   EXPECT_EQ(beyond([](TableFile& t) { t.row[3].sd = 1e30; }).substr(0, 11), "mz1: sd is ");
   EXPECT_EQ(beyond([](TableFile& t) { t.forgetting[2] = 0.5; }).substr(0, 24), "forgetting of group 2 is");
+}
+
+// 60 N m hold 7.645 kg at 0.5 + 0.3 m; the elbow's 30 N m would hold more at 0.3 m. The link's own: 2 kg, and 20 times
+// 0.3 of it.
+TEST(TableCeilings, TheLastLink_MayCarryWhatEveryJointHolds) {
+  const codegen::Ceilings c = codegen::MakeCeilings(Shipped("two_link"));
+  const double load_kg = 60 / (9.81 * 0.8);
+  EXPECT_NEAR(c.parameter[11].high, 2 * (1 + 20 * 0.3) + load_kg, 1e-9);
+  EXPECT_NEAR(c.parameter[13].high, 14 * 20 * 0.005 + 0.3 * load_kg, 1e-9) << "my2: its centre lies on the axis";
+  EXPECT_NEAR(c.parameter[0].high, 3 * (1 + 20 * 0.3), 1e-9) << "link 1 carries none";
+}
+
+// What a fit must keep: at the table itself each limit is broken, at the model's own values all are kept.
+TEST(TableCeilings, LimitsOfAFit_LieBetweenTheModelsOwnTableAndWhatIsRefused) {
+  const codegen::Model model = Shipped("two_link");
+  TableFile t = DefaultTable(model);
+  const auto left = [&](const Limit& limit, const TableFile& table) {
+    double sum = limit.base;
+    for (int k = 0; k < model.body_parameters(); ++k) sum += limit.bodies[k] * table.row[k].mean;
+    for (int c = 0; c < model.columns(); ++c)
+      if (!model.is_rigid(c)) sum += limit.x[c] * table.row[model.table_index(c)].mean;
+    return sum;
+  };
+  EXPECT_TRUE(BeyondCeilings(model, t).limits.empty());
+  const TableFile own = t;
+  Row(t, "m2").mean = 30;
+  Row(t, "Fc1").mean = 4, Row(t, "Fv1").mean = -2.2;  // 4 - 2.2 * 3.49 = -3.68 at full speed; 3 are allowed
+  const Ceiled beyond = BeyondCeilings(model, t);
+  EXPECT_EQ(beyond.said,
+            (std::vector<std::string>{
+                "m2: the fit gives 30; a drive takes at most 21.6453, so it was held there",
+                "joint 1: at 3.49 rad/s (m/s) the fitted friction would push by 3.679 N m (N); a drive takes at most 3, so "
+                "it was held there"}));
+  ASSERT_EQ(beyond.limits.size(), 1u + 2 * 16) << "eight speeds in two directions, two limits each";
+  int broken = 0;
+  for (const Limit& limit : beyond.limits) {
+    broken += left(limit, t) < 0;
+    EXPECT_GT(left(limit, own), 0);
+  }
+  EXPECT_EQ(broken, 3) << "m2, and the friction at full speed in both directions";
+  Row(t, "m2").mean = 21.62, Row(t, "Fv1").mean = -(4 + 2.95) / (200 * std::numbers::pi / 180);
+  for (const Limit& limit : beyond.limits) EXPECT_GT(left(limit, t), 0);
+  EXPECT_EQ(BeyondCeiling(model, t), "");
 }
 
 // The shoulder reaches 200 deg/s = 3.49 rad/s; 5 % of its 60 N m is the tolerance.

@@ -309,6 +309,72 @@ TEST(ReadOutPhysical, ARotorInertiaPulledBelowZero_StaysAboveIt) {
   EXPECT_TRUE(IsPhysical(out.bodies));
 }
 
+// A limit on one column is the same as holding this column at the limit, if the fit alone goes beyond it.
+TEST(FitWithBarrier, WithinALimit_IsTheFitThatIsHeldThere) {
+  SyntheticArm arm(Er20(), 3);
+  const codegen::Model& model = arm.model();
+  const Dataset d = arm.Run(10, 12);
+  const Fit fit = WeightedFit(model, {&d});
+  const Prior prior = MakePrior(model);
+  BarrierProblem free;
+  free.model = &model;
+  free.bodies = BodyMean(model);
+  free.bodies_sd = VectorXd::Zero(free.bodies.size());
+  for (int k = 0; k < free.bodies.size(); ++k) free.bodies_sd[k] = model.table()[k].sd;
+  free.x = prior.mean;
+  free.x_sd = prior.covariance.diagonal().cwiseSqrt();
+  free.data = [&](const VectorXd& x, bool) { return LogsAbout(fit, x); };
+  const BarrierFit alone = FitWithBarrier(free);
+  const int Fc2 = model.front_begin(1);
+  ASSERT_EQ(model.column_name(Fc2), "Fc2");
+  for (const double towards : {-1.0, 1.0}) {  // at most, at least
+    const double bound = alone.x[Fc2] + towards * 8 * fit.sd[Fc2];
+    BarrierProblem limited = free, held = free;
+    limited.x[Fc2] = bound + towards * fit.prior_sd[Fc2];  // the prior keeps the limit
+    Limit limit{-towards * bound, VectorXd::Zero(free.bodies.size()), VectorXd::Zero(free.x.size())};
+    limit.x[Fc2] = towards;
+    limited.limits = {limit};
+    held.x[Fc2] = bound, held.x_sd[Fc2] = 0;
+    const BarrierFit got = FitWithBarrier(limited), expected = FitWithBarrier(held);
+    ASSERT_TRUE(got.converged && expected.converged);
+    EXPECT_GT(towards * (got.x[Fc2] - bound), 0);
+    EXPECT_GT((expected.x - alone.x).cwiseAbs().maxCoeff(), 0);
+    for (const int c : fit.active) EXPECT_NEAR(got.x[c], expected.x[c], 0.02 * fit.sd[c]) << model.column_name(c);
+  }
+}
+
+// The same of a body: link 2 heavier than a limit allows.
+TEST(FitWithBarrier, ALimitOfABody_IsKept) {
+  SyntheticArm arm(Er20(), 3);
+  const codegen::Model& model = arm.model();
+  BarrierProblem problem;
+  problem.model = &model;
+  problem.bodies = BodyMean(model);
+  problem.bodies_sd = VectorXd::Zero(problem.bodies.size());
+  for (int k = 0; k < problem.bodies.size(); ++k) problem.bodies_sd[k] = model.table()[k].sd;
+  problem.x = MakePrior(model).mean, problem.x_sd = VectorXd::Zero(problem.x.size());
+  const int mx2 = 12;
+  const double first = problem.bodies[mx2], bound = first + 0.1 * std::abs(first);
+  const VectorXd base = model.base_map().col(mx2);
+  // Data that want the base parameters which hold mx2 to move far.
+  problem.data = [&](const VectorXd& x, bool) {
+    DataTerm term{0, VectorXd::Zero(x.size()), MatrixXd::Zero(x.size(), x.size())};
+    const VectorXd aim = problem.x.segment(model.front(), model.rigid()) + 2 * std::abs(first) * base;
+    term.hessian.block(model.front(), model.front(), model.rigid(), model.rigid()).setIdentity();
+    term.hessian *= 1e4;
+    term.gradient.segment(model.front(), model.rigid()) = 1e4 * (x.segment(model.front(), model.rigid()) - aim);
+    return term;
+  };
+  EXPECT_GT(FitWithBarrier(problem).bodies[mx2], bound);
+  Limit limit{bound, VectorXd::Zero(problem.bodies.size()), VectorXd::Zero(problem.x.size())};
+  limit.bodies[mx2] = -1;
+  problem.limits = {limit};
+  const BarrierFit got = FitWithBarrier(problem);
+  EXPECT_LT(got.bodies[mx2], bound);
+  EXPECT_GT(got.bodies[mx2], bound - 0.01 * std::abs(first));
+  EXPECT_TRUE(IsPhysical(got.bodies));
+}
+
 TEST(ReadOutPhysical, APriorThatCannotExist_IsRefusedByName) {
   codegen::Robot robot = Er20();
   SyntheticArm arm(robot, 1);

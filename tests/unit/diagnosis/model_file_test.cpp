@@ -98,7 +98,9 @@ TEST_F(NewModelFile, OfEveryRecord_IsGenerated_WithItsValuesOrWithARemedy) {
     const codegen::Model next = Generated(declared, finding);
     const std::string text = Text(file_);
     EXPECT_EQ(Count(text, "codegen/effects/" + name + ".toml. Train: a.csv (sha256 0123456789abcdef)"), 1);
-    EXPECT_EQ(Count(text, "\n[[effect]]"), record.on_target ? 1 : 0);
+    // The term's own table, and the friction of each of its joints, if the term does not take its place.
+    const int joints = static_cast<int>(t.joints.size()), friction = record.replaces.empty() ? joints : 0;
+    EXPECT_EQ(Count(text, "\n[[effect]]"), record.on_target ? 1 + friction : 0);
     EXPECT_EQ(codegen::Schema(next) != codegen::Schema(declared), record.on_target);
     for (const auto& c : t.columns) EXPECT_EQ(Count(text, "# " + c.name + " = "), c.fixed_amplitude ? 0 : 1) << c.name;
     EXPECT_EQ(Count(text, " +- 0.25 ") + Count(text, " +- 0.5 "), Count(text, " +- "));

@@ -133,7 +133,7 @@ nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle te
     json = std::move(run.json);
     std::string of = "Train:";
     for (const logs::Log& log : logs) of += " " + log.source;
-    json["model_file"] = diagnosis::ModelFile(*run.model, run.diagnosis->finding(), of);
+    json["model_file"] = diagnosis::ModelFile(*run.model, run.catalogue, run.diagnosis->finding(), of).text;
   }
   Warn(notes);
   return ToDict(json);

@@ -61,15 +61,15 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
   for (const std::string& p : o.train)
     provenance +=
         " " + std::filesystem::path(p).filename().string() + " (sha256 " + files::FileHash(p).substr(0, 16) + ")";
-  const std::string before_test = diagnosis::ModelFile(model, finding, provenance);
+  const std::string before_test = diagnosis::ModelFile(model, run->catalogue, finding, provenance).text;
   if (!o.model_out.empty()) {
     files::WriteWholeFile(o.model_out, before_test);
     model_hash = files::FileHash(o.model_out);
   }
   run->Judge(read.Raw(o.test), o.robot, o.json, SayAside);
-  const std::string after_test = diagnosis::ModelFile(model, finding, provenance);
-  if (!o.model_out.empty() && after_test != before_test)
-    files::WriteWholeFile(o.model_out, after_test);  // what was not confirmed is taken out
+  const diagnosis::NewModel after_test = diagnosis::ModelFile(model, run->catalogue, finding, provenance);
+  if (!o.model_out.empty() && after_test.text != before_test)
+    files::WriteWholeFile(o.model_out, after_test.text);  // what was not confirmed is taken out
   nlohmann::ordered_json& json = run->json;
   json["provenance"] = provenance, json["test"] = o.test;
   if (!o.model_out.empty()) {
@@ -83,6 +83,11 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
       fmt::print(stderr, "armcal: {}: a drive would refuse this model's own table: {}\n", o.model_out, beyond);
   }
   Print(*run, o);
+  for (const int j : after_test.from_zero)
+    if (!o.model_out.empty())
+      fmt::print("joint {}: the friction that was found would push beyond the logs; in {} it starts from zero, and armcal "
+                 "identify fits it within what a drive takes\n",
+                 j + 1, o.model_out);
   WriteJson(o.json, json);
   return run;
 }

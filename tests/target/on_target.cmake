@@ -41,6 +41,11 @@ add_test(NAME Firmware_OverItsSerialLine_TakesATableAndLearns
           ${PROJECT_SOURCE_DIR}/build/host/armcal)
 set_tests_properties(Firmware_OverItsSerialLine_TakesATableAndLearns PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300 LABELS target)
 
+# The same firmware's storage, over the line: 200 round trips, and 50 power cuts during a save.
+add_test(NAME Firmware_StoredTables_SurvivePowerCuts
+  COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/stored_tables.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_firmware>)
+set_tests_properties(Firmware_StoredTables_SurvivePowerCuts PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 1200 LABELS long)
+
 # The public rules of Modbus, asked of the same firmware: a few of them, and all with the long tests.
 set(rules ${PROJECT_SOURCE_DIR}/build/host/tests/e2e/test_e2e_modbus_rules)
 foreach(part "Firmware_OverItsSerialLine_KeepsRulesOfModbus|*.AReply_*:*/Requests.ReadingRegisters/serial|target"

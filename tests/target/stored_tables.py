@@ -4,7 +4,8 @@
   stored_tables.py BOARD IMAGE [TRIPS [CUTS]]    default: 200 and 50
 
 A file backs the board's memory, so the storage outlives QEMU. A debugger's watchpoint on the storage stops the board after
-each byte that is written there. A cut kills QEMU at one of these bytes; the cuts lie evenly over a whole save. 77: no QEMU.
+each byte that is written there. A cut kills QEMU after one of these bytes. Two thirds of the cuts lie evenly over a whole save,
+the others after each of its last bytes, where the record is completed. 77: no QEMU.
 """
 import os
 import re
@@ -14,16 +15,17 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 import zlib
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "readme"))
-from firmware_session import Line, halves  # noqa: E402
+from firmware_session import Line, Refused, halves  # noqa: E402
 
 MEMORY = 16 << 20  # of the board's PSRAM
 STORAGE = 0x21000000
 SECTORS = 8 * 4096
 UNLOCK, OPEN, CHECK, SAVE = 0x6B6C6E75, 0x6E65706F, 0x6B656863, 0x65766173
-BLANK = 33
+BLANK, TOO_SOON = 33, 20  # Status
 BODY = 11  # numbers of a link; the last is its rotor
 
 
@@ -64,7 +66,14 @@ class Board:
         return halves(sequence + 3, SAVE, schema) + [count, 0] + halves(crc)
 
     def save(self, table):
-        self.line.write(0x0000, self.send(table))
+        command = self.send(table)
+        while True:
+            try:
+                self.line.write(0x0000, command)
+                break
+            except Refused:
+                assert self.line.read(4, 0x0041, 1) == [TOO_SOON]  # the board limits the rate, for the flash's sake
+                time.sleep(0.1)
         while (state := self.line.read(4, 0x0040, 1)[0]) == 4:
             pass
         assert state == 5, f"transaction state {state}, status {self.line.read(4, 0x0041, 1)[0]}"
@@ -97,9 +106,16 @@ class Debugger:
         self.socket.sendall(b"\x03")
         return self.answer()
 
-    def run_to_write(self):
+    def run_through_write(self):
+        """QEMU stops before the byte is written, so one step without the watchpoint writes it."""
         answer = self.ask(b"c")
         assert answer.startswith(b"T05"), answer
+        self.watch(False)
+        self.ask(b"s")
+        self.watch(True)
+
+    def watch(self, on):
+        assert self.ask(b"%s2,%x,%x" % (b"Z" if on else b"z", STORAGE, SECTORS)) == b"OK", "no watchpoint"
 
 
 def packed(table):
@@ -149,12 +165,12 @@ def written_bytes(board, image, memory, folder, table, most):
         command = b.send(table)
         debugger = Debugger(path)
         debugger.stop()
-        assert debugger.ask(b"Z2,%x,%x" % (STORAGE, SECTORS)) == b"OK", "no watchpoint"
+        debugger.watch(True)
         b.line.post(struct.pack(f">BHHB{len(command)}H", 16, 0, len(command), 2 * len(command), *command))
         count = 0
         while most is None or count < most:
             try:
-                debugger.run_to_write()
+                debugger.run_through_write()
             except socket.timeout:
                 break
             count += 1
@@ -168,9 +184,12 @@ def cuts(board, image, memory, folder, default, number):
     assert in_force(board, image, memory) == variant(default, 500), "a save that was only watched"
     old = variant(default, 500)
     kept = changed = torn = 0
-    for k in range(number):
+    at_end = number // 3
+    even = number - at_end
+    places = [1 + (total - at_end - 1) * k // even for k in range(even)] + [total - k for k in reversed(range(at_end))]
+    for k, place in enumerate(places):
         new = variant(default, 501 + k)
-        done = written_bytes(board, image, memory, folder, new, 1 + (total - 1) * k // max(1, number - 1))
+        done = written_bytes(board, image, memory, folder, new, place)
         now = in_force(board, image, memory)
         kept, changed, torn = kept + (now == old), changed + (now == new), torn + (now not in (old, new))
         print(f"cut after byte {done} of {total}: {'old' if now == old else 'new' if now == new else 'TORN'}", flush=True)

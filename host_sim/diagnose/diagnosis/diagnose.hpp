@@ -125,6 +125,13 @@ class Diagnosis {
 
 // The robot file with the confirmed terms added: each with its record, parameters and standard deviations, `provenance`
 // and score as comments. What a model can hold is an [[effect]] table; of the rest a comment says what to do about it.
-std::string ModelFile(const codegen::Model& model, const Finding& finding, const std::string& provenance);
+struct NewModel {
+  std::string text;
+  // Joints, from 0, on which the friction found would push at speeds or temperatures beyond the logs, so that a drive
+  // would refuse the model's own table. There the terms that an estimate may move start from zero.
+  std::vector<int> from_zero;
+};
+NewModel ModelFile(const codegen::Model& model, const codegen::Catalogue& catalogue, const Finding& finding,
+                   const std::string& provenance);
 
 }  // namespace armcal::diagnosis

@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <regex>
+
+#include "host_sim/identify/calibration/table_ceilings.hpp"
 
 namespace armcal::diagnosis {
 
@@ -23,38 +26,6 @@ std::string Declared(const std::filesystem::path& path) {
       line = fmt::format("urdf = \"{}\"{}", std::filesystem::absolute(path.parent_path() / found[1].str()).string(),
                          found[2].str());
     text += line + "\n";
-  }
-  return text;
-}
-
-bool IsFrictionLaw(const codegen::EffectInstance& e) { return e.record->friction_law || !e.record->replaces.empty(); }
-
-// Terms stand beside the declared friction as it was fitted with them. Beside other friction their sum may push. So the
-// fitted friction of their joints is written, too, unless a term takes its place.
-std::string FrictionBeside(const codegen::Model& model, const Finding& finding) {
-  std::string text;
-  for (const codegen::EffectInstance& e : model.effects()) {
-    if (!IsFrictionLaw(e)) continue;
-    const auto written = [&](const Term& t) { return t.confirmed && t.record->on_target; };
-    const bool beside = std::any_of(finding.terms.begin(), finding.terms.end(), [&](const Term& t) {
-      return written(t) && std::find(t.joints.begin(), t.joints.end(), e.joints[0]) != t.joints.end();
-    });
-    const bool replaced = std::any_of(finding.terms.begin(), finding.terms.end(), [&](const Term& t) {
-      return written(t) && t.record->replaces == e.record->name && t.joints == e.joints;
-    });
-    if (!beside || replaced) continue;
-    std::string mean;
-    for (const codegen::EffectColumn& column : e.columns)
-      for (int c = 0; c < model.columns(); ++c)
-        if (!model.is_rigid(c) && model.column_name(c) == column.name &&
-            model.table()[static_cast<std::size_t>(model.table_index(c))].state == "estimated")
-          mean += fmt::format("{}{} = {:.9e}", mean.empty() ? "" : ", ", column.key,
-                              std::clamp(finding.x[c], column.lower, column.upper));
-    if (!mean.empty())
-      text += fmt::format(
-          "\n# The friction that was fitted beside what was found.\n[[effect]]\nname = \"{}\"\njoints = [{}]\nmean = {{ {} "
-          "}}\n",
-          e.record->name, e.joints[0] + 1, mean);
   }
   return text;
 }
@@ -87,38 +58,100 @@ std::string Comments(const Term& t, const std::string& provenance) {
   return text;
 }
 
-std::string EffectTable(const codegen::Model& model, const Finding& finding, const Term& t) {
-  std::string joints, mean, nonlinear;
-  for (const int j : t.joints) joints += fmt::format("{}{}", joints.empty() ? "" : ", ", j + 1);
+using Joints = std::vector<int>;
+
+bool Contains(const Joints& joints, int joint) {
+  return std::find(joints.begin(), joints.end(), joint) != joints.end();
+}
+
+bool IsWritten(const Term& t) { return t.confirmed && t.record->on_target; }
+
+bool StartsFromZero(const Term& t, const Joints& from_zero) {
+  return !t.record->search.at_turns &&
+         std::any_of(t.joints.begin(), t.joints.end(), [&](int j) { return Contains(from_zero, j); });
+}
+
+codegen::EffectUse UseOf(const codegen::Model& model, const Finding& finding, const Term& t, const Joints& from_zero) {
+  codegen::EffectUse use;
+  use.effect = t.record->name, use.joints = t.joints;
+  // An estimate on sliding rows alone cannot see what shows near turns and at rest: it stays as it was found.
+  use.state = t.record->search.at_turns ? "fixed" : "estimated";
   for (std::size_t c = 0; c < t.columns.size(); ++c) {
     const codegen::EffectColumn& column = t.columns[c];
     if (column.fixed_amplitude) continue;  // the record's own
     const double value = t.amplitude[static_cast<Eigen::Index>(c)] + DeclaredShare(model, finding, t, column.key);
-    mean += fmt::format("{}{} = {:.9e}", mean.empty() ? "" : ", ", column.key,
-                        std::clamp(value, column.lower, column.upper));
+    use.mean[column.key] = StartsFromZero(t, from_zero) ? 0 : std::clamp(value, column.lower, column.upper);
   }
-  for (std::size_t k = 0; k < t.eta.size(); ++k)
-    nonlinear += fmt::format("{}{} = {:.9e}", nonlinear.empty() ? "" : ", ", t.unknowns[k].key, t.eta[k]);
-  // An estimate on sliding rows alone cannot see what shows near turns and at rest: it stays as it was found.
-  std::string text = fmt::format("[[effect]]\nname = \"{}\"\nstate = \"{}\"\n", t.record->name,
-                                 t.record->search.at_turns ? "fixed" : "estimated");
+  for (std::size_t k = 0; k < t.eta.size(); ++k) use.nonlinear[t.unknowns[k].key] = t.eta[k];
+  return use;
+}
+
+// Terms stand beside the declared friction as it was fitted with them. Beside other friction their sum may push. So the
+// fitted friction of their joints is written, too, unless a term takes its place.
+std::vector<codegen::EffectUse> FrictionBeside(const codegen::Model& model, const Finding& finding) {
+  std::vector<codegen::EffectUse> out;
+  for (const codegen::EffectInstance& e : model.effects()) {
+    if (!e.record->friction_law && e.record->replaces.empty()) continue;
+    const auto any = [&](const auto& is) {
+      return std::any_of(finding.terms.begin(), finding.terms.end(), [&](const Term& t) { return IsWritten(t) && is(t); });
+    };
+    if (!any([&](const Term& t) { return Contains(t.joints, e.joints[0]); })) continue;
+    if (any([&](const Term& t) { return t.record->replaces == e.record->name && t.joints == e.joints; })) continue;
+    codegen::EffectUse use;
+    use.effect = e.record->name, use.joints = e.joints;
+    for (const codegen::EffectColumn& column : e.columns)
+      for (int c = 0; c < model.columns(); ++c)
+        if (!model.is_rigid(c) && model.column_name(c) == column.name &&
+            model.table()[static_cast<std::size_t>(model.table_index(c))].state == "estimated")
+          use.mean[column.key] = std::clamp(finding.x[c], column.lower, column.upper);
+    if (!use.mean.empty()) out.push_back(use);
+  }
+  return out;
+}
+
+std::string TableText(const codegen::EffectUse& use) {
+  const auto list = [](const std::map<std::string, double>& values) {
+    std::string text;
+    for (const auto& [key, value] : values) text += fmt::format("{}{} = {:.9e}", text.empty() ? "" : ", ", key, value);
+    return text;
+  };
+  std::string joints, text = fmt::format("[[effect]]\nname = \"{}\"\nstate = \"{}\"\n", use.effect, use.state);
+  for (const int j : use.joints) joints += fmt::format("{}{}", joints.empty() ? "" : ", ", j + 1);
   if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
-  if (!mean.empty()) text += fmt::format("mean = {{ {} }}\n", mean);
-  if (!nonlinear.empty()) text += fmt::format("nonlinear = {{ {} }}\n", nonlinear);
+  if (!use.mean.empty()) text += fmt::format("mean = {{ {} }}\n", list(use.mean));
+  if (!use.nonlinear.empty()) text += fmt::format("nonlinear = {{ {} }}\n", list(use.nonlinear));
   return text;
+}
+
+// Joints on which a drive would refuse the friction of the new model's own table.
+Joints Pushing(const codegen::Model& model, const codegen::Catalogue& catalogue, const Finding& finding) {
+  codegen::Robot robot = model.robot();
+  for (const Term& t : finding.terms)
+    if (IsWritten(t)) robot.effect.push_back(UseOf(model, finding, t, {}));
+  for (const codegen::EffectUse& use : FrictionBeside(model, finding)) robot.effect.push_back(use);
+  const codegen::Model next(robot, catalogue);
+  return calibration::BeyondCeilings(next, calibration::DefaultTable(next)).joints;
 }
 
 }  // namespace
 
-std::string ModelFile(const codegen::Model& model, const Finding& finding, const std::string& provenance) {
-  std::string text = Declared(model.robot().path);
+NewModel ModelFile(const codegen::Model& model, const codegen::Catalogue& catalogue, const Finding& finding,
+                   const std::string& provenance) {
+  NewModel out{Declared(model.robot().path), Pushing(model, catalogue, finding)};
   for (const Term& t : finding.terms) {
     if (!t.confirmed) continue;
-    text += Comments(t, provenance);
-    text += t.record->on_target ? EffectTable(model, finding, t)
-                                : fmt::format("# No model can hold it: {}.\n", t.record->remedy);
+    out.text += Comments(t, provenance);
+    if (!t.record->on_target) {
+      out.text += fmt::format("# No model can hold it: {}.\n", t.record->remedy);
+      continue;
+    }
+    if (StartsFromZero(t, out.from_zero))
+      out.text += "# Beyond the logs this friction would push. So it starts from zero, and armcal identify fits it.\n";
+    out.text += TableText(UseOf(model, finding, t, out.from_zero));
   }
-  return text + FrictionBeside(model, finding);
+  for (const codegen::EffectUse& use : FrictionBeside(model, finding))
+    out.text += "\n# The friction that was fitted beside what was found.\n" + TableText(use);
+  return out;
 }
 
 }  // namespace armcal::diagnosis

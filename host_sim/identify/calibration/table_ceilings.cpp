@@ -165,6 +165,7 @@ void AddFriction(const codegen::Model& m, const Ceilings& c, const model::Ceilin
     for (const GridFriction& at : grid)
       if (at.joint == j && !core::IsOk(at.Judge(view)) && (!worst || excess(at) > excess(*worst))) worst = &at;
     if (!worst) continue;
+    out.joints.push_back(j);
     const bool pushes = worst->sum_Nm < 0;
     out.said.push_back(
         fmt::format("joint {}: at {:.3g} rad/s (m/s) the fitted friction would {} by {:.4g} N m (N); a drive takes at most "

@@ -17,6 +17,7 @@ std::string BeyondCeiling(const codegen::Model& model, const TableFile& table);
 struct Ceiled {
   std::vector<std::string> said;  // a sentence for each number that lies beyond, as the user reads it
   std::vector<Limit> limits;      // for FitWithBarrier; a joint whose friction lies beyond has them on the whole grid
+  std::vector<int> joints;        // whose friction lies beyond, from 0
 };
 // table: of a fit, its means are those of the fit. Columns of friction that depend on the estimate are taken as they are
 // at this table. The default table keeps the limits if it is within the ceilings itself.

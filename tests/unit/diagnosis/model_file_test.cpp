@@ -72,7 +72,7 @@ class NewModelFile : public testing::Test {
   codegen::Model Generated(const codegen::Model& declared, const Finding& finding) {
     file_ = folder_ / "new" / "model.toml";
     fs::create_directories(file_.parent_path());
-    std::ofstream(file_) << ModelFile(declared, finding, "Train: a.csv (sha256 0123456789abcdef)");
+    std::ofstream(file_) << ModelFile(declared, Records(), finding, "Train: a.csv (sha256 0123456789abcdef)").text;
     codegen::Model next(codegen::ReadRobot(file_), Records());
     EXPECT_GT(codegen::Emit(next).text.at("model.hpp").size(), 1000u);
     return next;

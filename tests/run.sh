@@ -84,6 +84,7 @@ if [[ $scope == peers ]]; then
   step "its regressor and Pinocchio" build/peers/venv/bin/python tests/peers/python_test.py build/host/armcal build/peers/python
   step "packages of Conan, colcon, PlatformIO and Zephyr" build/peers/venv/bin/python tests/peers/packages_test.py . build/peers/packages
   if step "docs packages" toolchains/install.sh docs; then step "the site" cmake --build --preset host --target docs_site; fi
+  step "the page about TLS" tests/docs/follow.sh docs/tls.md build/peers/tls build/host/armcal
   step "the report in a browser" build/peers/venv/bin/python tests/peers/report_test.py build/host/armcal build/peers/report
   finish
 fi

@@ -3,7 +3,7 @@
 #   toolchains/install.sh host    compiler, libraries and tests of the PC side
 #   toolchains/install.sh cross   compiler of the Cortex-M images
 #   toolchains/install.sh fuzz    clang with libFuzzer, for the long tests
-#   toolchains/install.sh peers   Python, its headers, pip, a browser and colcon, for tests/run.sh peers
+#   toolchains/install.sh peers   Python, its headers, pip, a browser, colcon and stunnel, for tests/run.sh peers
 #   toolchains/install.sh docs    Sphinx and Doxygen, for the target docs_site
 # Does nothing when all is there. Needs root or sudo only when something is missing.
 set -euo pipefail
@@ -15,7 +15,8 @@ host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
 cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   qemu-system-arm python3)
 fuzz_packages=(clang libclang-rt-dev)
-peers_packages=(python3 python3-dev python3-venv python3-pip chromium colcon python3-colcon-cmake python3-colcon-ros)
+peers_packages=(python3 python3-dev python3-venv python3-pip chromium colcon python3-colcon-cmake python3-colcon-ros
+  stunnel4 openssl)
 docs_packages=(python3 python3-sphinx python3-myst-parser doxygen)
 
 case "${1:-}" in

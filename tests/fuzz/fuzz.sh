@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 seconds=${1:?how many seconds}
 shift
 targets=("$@")
-[[ ${#targets[@]} -gt 0 ]] || targets=(rtu tcp engine table vendor csv gzip robot mcap)
+[[ ${#targets[@]} -gt 0 ]] || targets=(rtu tcp engine controller table vendor csv gzip robot mcap)
 mkdir -p build/fuzz
 
 # The readers are linked with the same toml++ library as armcal. In the header-only form of toml++ 3.3 an assert fails on a table

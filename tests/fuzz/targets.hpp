@@ -17,6 +17,8 @@ void Tcp(const std::uint8_t* bytes, std::size_t count);
 // Requests of three connections, and whole steps of flashing: the table in force is the one before or one that was
 // checked.
 void Engine(const std::uint8_t* bytes, std::size_t count);
+// The same requests, trials and ticks, given to the whole controller of a small arm: no torque is beyond its ceiling.
+void Controller(const std::uint8_t* bytes, std::size_t count);
 void Table(const std::uint8_t* bytes, std::size_t count);
 void Vendor(const std::uint8_t* bytes, std::size_t count);
 // Files. Bad ones are io::InputError, nothing else.
@@ -25,8 +27,8 @@ void Gzip(const std::uint8_t* bytes, std::size_t count);
 void Robot(const std::uint8_t* bytes, std::size_t count);
 void Mcap(const std::uint8_t* bytes, std::size_t count);
 
-inline constexpr Target kTargets[] = {{"rtu", Rtu},     {"tcp", Tcp},       {"engine", Engine},
-                                      {"table", Table}, {"vendor", Vendor}, {"csv", Csv},
-                                      {"gzip", Gzip},   {"robot", Robot},   {"mcap", Mcap}};
+inline constexpr Target kTargets[] = {
+    {"rtu", Rtu},       {"tcp", Tcp}, {"engine", Engine}, {"controller", Controller}, {"table", Table},
+    {"vendor", Vendor}, {"csv", Csv}, {"gzip", Gzip},     {"robot", Robot},           {"mcap", Mcap}};
 
 }  // namespace armcal::fuzz

@@ -3,15 +3,20 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <memory>
+#include <utility>
 #include <vector>
 
+#include "armcal/controller/controller.hpp"
 #include "armcal/estimator/adopted_table.hpp"
+#include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/link/rtu.hpp"
 #include "armcal/link/tcp.hpp"
 #include "armcal/model/ceilings.hpp"
 #include "armcal/model/parameters.hpp"
 #include "codegen/generated/er20_like/model.hpp"
+#include "codegen/generated/two_link/model.hpp"
 #include "host_sim/machine/drive/vendor_block.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tests/unit/link/test_device.hpp"
@@ -34,6 +39,54 @@ struct Source {
     const auto high = static_cast<std::uint16_t>(Byte() << 8);
     return static_cast<std::uint16_t>(high | Byte());
   }
+};
+
+// Requests of three connections to the engine of a device. step: what the device's background does.
+class Clients {
+ public:
+  Clients(link::PduEngine& engine, std::function<void()> step, std::uint32_t schema)
+      : engine_(engine), step_(std::move(step)), schema_(schema), session_{0, engine.sessions().Begin(), engine.sessions().Begin()} {}
+
+  void Choose(unsigned session) { now_ = session_[session % 3]; }
+  void Ask(const std::vector<std::uint8_t>& pdu) {
+    std::uint8_t reply[link::kMaxPdu];
+    std::size_t length = engine_.Handle(pdu.data(), pdu.size(), reply, now_);
+    for (int turn = 0; turn < 100 && length == link::kReplyLater; ++turn) {
+      step_();
+      length = engine_.Handle(pdu.data(), pdu.size(), reply, now_);
+    }
+    Must(length <= link::kMaxPdu && (pdu.empty() ? length == 0 : length >= 2), "a reply of impossible length");
+  }
+  void Write(std::size_t first, const std::vector<std::uint16_t>& words) {
+    std::vector<std::uint8_t> pdu{
+        16, static_cast<std::uint8_t>(first >> 8),   static_cast<std::uint8_t>(first),
+        0,  static_cast<std::uint8_t>(words.size()), static_cast<std::uint8_t>(2 * words.size())};
+    for (const std::uint16_t w : words)
+      pdu.push_back(static_cast<std::uint8_t>(w >> 8)), pdu.push_back(static_cast<std::uint8_t>(w));
+    Ask(pdu);
+  }
+  void Unlock() { Write(link::reg::kUnlock.address, {0x6B6C, 0x6E75}); }
+  void Command(std::uint32_t name, const std::vector<std::uint16_t>& stage) {
+    namespace reg = link::reg;
+    link::Words<reg::kCommandBlock> w;
+    w.Set<reg::kSequence>(++sequence_);
+    w.Set<reg::kCommand>(name);
+    w.Set<reg::kCommandSchema>(schema_);
+    w.Set<reg::kCommandWords>(static_cast<std::uint16_t>(stage.size()));
+    w.Set<reg::kCommandCrc>(core::Crc32Words(stage.data(), stage.size()));
+    Write(reg::kSequence.address, {w.data(), w.data() + w.size()});
+  }
+  void Stage(const std::vector<std::uint16_t>& stage) {
+    for (std::size_t at = 0; at < stage.size(); at += 120)
+      Write(link::reg::kStagedTable.address + at,
+            {stage.begin() + static_cast<std::ptrdiff_t>(at),
+             stage.begin() + static_cast<std::ptrdiff_t>(std::min(at + 120, stage.size()))});
+  }
+
+ private:
+  link::PduEngine& engine_;
+  std::function<void()> step_;
+  std::uint32_t schema_, sequence_ = 0, session_[3], now_ = 0;
 };
 
 class StillArm final : public drive::PlayedMotion {
@@ -91,66 +144,36 @@ void Engine(const std::uint8_t* bytes, std::size_t count) {
   const auto drive = std::make_unique<test::TestDevice>();
   Source in{bytes, count};
   const std::vector<std::uint16_t> before = drive->active;
-  const std::uint32_t sessions[] = {0, drive->device.engine().sessions().Begin(),
-                                    drive->device.engine().sessions().Begin()};
   std::vector<std::uint16_t> stage = test::MakeTable(1);
-  std::uint32_t now_ms = 0, sequence = 0;
+  std::uint32_t now_ms = 0;
+  Clients clients(drive->device.engine(), [&] { drive->device.Step(now_ms); }, test::kSchema);
   std::vector<std::vector<std::uint16_t>> checked;
   while (in.left > 0) {
     const std::uint8_t what = in.Byte();
-    const std::uint32_t session = sessions[what / 8 % 3];
-    std::uint8_t reply[link::kMaxPdu];
-    const auto ask = [&](const std::vector<std::uint8_t>& pdu) {
-      std::size_t length = drive->device.engine().Handle(pdu.data(), pdu.size(), reply, session);
-      for (int turn = 0; turn < 100 && length == link::kReplyLater; ++turn) {
-        drive->device.Step(now_ms);
-        length = drive->device.engine().Handle(pdu.data(), pdu.size(), reply, session);
-      }
-      Must(length <= link::kMaxPdu && (pdu.empty() ? length == 0 : length >= 2), "a reply of impossible length");
-    };
-    const auto write = [&](int first, const std::vector<std::uint16_t>& words) {
-      std::vector<std::uint8_t> pdu{
-          16, static_cast<std::uint8_t>(first >> 8),   static_cast<std::uint8_t>(first),
-          0,  static_cast<std::uint8_t>(words.size()), static_cast<std::uint8_t>(2 * words.size())};
-      for (const std::uint16_t w : words)
-        pdu.push_back(static_cast<std::uint8_t>(w >> 8)), pdu.push_back(static_cast<std::uint8_t>(w));
-      ask(pdu);
-    };
-    const auto command = [&](std::uint32_t name) {
-      link::Words<reg::kCommandBlock> w;
-      w.Set<reg::kSequence>(++sequence);
-      w.Set<reg::kCommand>(name);
-      w.Set<reg::kCommandSchema>(test::kSchema);
-      w.Set<reg::kCommandWords>(test::kTableWords);
-      w.Set<reg::kCommandCrc>(core::Crc32Words(stage.data(), stage.size()));
-      write(reg::kSequence.address, {w.data(), w.data() + w.size()});
-    };
+    clients.Choose(what / 8);
     switch (what % 8) {
       case 0: {
         std::vector<std::uint8_t> pdu(in.Byte());
         for (std::uint8_t& byte : pdu) byte = in.Byte();
-        ask(pdu);
+        clients.Ask(pdu);
         break;
       }
       case 1:
-        write(reg::kUnlock.address, {0x6B6C, 0x6E75});
+        clients.Unlock();
         break;
       case 2:
-        command(reg::kOpen);
+        clients.Command(reg::kOpen, stage);
         break;
       case 3:
         stage = test::MakeTable(in.Byte());
         stage[2 + in.Byte() % 250u] = in.Word();
-        for (std::size_t at = 0; at < stage.size(); at += 120)
-          write(reg::kStagedTable.address + static_cast<int>(at),
-                {stage.begin() + static_cast<std::ptrdiff_t>(at),
-                 stage.begin() + static_cast<std::ptrdiff_t>(std::min(at + 120, stage.size()))});
+        clients.Stage(stage);
         break;
       case 4:
-        command(reg::kCheck);
+        clients.Command(reg::kCheck, stage);
         break;
       case 5:
-        command(reg::kSave);
+        clients.Command(reg::kSave, stage);
         break;
       case 6:
         drive->application.enabled = in.Byte() % 4 == 0;
@@ -172,6 +195,99 @@ void Engine(const std::uint8_t* bytes, std::size_t count) {
     Must(old || drive->active == drive->application.adopted ||
              drive->transaction.state() == link::TransactionState::kCommitting,
          "a table in force that was not adopted");
+  }
+}
+
+void Controller(const std::uint8_t* bytes, std::size_t count) {
+  namespace reg = link::reg;
+  using Model = generated::TwoLink;
+  using Drive = controller::Controller<Model, filter::ForgettingFilter<Model>>;
+  constexpr int n = Model::kJoints;
+  struct Time {
+    std::uint32_t tick = 0;
+    static std::uint32_t Read(void* self) { return static_cast<Time*>(self)->tick; }
+  } time;
+  test::NorFlash flash{{2, 8192, 8, 0xFF}};
+  controller::BoardRules rules;
+  rules.adopt_while_enabled = true, rules.saves = {100, 0};
+  const auto drive =
+      std::make_unique<Drive>(flash.storage(), hardware::Clock{&time, Time::Read, Time::Read}, link::Identity{}, rules);
+  const auto trace = std::make_unique<controller::RawTrace<Model, 1024>>();
+  Must(core::IsOk(drive->Record(*trace)), "a trace that cannot be served");
+  (void)drive->Boot();
+  std::vector<std::uint16_t> usual(estimator::Table<Model>::kWords);
+  model::Encode(estimator::DefaultTable<Model>(), usual.data());
+  std::vector<std::uint16_t> stage = usual;
+  Source in{bytes, count};
+  Clients clients(drive->engine(), [&] { (void)drive->Step(); }, Model::kSchema);
+  const auto number = [&in](float size) { return size * static_cast<float>(static_cast<std::int8_t>(in.Byte())) / 127.0f; };
+  while (in.left > 0) {
+    const std::uint8_t what = in.Byte();
+    clients.Choose(what / 16);
+    switch (what % 16) {
+      case 0: {
+        std::vector<std::uint8_t> pdu(in.Byte());
+        for (std::uint8_t& byte : pdu) byte = in.Byte();
+        clients.Ask(pdu);
+        break;
+      }
+      case 1:
+        clients.Unlock();
+        break;
+      case 2:
+        clients.Command(reg::kOpen, stage);
+        break;
+      case 3:  // the model's own table, bumpless, with up to three words changed
+        stage = usual;
+        stage[5] = 1, stage[7] = 500;
+        for (unsigned k = in.Byte() % 4u; k > 0; --k) stage[in.Word() % stage.size()] = in.Word();
+        clients.Stage(stage);
+        break;
+      case 4:
+        clients.Command(reg::kCheck, stage);
+        break;
+      case 5:
+        clients.Command(reg::kSave, stage);
+        break;
+      case 6:
+        clients.Command(reg::kTrial, stage);
+        break;
+      case 7:
+        clients.Command(reg::kConfirm, stage);
+        break;
+      case 8:
+        clients.Command(reg::kBack, stage);
+        break;
+      case 9:
+        drive->SetEnabledAxes(in.Byte() % 4u);
+        break;
+      case 10:
+        drive->ReportTrackingError();
+        break;
+      case 11:
+        time.tick += in.Word();
+        break;
+      default: {
+        controller::SetPoint<n> set;
+        model::RawSample<n> raw;
+        for (int j = 0; j < n; ++j) {
+          set.q[j] = number(7.0f), set.qd[j] = number(30.0f), set.qdd[j] = number(200.0f);
+          raw.counts[j] = in.Word() * 8, raw.current[j] = static_cast<std::int16_t>(in.Word());
+          raw.flags[j] = in.Byte(), raw.temperature_degC[j] = number(300.0f);
+        }
+        for (unsigned ticks = 1 + in.Byte() % 20u; ticks > 0; --ticks) {
+          float tau_Nm[n];
+          (void)drive->FeedForward(set, raw.temperature_degC, tau_Nm);
+          for (int j = 0; j < n; ++j)
+            Must(std::abs(tau_Nm[j]) <= Model::kCeilings.joint[j].torque_Nm, "a torque beyond the ceiling");
+          raw.tick = ++time.tick;
+          for (int j = 0; j < n; ++j) raw.counts[j] += static_cast<std::int32_t>(100.0f * set.qd[j]);
+          (void)drive->Push(raw);
+        }
+        break;
+      }
+    }
+    for (int step = 0; step < 40 && drive->Step(); ++step) {}
   }
 }
 

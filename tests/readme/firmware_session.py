@@ -75,6 +75,11 @@ class Line:
             raise Refused(reply[2])
         return reply[2:-2]
 
+    def drain(self):
+        """A late reply must not be taken for the next one."""
+        while select.select([self.file], [], [], 1.0)[0]:
+            os.read(self.file, 4096)
+
     def ask(self, pdu):
         deadline = time.monotonic() + SECONDS
         while True:
@@ -84,6 +89,7 @@ class Line:
                 if time.monotonic() > deadline:
                     raise SystemExit(f"no reply to {pdu[:5].hex()}: {missing}")
                 print(f"asking {pdu[:5].hex()} again: {missing}")
+                self.drain()
 
     def read(self, function, first, count):
         words = []

@@ -85,9 +85,10 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
   Print(*run, o);
   for (const int j : after_test.from_zero)
     if (!o.model_out.empty())
-      fmt::print("joint {}: the friction that was found would push beyond the logs; in {} it starts from zero, and armcal "
-                 "identify fits it within what a drive takes\n",
-                 j + 1, o.model_out);
+      fmt::print(
+          "joint {}: the friction that was found would push beyond the logs; in {} it starts from zero, and armcal "
+          "identify fits it within what a drive takes\n",
+          j + 1, o.model_out);
   WriteJson(o.json, json);
   return run;
 }

@@ -186,8 +186,7 @@ void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vecto
   const calibration::Fit all = calibration::WeightedFit(known, calibration::Pointers(without));
   const calibration::Fit held =
       calibration::WeightedFit(known, calibration::Pointers(without), calibration::HardlyDetermined(known, all));
-  const analysis::IdentifiedBodies read =
-      analysis::ReadBodies(known, all, held, without[0].s.t[1] - without[0].s.t[0]);
+  const analysis::IdentifiedBodies read = analysis::ReadBodies(known, all, held, without[0].s.t[1] - without[0].s.t[0]);
   PrintHeld(read);
   calibration::TableFile table = read.table;
   for (std::size_t j = 0; j < scale.size(); ++j) table.joint[j].torque_scale *= scale[j];

@@ -83,8 +83,8 @@ std::vector<fs::path> Cases(const fs::path& practice) {
 // The declared model of a practice case.
 std::string RobotOf(const fs::path& one, const fs::path& folder) {
   const std::string robot = (folder / (one.filename().string() + ".toml")).string();
-  const Outcome o = RunProgram({ARMCAL_BUILD_FOLDER "/tests/practice/practice_robot", one.string(),
-                                (one.parent_path() / "robots").string()});
+  const Outcome o = RunProgram(
+      {ARMCAL_BUILD_FOLDER "/tests/practice/practice_robot", one.string(), (one.parent_path() / "robots").string()});
   EXPECT_EQ(o.code, 0) << o.err;
   std::ofstream(robot) << o.out;
   return robot;
@@ -176,7 +176,8 @@ TEST(LongAcceptedTables, OfModelsDiagnosedFromMeasuredLogs) {
     ASSERT_NO_FATAL_FAILURE(Identify(model.string(), train, channels, table));
     ExpectAccepted(model.string(), {table});
   };
-  const Names emps = Logs(measured / "emps"), kr300 = Logs(measured / "kuka_kr300"), lwr4 = Logs(measured / "kuka_lwr4");
+  const Names emps = Logs(measured / "emps"), kr300 = Logs(measured / "kuka_kr300"),
+              lwr4 = Logs(measured / "kuka_lwr4");
   diagnosed("emps", {emps[0]}, emps[1], "host_sim/data/channels/emps.toml");
   diagnosed("kuka_kr300", {kr300[0], kr300[1]}, kr300[2], "host_sim/data/channels/kuka_kr300.toml");
   diagnosed("kuka_lwr4", {lwr4[0], lwr4[1]}, lwr4[2], kLwr4Channels);

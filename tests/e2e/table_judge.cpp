@@ -1,5 +1,6 @@
 // end-to-end tests - the firmware's check of tables, compiled for one generated model by accepted_tables_test.cpp.
-//   table_judge < WORDS    WORDS: a table a line, its words in hex. The first answer is about the model's default table.
+//   table_judge < WORDS    WORDS: a table a line, its words in hex. The first answer is about the model's default
+//   table.
 // An answer is a line: "accepted", or the status, word, value and bound of the refusal.
 #include <cstdint>
 #include <iostream>

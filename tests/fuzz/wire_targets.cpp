@@ -45,7 +45,10 @@ struct Source {
 class Clients {
  public:
   Clients(link::PduEngine& engine, std::function<void()> step, std::uint32_t schema)
-      : engine_(engine), step_(std::move(step)), schema_(schema), session_{0, engine.sessions().Begin(), engine.sessions().Begin()} {}
+      : engine_(engine),
+        step_(std::move(step)),
+        schema_(schema),
+        session_{0, engine.sessions().Begin(), engine.sessions().Begin()} {}
 
   void Choose(unsigned session) { now_ = session_[session % 3]; }
   void Ask(const std::vector<std::uint8_t>& pdu) {
@@ -146,7 +149,8 @@ void Engine(const std::uint8_t* bytes, std::size_t count) {
   const std::vector<std::uint16_t> before = drive->active;
   std::vector<std::uint16_t> stage = test::MakeTable(1);
   std::uint32_t now_ms = 0;
-  Clients clients(drive->device.engine(), [&] { drive->device.Step(now_ms); }, test::kSchema);
+  Clients clients(
+      drive->device.engine(), [&] { drive->device.Step(now_ms); }, test::kSchema);
   std::vector<std::vector<std::uint16_t>> checked;
   while (in.left > 0) {
     const std::uint8_t what = in.Byte();
@@ -219,8 +223,11 @@ void Controller(const std::uint8_t* bytes, std::size_t count) {
   model::Encode(estimator::DefaultTable<Model>(), usual.data());
   std::vector<std::uint16_t> stage = usual;
   Source in{bytes, count};
-  Clients clients(drive->engine(), [&] { (void)drive->Step(); }, Model::kSchema);
-  const auto number = [&in](float size) { return size * static_cast<float>(static_cast<std::int8_t>(in.Byte())) / 127.0f; };
+  Clients clients(
+      drive->engine(), [&] { (void)drive->Step(); }, Model::kSchema);
+  const auto number = [&in](float size) {
+    return size * static_cast<float>(static_cast<std::int8_t>(in.Byte())) / 127.0f;
+  };
   while (in.left > 0) {
     const std::uint8_t what = in.Byte();
     clients.Choose(what / 16);
@@ -287,7 +294,8 @@ void Controller(const std::uint8_t* bytes, std::size_t count) {
         break;
       }
     }
-    for (int step = 0; step < 40 && drive->Step(); ++step) {}
+    for (int step = 0; step < 40 && drive->Step(); ++step) {
+    }
   }
 }
 

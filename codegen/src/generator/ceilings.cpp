@@ -42,8 +42,8 @@ Ceilings::OfJoint OfJoint(const Robot& r, int i) {
           j.position_limit_rad[1]};
 }
 
-// The heaviest load beyond the last link that every joint holds on a stretched arm that weighs nothing. A log of a laden
-// arm shows the load as a part of the last link, whose own mass says nothing of it.
+// The heaviest load beyond the last link that every joint holds on a stretched arm that weighs nothing. A log of a
+// laden arm shows the load as a part of the last link, whose own mass says nothing of it.
 double LargestLoad_kg(const Robot& r) {
   double load_kg = INFINITY, reach_m = kLoadDistance_m;
   for (int i = r.joints() - 1; i >= 0; --i) {

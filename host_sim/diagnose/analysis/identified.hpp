@@ -24,7 +24,7 @@ struct IdentifiedBodies {
   calibration::PhysicalReadOut bodies;
   calibration::TableFile table;
   std::vector<std::string> held;  // what the fit gave beyond the ceilings, a sentence for each
-  int FromPrior() const;  // so many rows of the table rest mostly on the prior
+  int FromPrior() const;          // so many rows of the table rest mostly on the prior
 };
 // all: every parameter free; used: those held that the logs hardly determine. step_s: the logs' sample time.
 IdentifiedBodies ReadBodies(const codegen::Model& model, const calibration::Fit& all, const calibration::Fit& used,

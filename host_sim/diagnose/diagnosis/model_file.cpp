@@ -93,7 +93,8 @@ std::vector<codegen::EffectUse> FrictionBeside(const codegen::Model& model, cons
   for (const codegen::EffectInstance& e : model.effects()) {
     if (!e.record->friction_law && e.record->replaces.empty()) continue;
     const auto any = [&](const auto& is) {
-      return std::any_of(finding.terms.begin(), finding.terms.end(), [&](const Term& t) { return IsWritten(t) && is(t); });
+      return std::any_of(finding.terms.begin(), finding.terms.end(),
+                         [&](const Term& t) { return IsWritten(t) && is(t); });
     };
     if (!any([&](const Term& t) { return Contains(t.joints, e.joints[0]); })) continue;
     if (any([&](const Term& t) { return t.record->replaces == e.record->name && t.joints == e.joints; })) continue;

@@ -116,6 +116,10 @@ void WriteIdentificationPage(const std::filesystem::path& path, const ordered_js
   page.Add(SpectrumCharts(json, predicted, {worst}), log + "; samples without a prediction count as zero.");
   AddErrors(page, json);
   AddColumns(page, json);
+  if (json.contains("held_to_ceilings") && !json["held_to_ceilings"].empty()) {
+    page.Section("Held within what a drive takes");
+    page.List(json["held_to_ceilings"].get<std::vector<std::string>>());
+  }
   if (json.contains("held_out_text") && !json["held_out_text"].empty()) {
     page.Section("What the held-out log cannot tell");
     page.List(json["held_out_text"].get<std::vector<std::string>>());

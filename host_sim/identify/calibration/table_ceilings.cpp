@@ -53,7 +53,7 @@ std::string InWords(const TableFile& t, const core::Refusal& r) {
 // The friction of one joint at one point of the firmware's grid.
 struct GridFriction {
   int joint = 0;
-  double speed_radps = 0;
+  double speed_radps = 0, degC = 0;
   Eigen::VectorXd braking;  // [columns] against the motion, per unit of each column that counts
   double sum_Nm = 0;
   int column = 0;  // the one with the largest torque
@@ -97,7 +97,7 @@ std::vector<GridFriction> FrictionOnGrid(const codegen::Model& m, const Ceilings
   for (int p = 0; p < points; ++p)
     for (int i = 0; i < n; ++i) {
       const int row = p * each + each - 1;
-      GridFriction at{i, s.qd(row, i), Eigen::VectorXd::Zero(m.columns()), 0, m.front_begin(i)};
+      GridFriction at{i, s.qd(row, i), s.temp(row, i), Eigen::VectorXd::Zero(m.columns()), 0, m.front_begin(i)};
       double greatest = -1;
       for (int k = m.front_begin(i); k < m.front_begin(i + 1); ++k) {
         if (!c.friction[k] || t.row[m.table_index(k)].state == "standby") continue;
@@ -142,8 +142,8 @@ void AddMeans(const codegen::Model& m, const Ceilings& c, const TableFile& t, Ce
     (limit.*part)[place] = towards;
     limit.base = -towards * (ceiling + kInside * (m.table()[k].mean - ceiling));
     out.limits.push_back(std::move(limit));
-    out.said.push_back(fmt::format("{}: the fit gives {:.6g}; a drive takes {} {:.6g}, so it was held there",
-                                   row.name, row.mean, row.mean < low ? "at least" : "at most", ceiling));
+    out.said.push_back(fmt::format("{}: the fit gives {:.6g}; a drive takes {} {:.6g}, so it was held there", row.name,
+                                   row.mean, row.mean < low ? "at least" : "at most", ceiling));
   };
   for (int k = 0; k < m.body_parameters(); ++k) add(k, &Limit::bodies, k);
   for (int k = 0; k < m.columns(); ++k)
@@ -166,12 +166,12 @@ void AddFriction(const codegen::Model& m, const Ceilings& c, const model::Ceilin
       if (at.joint == j && !core::IsOk(at.Judge(view)) && (!worst || excess(at) > excess(*worst))) worst = &at;
     if (!worst) continue;
     out.joints.push_back(j);
-    const bool pushes = worst->sum_Nm < 0;
-    out.said.push_back(
-        fmt::format("joint {}: at {:.3g} rad/s (m/s) the fitted friction would {} by {:.4g} N m (N); a drive takes at most "
-                    "{:.4g}, so it was held there",
-                    j + 1, worst->speed_radps, pushes ? "push" : "brake", std::abs(worst->sum_Nm),
-                    pushes ? ceiling.feed_Nm : ceiling.friction_Nm));
+    const bool pushes = worst->sum_Nm < 0, by_temperature = (c.friction_reads & model::kReadsTemperature) != 0;
+    out.said.push_back(fmt::format(
+        "joint {}: at {:.3g} rad/s (m/s){} the fitted friction would {} by {:.4g} N m (N); a drive takes at most "
+        "{:.4g}, so it was held there",
+        j + 1, worst->speed_radps, by_temperature ? fmt::format(" and {:g} deg C", worst->degC) : "",
+        pushes ? "push" : "brake", std::abs(worst->sum_Nm), pushes ? ceiling.feed_Nm : ceiling.friction_Nm));
     for (const GridFriction& at : grid) {
       if (at.joint != j) continue;
       const double before = at.braking.dot(own);

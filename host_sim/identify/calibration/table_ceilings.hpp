@@ -19,8 +19,8 @@ struct Ceiled {
   std::vector<Limit> limits;      // for FitWithBarrier; a joint whose friction lies beyond has them on the whole grid
   std::vector<int> joints;        // whose friction lies beyond, from 0
 };
-// table: of a fit, its means are those of the fit. Columns of friction that depend on the estimate are taken as they are
-// at this table. The default table keeps the limits if it is within the ceilings itself.
+// table: of a fit, its means are those of the fit. Columns of friction that depend on the estimate are taken as they
+// are at this table. The default table keeps the limits if it is within the ceilings itself.
 Ceiled BeyondCeilings(const codegen::Model& model, const TableFile& table);
 
 // "Fc2: mean", "joint 2: torque_limit_Nm", "flags": what a word of the table is called.

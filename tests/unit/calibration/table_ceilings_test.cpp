@@ -77,11 +77,12 @@ TEST(TableCeilings, LimitsOfAFit_LieBetweenTheModelsOwnTableAndWhatIsRefused) {
   Row(t, "m2").mean = 30;
   Row(t, "Fc1").mean = 4, Row(t, "Fv1").mean = -2.2;  // 4 - 2.2 * 3.49 = -3.68 at full speed; 3 are allowed
   const Ceiled beyond = BeyondCeilings(model, t);
-  EXPECT_EQ(beyond.said,
-            (std::vector<std::string>{
-                "m2: the fit gives 30; a drive takes at most 21.6453, so it was held there",
-                "joint 1: at 3.49 rad/s (m/s) the fitted friction would push by 3.679 N m (N); a drive takes at most 3, so "
-                "it was held there"}));
+  EXPECT_EQ(
+      beyond.said,
+      (std::vector<std::string>{
+          "m2: the fit gives 30; a drive takes at most 21.6453, so it was held there",
+          "joint 1: at 3.49 rad/s (m/s) the fitted friction would push by 3.679 N m (N); a drive takes at most 3, so "
+          "it was held there"}));
   ASSERT_EQ(beyond.limits.size(), 1u + 2 * 16) << "eight speeds in two directions, two limits each";
   int broken = 0;
   for (const Limit& limit : beyond.limits) {

@@ -64,7 +64,8 @@ TEST(Verdict, OnARepeatedTrajectory_ConfirmsNothing_AndWritesNothing) {
   EXPECT_FALSE(d.view.finding->terms[0].confirmed);
   EXPECT_NE(DiagnosisText(d.view).find("found on this trajectory, NOT CONFIRMED"), std::string::npos);
   EXPECT_NE(Sentence(d.view, 0).find("another trajectory"), std::string::npos) << Sentence(d.view, 0);
-  EXPECT_EQ(diagnosis::ModelFile(d.arm.model(), tests::Records(), *d.view.finding, "").text.find("torque_ripple"), std::string::npos);
+  EXPECT_EQ(diagnosis::ModelFile(d.arm.model(), tests::Records(), *d.view.finding, "").text.find("torque_ripple"),
+            std::string::npos);
   const nlohmann::ordered_json json = DiagnosisJson(d.view);
   EXPECT_EQ(json["verdict"], "none");
   EXPECT_EQ(json["terms"][0]["unconfirmed"], "it repeats");

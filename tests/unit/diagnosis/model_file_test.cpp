@@ -209,6 +209,26 @@ TEST_F(NewModelFile, OfALawThatReplaces_HasTheDeclaredFrictionAdded) {
   }
 }
 
+// Friction that was fitted beside a term is written with it. Where the sum would push at full speed, the term starts
+// from zero: at 3.49 rad/s this one takes 0.6 (3.49)^3 = 25.5 N m off about 1 + 1.2 * 3.49 N m, and 3 N m may push.
+TEST_F(NewModelFile, OfFrictionThatWouldPushBeyondTheLogs_StartsFromZero) {
+  const codegen::Model declared(codegen::ReadRobot("codegen/robots/two_link.toml"), Records());
+  for (const double amplitude : {0.6, -0.05, -0.6}) {
+    Finding finding = Of({Found("viscous_cubic", declared)}, declared);
+    Term& t = finding.terms[0];
+    ASSERT_EQ(t.joints, std::vector<int>{0});
+    ASSERT_EQ(t.amplitude.size(), 1);
+    t.amplitude[0] = amplitude;
+    const codegen::Model next = Generated(declared, finding);
+    const bool pushes = amplitude == -0.6;
+    EXPECT_EQ(Entry(next, t.columns[0].name)->mean, pushes ? 0 : amplitude);
+    EXPECT_EQ(ModelFile(declared, Records(), finding, "").from_zero, pushes ? std::vector<int>{0} : std::vector<int>{});
+    EXPECT_EQ(Count(Text(file_), "So it starts from zero"), pushes ? 1 : 0);
+    for (int c = 0; c < 2; ++c) EXPECT_NEAR(Entry(next, declared.column_name(c))->mean, finding.x[c], 1e-8);
+    EXPECT_EQ(Entry(next, "Fc2")->mean, Entry(declared, "Fc2")->mean) << "a joint without a term";
+  }
+}
+
 TEST_F(NewModelFile, OfARobotFromUrdf_FindsItsUrdfFromElsewhere) {
   std::ofstream(folder_ / "arm.urdf") << R"(<robot name="arm"><link name="base"/><link name="l1"><inertial>
     <origin xyz="0.2 0 0"/><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>

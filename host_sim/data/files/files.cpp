@@ -27,6 +27,9 @@ using GzHandle = std::unique_ptr<gzFile_s, CloseGz>;
 // Text of numbers shrinks to a third or a fifth. A file made to fill the memory shrinks to a thousandth.
 constexpr std::size_t kExpansion = 60, kExpansionFree_bytes = std::size_t{16} << 20;
 
+// Small files are many: robot files, tables, and what a fuzzer makes.
+constexpr std::size_t kPortion_bytes = std::size_t{1} << 16;
+
 void RequireRegular(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error)) throw io::InputError(path.string() + ": no such file");
@@ -67,7 +70,7 @@ std::string ReadWholeFile(const fs::path& path) {
   RequireRegular(path);
   GzHandle in(gzopen(path.c_str(), "rb"));
   if (!in) throw io::InputError(path.string() + ": cannot be opened");
-  gzbuffer(in.get(), 1u << 18);
+  gzbuffer(in.get(), kPortion_bytes);
   std::string content;
   std::size_t used = 0;
   for (;;) {
@@ -76,7 +79,7 @@ std::string ReadWholeFile(const fs::path& path) {
     if (used > most)
       throw io::InputError(path.string() + ": grows to more than " + std::to_string(kExpansion) +
                            " times its size when it is decompressed, which no log does");
-    content.resize(std::max<std::size_t>(std::size_t{1} << 20, used + used / 2));
+    content.resize(std::max(kPortion_bytes, used + used / 2));
     const int got = gzread(in.get(), content.data() + used,
                            static_cast<unsigned>(std::min<std::size_t>(content.size() - used, std::size_t{1} << 30)));
     int code = Z_OK;

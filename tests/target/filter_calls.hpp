@@ -41,7 +41,6 @@ struct FilterCalls {
   int (*slice_credit)();  // that cuts a sample into equal slices
   void (*begin_row)(const Row& row);
   bool (*step_row)(int& credit);
-  bool together;  // the reports of all rows stand after step_rows; else each after its step_row
   bool (*step_rows)(int& credit);
   const filter::UpdateReport& (*report)(int joint);
   void (*begin_end)(std::uint32_t moving);
@@ -119,7 +118,6 @@ struct Instance {
             SliceCredit,
             BeginRow,
             StepRow,
-            Filter::kTogether,
             StepRows,
             Report,
             BeginEnd,

@@ -185,7 +185,7 @@ class Estimator {
         BeginRow();
         return true;
       case Stage::kUpdate:
-        if (filter_.StepRow(credit_)) FinishRow();
+        if (filter_.StepRow(credit_)) stage_ = ++joint_ < n ? Stage::kRow : Stage::kRows;
         return true;
       case Stage::kRows:
         if (filter_.StepRows(credit_)) joint_ = 0, stage_ = Stage::kReport;
@@ -289,12 +289,6 @@ class Estimator {
   const model::Rows<Model>& FilterRows() const {
     if constexpr (Filter::kExtended) return live_.rows();
     else return intake_.rows();
-  }
-
-  void FinishRow() {
-    if (!Filter::kTogether) ReportRow();
-    stage_ = ++joint_ < n ? Stage::kRow : Stage::kRows;
-    if (!Filter::kTogether && joint_ == n) EndRows();
   }
 
   void ReportRow() {

@@ -17,15 +17,18 @@
 
 namespace armcal::filter {
 
-// Where the numbers are. x points at: the estimate, the row that is being processed and its gain, [shape->size] each,
-// then the factor's elements.
+inline constexpr int kRowsAtOnce = 2;  // so many rows the factor takes together
+
+// Where the numbers are. x points at: the estimate [shape->size], the rows that are being processed
+// [shape->size][kRowsAtOnce], then the factor's elements. While the rows are processed, their gains take their place. A
+// rank-one sum has its vector [shape->size] in the same room.
 template <Form form>
 struct Factor {
   const Shape<form>* shape;
   float* x;
 
-  float* row() const { return x + shape->size; }
-  float* gain() const { return x + 2 * shape->size; }
+  float* row(int p) const { return x + shape->size + kRowsAtOnce * p; }  // element p of each row
+  float* sum() const { return x + shape->size; }
   float* column(int p) const { return x + shape->Origin(p); }  // element (i, p) of the factor is column(p)[i]
   float& d(int p) const { return column(p)[p]; }
 };
@@ -75,38 +78,52 @@ ARMCAL_NOINLINE bool AddDiagonal(const Shape<form>& shape, const float* x, float
   return p == shape.size;
 }
 
-// The work on one row or one rank-one sum. A slice (slices.hpp) ends between two columns. Between two slices other code
-// may run, but it must not begin other work on the same object, and must not change the factor.
+// The work on a group of rows or on one rank-one sum. Between two slices (slices.hpp) other code may run, but it must
+// not begin other work on the same object, and must not change the factor.
+//
+// The factor takes the rows in their order. But only f = U' h of the first row and v = D f of it are needed to know
+// what the first row does to f of the second: U changes by gain times shift, so f changes by (gain' h) times shift,
+// and gain' h is a sum of v times f. So both rows are projected with the same U, and both change U in one pass.
 template <Form form>
 class FactorWork {
  public:
   using Shape = filter::Shape<form>;
   using Factor = filter::Factor<form>;
 
-  // The cost of a row. The constants (a column's own work, a row's beginning and end) were measured.
-  static constexpr int RowCost(const Shape& shape, int first, Front front) {
-    int cost = BeginCost(shape, first) + ApplyCost(shape);
-    for (int p = first; p < shape.size; p = shape.Above(p, front))
-      cost += ProjectCost(p - first) + MeasureCost(p - shape.Begin(p));
+  // The cost of a group of rows. The constants (a block's own work, the rows' beginning and end) were measured.
+  static constexpr int RowsCost(const Shape& shape, const RowPlace (&place)[kRowsAtOnce]) {
+    const Touched touched(shape, place);
+    int cost = BeginCost(shape) + ApplyCost(shape);
+    for (const Front& front : touched.front)
+      for (int j = 0, count = front.end - front.begin; j < count; j += Width(count, j))
+        cost += ProjectCost(Width(count, j), j) + MeasureCost(Width(count, j), j);
+    for (int j = touched.shared, count = shape.Shared(); j < count; j += Width(count, j)) {
+      const int p = shape.At(j), width = Width(count, j);
+      cost += ProjectCost(width, p - touched.first) + MeasureCost(width, p);
+    }
     return cost;
   }
 
-  // The row y = h' x + noise of `variance` > 0. The caller has filled in h from position `first` on; before, it is
-  // zero.
-  ARMCAL_NOINLINE void BeginRow(Factor f, int first, Front front, float y, float variance) {
-    first_ = first, front_ = front;
-    innovation_ = y - math::Dot(f.row() + first, f.x + first, f.shape->size - first);
-    alpha_ = sum_ = variance;
-    for (int p = 0; p < f.shape->size; ++p) f.gain()[p] = 0.0f;
-    next_ = f.shape->size - 1;
+  // A group begins: no row is in it yet. Until it is done, the caller fills in each row's elements (Factor::row), and
+  // calls BeginRow. A row that is not given is a row of zeros.
+  ARMCAL_NOINLINE void BeginRows(Factor f) {
+    float* const row = f.row(0);
+    math::internal::ByFours(kRowsAtOnce * f.shape->size, [&](int k) ARMCAL_INLINE { row[k] = 0.0f; });
+    for (int i = 0; i < kRowsAtOnce; ++i) innovation_[i] = 0.0f, alpha_[i] = 1.0f, place_[i] = kNoRow;
     stage_ = Stage::kBegun;
   }
-  // Returns true when the row is done. Bit p of `considered`: the column at position p has uncertainty and does not
-  // move. nullptr: there is none.
-  ARMCAL_NOINLINE bool StepRow(Factor f, const std::uint32_t* considered, int& credit) {
+  // Row i of the group: y = h' x + noise of `variance` > 0.
+  void BeginRow(int i, RowPlace place, float y, float variance) {
+    place_[i] = place;
+    innovation_[i] = y;
+    alpha_[i] = variance;
+  }
+  // Returns true when the rows are done. Bit p of `considered`: the column at position p has uncertainty and does not
+  // move. Then only row 0 may be given. nullptr: there is none.
+  ARMCAL_NOINLINE bool StepRows(Factor f, const std::uint32_t* considered, int& credit) {
     if (stage_ == Stage::kBegun) {
-      credit -= BeginCost(*f.shape, first_);
-      stage_ = Stage::kProject;
+      Predict(f);
+      credit -= BeginCost(*f.shape);
     }
     if (stage_ == Stage::kProject && !Project(f, credit)) return false;
     if (stage_ == Stage::kMeasure) {
@@ -116,164 +133,296 @@ class FactorWork {
     }
     return stage_ == Stage::kIdle || StepSum(f, credit);
   }
-  float innovation() const { return innovation_; }  // of the row that was begun last
-  float variance() const { return sum_; }           // h' P h + noise, before the row
+  // Of row i of the group that was done last: the innovation, and h' P h + noise. The rows before it are worked in.
+  float innovation(int i) const { return innovation_[i]; }
+  float variance(int i) const { return variance_[i]; }
 
   static constexpr int SumCost(const Shape& shape, int last) {  // of BeginUnitSum
     const int columns = last + 1 - shape.Begin(last);
-    return columns * FoldCost(0) + columns * (columns - 1) * 5 / 8;
+    return columns * FoldCost(0) + columns * (columns - 1) * 27 / 64;
   }
   // P + c e e' with c >= 0, where e is the unit vector of position p <= last. In the block form p and last lie in the
   // front of one joint. The instructions depend on `last` alone.
   ARMCAL_NOINLINE void BeginUnitSum(Factor f, int p, float c, int last) {
-    for (int k = f.shape->Begin(last); k <= last; ++k) f.row()[k] = 0.0f;
-    f.row()[p] = 1.0f;
+    for (int k = f.shape->Begin(last); k <= last; ++k) f.sum()[k] = 0.0f;
+    f.sum()[p] = 1.0f;
     BeginSum(f, c, last);
   }
   ARMCAL_NOINLINE bool StepSum(Factor f, int& credit) {
-    float c = alpha_;
+    float c = alpha_[0];
     int p = next_, left = credit;
-    const int first = first_;
-    float* const row = f.row();
-    for (; p >= first && left > 0; --p) {
-      float* const column = f.column(p);
-      const float a = row[p], old = column[p];
-      const float now = old + c * a * a;
-      const std::uint32_t some = math::MaskOf(now > 1e-30f);
-      const float inverse = 1.0f / math::Max(now, 1e-30f);
-      math::Fold(row + first, column + first, a, math::Masked(c * a * inverse, some), p - first);
-      column[p] = now;
-      c *= math::Select(some != 0u, old * inverse, 1.0f);
-      left -= FoldCost(p - first);
+    const int first = touched_.first;
+    float* const row = f.sum();
+    while (p >= first && left > 0) {
+      // Each column takes what lies between it and the last of them; then all take the rest together. At the end of a
+      // slice, columns are taken one by one.
+      const int length = p - first, width = length + 1 < kBlock || left < kBlock * FoldCost(length) ? 1 : kBlock;
+      const int last = p - width + 1;
+      float* column[kBlock];
+      float fold[kBlock][2];
+      for (int k = 0; k < width; ++k, --p) {
+        column[k] = f.column(p) + first;
+        const float a = row[p], old = f.d(p);
+        const float now = old + c * a * a;
+        const std::uint32_t some = math::MaskOf(now > 1e-30f);
+        const float inverse = 1.0f / math::Max(now, 1e-30f);
+        fold[k][0] = a;
+        fold[k][1] = math::Masked(c * a * inverse, some);
+        f.d(p) = now;
+        c *= math::Select(some != 0u, old * inverse, 1.0f);
+        const int from = width == 1 ? first : last;
+        math::Fold(row + from, f.column(p) + from, a, fold[k][1], p - from);
+        left -= FoldCost(p - first);
+      }
+      if (width == kBlock) math::FoldColumns<kBlock>(row + first, column, fold[0], last - first);
     }
     credit = left;
-    alpha_ = c, next_ = p;
+    alpha_[0] = c, next_ = p;
     if (p < first) stage_ = Stage::kIdle;
     return p < first;
   }
 
  private:
-  static constexpr int BeginCost(const Shape& shape, int first) { return 45 + 2 * (shape.size - first); }
-  static constexpr int ApplyCost(const Shape& shape) { return 20 + shape.size; }
-  static constexpr int ProjectCost(int length) { return Shape::kColumnCost + length / 2; }
-  static constexpr int MeasureCost(int length) { return Shape::kColumnCost + 2 + length; }
-  static constexpr int FoldCost(int length) { return 8 + length + length / 4; }
+  static constexpr int kRows = kRowsAtOnce, kBlock = kBlockColumns;
+
+  // The columns that a group touches: the front columns of its rows, and the shared columns from number `shared` on.
+  // Before position `first` all rows are zero.
+  struct Touched {
+    Front front[kRows] = {};
+    int first = 0, shared = 0, count = 0;
+
+    constexpr Touched() = default;
+    constexpr Touched(const Shape& shape, const RowPlace (&place)[kRows])
+        : first(shape.size), shared(shape.Shared()), count(shared) {
+      for (int i = 0; i < kRows; ++i) {
+        front[i] = place[i].front;
+        first = math::Min<int>(first, place[i].first);
+        shared = math::Min<int>(shared, place[i].shared);
+      }
+    }
+  };
+  // How many of `count` columns are processed together, from number j on.
+  static constexpr int Width(int count, int j) { return (count - j) % kBlock == 0 ? kBlock : 1; }
+
+  static constexpr int kRestCost = 6, kLeastRest = 8;  // of an element of a block; so many elements are worth a call
+  // BeginCost covers the caller's work on the last row, too.
+  static constexpr int BeginCost(const Shape& shape) { return 70 + 3 * shape.size / 2; }
+  static constexpr int ApplyCost(const Shape& shape) { return 15 + shape.size; }
+  static constexpr int ProjectCost(int width, int length) { return width == 1 ? 5 + 3 * length / 4 : 24 + 3 * length; }
+  static constexpr int MeasureCost(int width, int length) {
+    return width == 1 ? 14 + 2 * length : 40 + kRestCost * length;
+  }
+  static constexpr int FoldCost(int length) { return 13 + 27 * length / 32; }
 
   enum class Stage : std::uint8_t { kIdle, kBegun, kProject, kMeasure, kSum };
 
-  // P + c a a' with c >= 0 and a = row, which is zero after position `last`. All columns that it touches begin at the
+  // P + c a a' with c >= 0 and a = sum(), which is zero after position `last`. All columns that it touches begin at the
   // same position.
   void BeginSum(Factor f, float c, int last) {
-    alpha_ = c;
+    alpha_[0] = c;
     next_ = last;
-    first_ = f.shape->Begin(last);
+    touched_.first = f.shape->Begin(last);
     stage_ = Stage::kSum;
   }
 
-  // row = U' h in place, from the last column to the first; sum_ becomes h' P h + noise. Two neighbouring columns that
-  // begin at the same position are processed together. If there is no such pair, second = column and q = p, so the same
-  // code works for one column.
+  // The innovations by the estimate before the group.
+  void Predict(Factor f) {
+    touched_ = Touched(*f.shape, place_);
+    const int first = touched_.first;
+    const float* const x = f.x + first;
+    float sum[kRows] = {};
+    math::Dots<kRows, 1>(f.row(first), &x, f.shape->size - first, sum);
+    for (int i = 0; i < kRows; ++i) innovation_[i] -= sum[i];
+    shared_ = 0.0f;
+    next_ = touched_.count;
+    measured_ = 0;
+    fronts_done_ = false;
+    stage_ = Stage::kProject;
+  }
+
+  // h becomes f = U' h in place, from the last column to the first. At the end of a slice, columns are taken one by
+  // one.
   ARMCAL_NOINLINE bool Project(Factor f, int& credit) {
     const Shape& shape = *f.shape;
-    const int first = first_;
-    const Front front = front_;
-    int p = next_, left = credit;
-    float sum = sum_;
-    float* const row = f.row();
-    while (p >= first && left > 0) {
-      const int below = shape.Below(p, front);
-      const bool pair = below >= first && shape.Begin(below, front) == shape.Begin(p, front);
-      const int q = pair ? below : p;
-      const float* const column = f.column(p);
-      const float* const second = f.column(q);
-      float a = row[p];
-      for (int i = q; i < p; ++i) a += column[i] * row[i];
-      const auto dots = math::Dots(column + first, second + first, row + first, q - first, a, row[q]);
-      row[q] = dots.second;
-      row[p] = dots.first;
-      sum += column[p] * dots.first * dots.first;
-      left -= ProjectCost(p - first);
-      if (pair) {
-        sum += second[q] * dots.second * dots.second;
-        left -= ProjectCost(q - first);
-      }
-      p = pair ? shape.Below(q, front) : below;
+    const int first = touched_.first;
+    int j = next_, left = credit;
+    while (j > touched_.shared && left > 0) {
+      const bool whole = j >= kBlock && (touched_.count - j) % kBlock == 0;
+      const int width = whole && left > ProjectCost(kBlock, shape.At(j - kBlock) - first) ? kBlock : 1;
+      j -= width;
+      const int p = shape.At(j);
+      if (width == 1) ProjectColumn(f, first, shape.At(BlockBegin(touched_.count, j)), p);
+      else ProjectBlock(f, first, p);
+      left -= ProjectCost(width, p - first);
+    }
+    next_ = j;
+    if (j <= touched_.shared && left > 0) {
+      for (const Front& front : touched_.front)
+        for (int p = front.end; p > front.begin;) {
+          const int width = p - front.begin < kBlock ? 1 : kBlock;
+          p -= width;
+          if (width == 1) ProjectColumn(f, front.begin, p, p);
+          else ProjectBlock(f, front.begin, p);
+          left -= ProjectCost(width, p - front.begin);
+        }
+      stage_ = Stage::kMeasure;
     }
     credit = left;
-    sum_ = sum;
-    next_ = p;
-    if (p >= first) return false;
-    next_ = first;
-    stage_ = Stage::kMeasure;
-    return true;
+    return stage_ == Stage::kMeasure;
+  }
+  // Column p of a block that begins at `block`. The sums have the order of ProjectBlock.
+  static ARMCAL_NOINLINE void ProjectColumn(Factor f, int first, int block, int p) {
+    const float *const corner = f.column(p) + block, *const rest = f.column(p) + first;
+    if (p > block) math::Dots<kRows, 1>(f.row(block), &corner, p - block, f.row(p));
+    if (block > first) math::Dots<kRows, 1>(f.row(first), &rest, block - first, f.row(p));
+  }
+  // The columns at p, p + 1, ... p + kBlock - 1.
+  static ARMCAL_NOINLINE void ProjectBlock(Factor f, int first, int p) {
+    using math::internal::Each;
+    const float* column[kBlock];
+    float* const row = f.row(p);
+    float h[kBlock * kRows];
+    Each<kBlock * kRows>([&](auto k) ARMCAL_INLINE { h[k] = row[k]; });
+    Each<kBlock>([&](auto k) ARMCAL_INLINE {
+      const float* const corner = f.column(p + k) + p;
+      Each<kRows>([&](auto i) ARMCAL_INLINE {
+        float sum = h[k * kRows + i];
+        Each<k>([&](auto m) ARMCAL_INLINE { sum += corner[m] * h[m * kRows + i]; });
+        row[k * kRows + i] = sum;
+      });
+      column[k] = corner - (p - first);
+    });
+    if (p > first) math::Dots<kRows, kBlock>(f.row(first), column, p - first, row);
   }
 
+  // Each column, from the first to the last, changes by the gains of the columns before it; then its own elements of
+  // the gains take the place of f. A slice may end within a block of shared columns, after any of its elements.
   ARMCAL_NOINLINE bool Measure(Factor f, int& credit) {
     const Shape& shape = *f.shape;
-    const Front front = front_;
-    int p = next_, left = credit;
-    float alpha = alpha_;
-    float* const gain = f.gain();
-    const float* const row = f.row();
-    while (p < shape.size && left > 0) {
-      const int begin = shape.Begin(p, front), q = shape.Above(p, front);
-      const bool pair = q < shape.size && shape.Begin(q, front) == begin;
-      float* column = f.column(p);
-      float shift, v;
-      alpha = Pivot(row[p], alpha, column[p], shift, v);
-      left -= MeasureCost(p - begin);
-      int from = begin, to = p;
-      if (pair) {
-        float* const second = f.column(q);
-        float shift2, v2;
-        alpha = Pivot(row[q], alpha, second[q], shift2, v2);
-        left -= MeasureCost(q - begin);
-        math::BiermanColumns(column + begin, second + begin, gain + begin, shift, v, shift2, v2, p - begin);
-        gain[p] = v;
-        column = second, shift = shift2, v = v2;
-        from = p, to = q;
+    int j = next_, left = credit;
+    if (!fronts_done_) {
+      for (const Front& front : touched_.front)
+        for (int p = front.begin; p < front.end;) {
+          const int width = Width(front.end, p);
+          if (width == 1) MeasureColumn(f, front.begin, p);
+          else MeasureCorner(f, p), MeasureRest(f, p, front.begin, p);
+          left -= MeasureCost(width, p - front.begin);
+          p += width;
+        }
+      fronts_done_ = true;
+    }
+    while (j < touched_.count && left > 0) {
+      const int p = shape.At(j);
+      if (Width(touched_.count, j) == 1) {
+        MeasureColumn(f, 0, p);
+        left -= MeasureCost(1, p);
+        ++j;
+        continue;
       }
-      math::BiermanColumn(column + from, gain + from, shift, v, to - from);
-      gain[to] = v;
-      p = pair ? shape.Above(q, front) : q;
+      if (measured_ == 0) {
+        MeasureCorner(f, p);
+        left -= MeasureCost(kBlock, 0);
+      }
+      const int most = measured_ + math::Max(left / kRestCost & ~1, kLeastRest), end = math::Min(p, most);
+      MeasureRest(f, p, measured_, end);
+      left -= kRestCost * (end - measured_);
+      measured_ = end < p ? end : 0;
+      j += end < p ? 0 : kBlock;
     }
     credit = left;
-    alpha_ = alpha;
-    next_ = p;
-    return p >= shape.size;
+    next_ = j;
+    return j >= touched_.count;
+  }
+  // Elements from `begin` on.
+  ARMCAL_NOINLINE void MeasureColumn(Factor f, int begin, int p) {
+    float step[2 * kRows];
+    float* const column = f.column(p);
+    Pivot(f.row(p), column[p], alpha_, shared_, step);
+    float* const from = column + begin;
+    math::BiermanBlock<kRows, 1>(f.row(begin), &from, step, p - begin);
+  }
+  // The columns at p, p + 1, ... p + kBlock - 1: their elements from p on. Then the elements from begin to end.
+  ARMCAL_NOINLINE void MeasureCorner(Factor f, int p) {
+    using math::internal::Each;
+    float* const row = f.row(p);
+    float own[kBlock * kRows], alpha[kRows], shared = shared_;
+    Each<kRows>([&](auto i) ARMCAL_INLINE { alpha[i] = alpha_[i]; });
+    Each<kBlock * kRows>([&](auto k) ARMCAL_INLINE { own[k] = row[k]; });
+    Each<kBlock>([&](auto k) ARMCAL_INLINE {
+      float* const corner = f.column(p + k) + p;
+      float* const c = step_ + k * 2 * kRows;
+      Pivot(own + k * kRows, corner[k], alpha, shared, c);
+      Each<k>([&](auto m) ARMCAL_INLINE {
+        float u = corner[m];
+        Each<kRows>([&](auto i) ARMCAL_INLINE {
+          math::internal::BiermanElement()(own[m * kRows + i], u, c[2 * i], c[2 * i + 1]);
+        });
+        corner[m] = u;
+      });
+    });
+    Each<kRows>([&](auto i) ARMCAL_INLINE { alpha_[i] = alpha[i]; });
+    Each<kBlock * kRows>([&](auto k) ARMCAL_INLINE { row[k] = own[k]; });
+    shared_ = shared;
+  }
+  ARMCAL_NOINLINE void MeasureRest(Factor f, int p, int begin, int end) const {
+    float* column[kBlock];
+    math::internal::Each<kBlock>([&](auto k) ARMCAL_INLINE { column[k] = f.column(p + k) + begin; });
+    if (begin < end) math::BiermanBlock<kRows, kBlock>(f.row(begin), column, step_, end - begin);
   }
 
-  // Updates the D of one column and gives what its elements need. Returns the next alpha.
-  static float Pivot(float f, float alpha, float& d, float& shift, float& v) {
-    v = d * f;
-    shift = -f / alpha;
-    const float next = alpha + v * f;
-    d *= alpha / next;  // exactly 1 for f = 0
-    return next;
+  // Updates the D of one column and gives what its elements need. f [kRows] becomes v. step [kRows][2]: v and shift.
+  // alpha [kRows], shared: as the members.
+  ARMCAL_INLINE static void Pivot(float* f, float& d, float* alpha, float& shared, float* step) {
+    static_assert(kRows == 2);
+    float left = d;
+    math::internal::Each<kRows>([&](auto i) ARMCAL_INLINE {
+      if constexpr (i == 1) math::internal::BiermanElement()(shared, f[1], step[0], step[1]);
+      const float v = left * f[i], next = alpha[i] + v * f[i];
+      step[2 * i] = v;
+      step[2 * i + 1] = -f[i] / alpha[i];
+      left *= alpha[i] / next;  // exactly 1 for f = 0
+      alpha[i] = next;
+      f[i] = v;
+    });
+    d = left;
   }
 
   // x moves by gain times innovation. Considered columns follow Schmidt's form: their gain is zero, and S k k' goes
   // back to P, where k is the gain that they would have had.
   void Apply(Factor f, const std::uint32_t* considered) {
-    const float scale = 1.0f / alpha_, step = innovation_;
     const int size = f.shape->size;
+    for (int i = 0; i < kRows; ++i) variance_[i] = alpha_[i];
+    const float scale = 1.0f / alpha_[0];
     if (considered == nullptr) {
-      math::AddScaled(f.x, f.gain(), scale * step, size);
+      const float step = scale * innovation_[0];
+      innovation_[1] -= shared_ * step;
+      const float step2 = 1.0f / alpha_[1] * innovation_[1];
+      float *x = f.x, *gain = f.row(0);
+      math::internal::ByFours(size, [&](int) ARMCAL_INLINE {
+        *x = *x + gain[0] * step + gain[1] * step2;
+        ++x, gain += kRows;
+      });
       stage_ = Stage::kIdle;
       return;
     }
     for (int p = 0; p < size; ++p) {
       const std::uint32_t kept = 0u - ((considered[p / 32] >> (p % 32)) & 1u);
-      const float k = f.gain()[p] * scale;
-      f.x[p] += math::Masked(k, ~kept) * step;
-      f.row()[p] = math::Masked(k, kept);
+      const float k = f.row(p)[0] * scale;
+      f.x[p] += math::Masked(k, ~kept) * innovation_[0];
+      f.sum()[p] = math::Masked(k, kept);  // row(p) lies at 2 p, so it is read before it is overwritten
     }
-    BeginSum(f, alpha_, size - 1);
+    BeginSum(f, alpha_[0], size - 1);
   }
 
-  float alpha_ = 0.0f, sum_ = 0.0f, innovation_ = 0.0f;
-  int next_ = 0, first_ = 0;
-  Front front_ = {};
+  float alpha_[kRows] = {}, innovation_[kRows] = {}, variance_[kRows] = {};
+  float shared_ = 0.0f;  // of the present group: gain of row 0 times h of row 1, as far as the columns are measured
+  int next_ = 0;
+  // Of Measure: v and shift of the present block, and how many of its elements are done.
+  float step_[2 * kBlock * kRows] = {};
+  int measured_ = 0;
+  bool fronts_done_ = false;
+  RowPlace place_[kRows] = {};
+  Touched touched_;
   Stage stage_ = Stage::kIdle;
 };
 
@@ -286,13 +435,16 @@ class UdEstimate {
   static constexpr const auto& kShape = Order::kShape;
   using Work = FactorWork<Order::kForm>;
 
-  // The cost of a sample's rows.
-  static constexpr int kRowsCost = [] {
+  // The cost of a sample's rows, if the factor takes `together` of them at a time.
+  static constexpr int RowsCost(int together) {
     int cost = 0;
-    for (int i = 0; i < Order::kJoints; ++i)
-      cost += Work::RowCost(Order::kShape, Order::kAt.first[i], Order::FrontOf(i));
+    for (int i = 0; i < Order::kJoints; i += together) {
+      const bool two = together == 2 && i + 1 < Order::kJoints;
+      cost += Work::RowsCost(Order::kShape, {Order::PlaceOf(i), two ? Order::PlaceOf(i + 1) : kNoRow});
+    }
     return cost;
-  }();
+  }
+  static constexpr int kRowsCost = RowsCost(kRowsAtOnce), kSingleRowsCost = RowsCost(1);
 
   float& u(int i, int p) { return factor().column(p)[i]; }
   float& d(int p) { return factor().d(p); }
@@ -321,14 +473,13 @@ class UdEstimate {
     return filter::AddDiagonal(kShape, number_, variance, next, credit);
   }
 
-  // The work on a row or a sum: see FactorWork.
-  float* row() { return factor().row(); }  // [kSize] by positions, for the row's h
-  void BeginRow(int first, int joint, float y, float variance) {
-    work_.BeginRow(factor(), first, Order::FrontOf(joint), y, variance);
-  }
-  bool StepRow(const std::uint32_t* considered, int& credit) { return work_.StepRow(factor(), considered, credit); }
-  float innovation() const { return work_.innovation(); }
-  float variance() const { return work_.variance(); }
+  // The work on rows or a sum: see FactorWork.
+  float* row(int i) { return factor().row(0) + i; }  // its element at position p is row(i)[p * kRowsAtOnce]
+  void BeginRows() { work_.BeginRows(factor()); }
+  void BeginRow(int i, RowPlace place, float y, float variance) { work_.BeginRow(i, place, y, variance); }
+  bool StepRows(const std::uint32_t* considered, int& credit) { return work_.StepRows(factor(), considered, credit); }
+  float innovation(int i) const { return work_.innovation(i); }
+  float variance(int i) const { return work_.variance(i); }
   void BeginUnitSum(int p, float c, int last) { work_.BeginUnitSum(factor(), p, c, last); }
   bool StepSum(int& credit) { return work_.StepSum(factor(), credit); }
   void AddUnit(int p, float c, int last) {  // the whole sum

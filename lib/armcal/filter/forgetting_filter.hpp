@@ -18,7 +18,7 @@ template <class Layout>
 class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
  public:
   static constexpr int kColumns = Layout::kColumns;
-  static constexpr bool kExtended = false, kTogether = true;
+  static constexpr bool kExtended = false;
   static constexpr float kFloor = 1e-6f;
   using Columns = Order<Layout, Form::kBlock, Beside::kNothing>;
 
@@ -72,7 +72,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     float variance[kColumns] = {};
     UdEstimate<Columns> estimate;
     int next = 0, next_diagonal = 0;
-    bool inside_row = false;
+    bool inside_rows = false;
   };
 
   // Starts without data. The prior must not change while the filter works.
@@ -181,13 +181,13 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     for (int p = 0; p < kColumns; ++p) out.estimate.d(p) *= 1.0f / (1.0f - kFloor);
     for (float& v : out.variance) v = 0.0f;
     out.next = out.next_diagonal = 0;
-    out.inside_row = false;
+    out.inside_rows = false;
   }
   bool StepReadOut(ReadOut& out, int& credit) const {
-    for (; out.next < kColumns && credit > 0; ++out.next) {
-      if (!out.inside_row) BeginTake(out.next, out.estimate);
-      out.inside_row = !out.estimate.StepRow(nullptr, credit);
-      if (out.inside_row) return false;
+    for (; out.next < kColumns && credit > 0; out.next = EndOfTake(out.next)) {
+      if (!out.inside_rows) BeginTake(out.next, out.estimate);
+      out.inside_rows = !out.estimate.StepRows(nullptr, credit);
+      if (out.inside_rows) return false;
     }
     if (out.next < kColumns || !out.estimate.AddDiagonal(out.variance, out.next_diagonal, credit)) return false;
     for (int k = 0; k < kColumns; ++k) {
@@ -233,7 +233,8 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
         int columns = (Layout::kDense - k) % 2 == 0 ? 2 : 1;
         while (rows < kJoints && kStart.at[rows] < k + columns) ++rows;
         const bool more = rows < kJoints && kStart.at[rows] < k + 4;  // a row begins at the third column or the fourth
-        if (columns == 2 && k + 4 <= Layout::kDense && rows <= kFewRows && !more) columns = 4;
+        const bool last = k + 4 == Layout::kDense;  // GivensCorner does all of them, whatever the number of rows
+        if (columns == 2 && k + 4 <= Layout::kDense && (rows <= kFewRows || last) && !more) columns = 4;
         for (int i = 0; i < rows; i += kMostRows)
           Add(Layout::kFront + k, columns, i, rows - i < kMostRows ? rows - i : kMostRows, k);
         k += columns;
@@ -269,13 +270,14 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
   void WorkColumns(const Pass& pass, std::integer_sequence<int, row...>) {
     float* const block = block_ + pass.block;
     float* const stored = rows_ + pass.stored;
-    float rotation[2 * sizeof...(row) * columns];
+    float rotation[2 * kMostRows * columns];
     const int front = pass.column < Layout::kFront ? Layout::kDense : pass.column - Layout::kFront;
     math::GivensCorner<columns, kJoints>(d_ + pass.column, stored, block, pass.length, kStart.at + pass.first, front,
                                          pass.rows, weight_ + pass.first, rotation);
     const auto fold = [&](auto rows) {
       if constexpr (kPasses.Has(columns, rows))
-        if (pass.rows == rows) math::FoldBlock<rows, columns, kJoints>(block, stored, rotation, pass.length);
+        if (pass.rows == rows && pass.length > 1)
+          math::FoldBlock<rows, columns, kJoints>(block, stored, rotation, pass.length);
     };
     (fold(std::integral_constant<int, row + 1>{}), ...);
   }
@@ -293,12 +295,17 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
       if (pass.columns == 4) return WorkColumns<4>(pass, few);
   }
 
-  ARMCAL_NOINLINE void Forget(int begin, int end, bool moves) {
-    const std::uint32_t mask = math::MaskOf(moves), none = math::BitsOf(1.0f) & ~mask;
-    const float* const lambda = prior_->lambda;
-    float* const d = d_;
-    for (int k = begin; k < end; ++k)
-      d[k] = math::Max(d[k] * math::FloatOf((math::BitsOf(lambda[k]) & mask) | none), kFloor);
+  // Columns that do not forget are multiplied by 1.
+  void Forget(int begin, int end, bool moves) {
+    static constexpr float kNone = 1.0f;
+    const float* const factors[2] = {&kNone, prior_->lambda + begin};
+    const float* lambda = factors[moves];
+    const int step = moves;
+    float* d = d_ + begin;
+    math::internal::ByFours(end - begin, [&](int) ARMCAL_INLINE {
+      *d = math::Max(*d * *lambda, kFloor);
+      ++d, lambda += step;
+    });
   }
 
   // A row that the sample does not have is a row of zeros.
@@ -332,23 +339,37 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     return (Layout::kDense - begin) * (Layout::kDense - begin + 1) / 2;
   }
 
-  // Begins to add row `column` of the triangle to the read-out's estimate.
+  // The read-out's estimate takes the triangle's rows in groups: those of `column` and of the next columns of the same
+  // block, up to the one that this returns.
+  static constexpr int EndOfTake(int column) {
+    const int joint = JointOf<Layout>(column), end = joint < kJoints ? Layout::kFrontBegin[joint + 1] : kColumns;
+    return math::Min(column + kRowsAtOnce, end);
+  }
   void BeginTake(int column, UdEstimate<Columns>& estimate) const {
+    estimate.BeginRows();
+    for (int k = column; k < EndOfTake(column); ++k) Take(k, k - column, estimate);
+  }
+  // Row `column` of the triangle becomes row i of a group.
+  void Take(int column, int i, UdEstimate<Columns>& estimate) const {
     const float* stored = rows_ + kOffsets.at[column];
     const auto& at = Columns::kAt.position;
-    float* row = estimate.row();
-    for (int p = at[column]; p < kColumns; ++p) row[p] = 0.0f;
-    row[at[column]] = 1.0f;
-    int joint = Layout::kJoints, k = column + 1;
+    float* const row = estimate.row(i);
+    row[at[column] * kRowsAtOnce] = 1.0f;
+    RowPlace place = {0, 0, {0, 0}};
+    int k = column + 1;
     if (column < Layout::kFront) {
-      joint = JointOf<Layout>(column);
-      const int own = Layout::kFrontBegin[joint + 1] - k;
-      Scatter(stored, at + k, own, row);
+      const int joint = JointOf<Layout>(column), own = Layout::kFrontBegin[joint + 1] - k;
+      Scatter<kRowsAtOnce>(stored, at + k, own, ~0u, row);
       stored += own;
       k = Layout::kFront + Layout::kRowBegin[joint];
+      place = Columns::PlaceOf(joint);
+      if (i > 0) place.front = {0, 0};  // row 0 has named them
+    } else {
+      place.shared = static_cast<std::uint8_t>(BlockBegin(Columns::kShared, column - Layout::kFront));
     }
-    Scatter(stored, at + k, kColumns - k, row);
-    estimate.BeginRow(at[column], joint, stored[kColumns - k], 1.0f / d_[column]);
+    place.first = at[column];
+    Scatter<kRowsAtOnce>(stored, at + k, kColumns - k, ~0u, row);
+    estimate.BeginRow(i, place, stored[kColumns - k], 1.0f / d_[column]);
   }
 
   const Prior<Layout>* prior_ = nullptr;

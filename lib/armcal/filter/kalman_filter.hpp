@@ -7,10 +7,10 @@
 
 namespace armcal::filter {
 
-// Takes scalar rows one after the other. Process noise is added by rank-one sums. `considered` columns follow Schmidt's
-// form. After each sample, noise is added to one column only, and the next sample serves the next column. So the filter
-// adds the noise of one full round at once. The state is [front, dense], and in an extended filter eta after it. Every
-// call is bounded. Context: background.
+// Takes the rows of a sample in their order, two at a time. Process noise is added by rank-one sums. `considered`
+// columns follow Schmidt's form. After each sample, noise is added to one column only, and the next sample serves the
+// next column. So the filter adds the noise of one full round at once. The state is [front, dense], and in an extended
+// filter eta after it. Every call is bounded. Context: background.
 template <class Layout, Form form = Form::kDense, Beside beside = Beside::kNothing>
 class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
  public:
@@ -40,6 +40,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     prior_ = &prior;
     estimate_.Start(prior);
     turns_ = 0;
+    held_ = 0;
     last_noise_ = 0;
     for (std::uint32_t& word : considered_) word = 0;
     for (int p = 0; p < kSize; ++p) {
@@ -55,25 +56,39 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   // One whitened row of `joint`. Shapes: front [the joint's front columns]; dense [kDense], zero before
   // kRowBegin[joint]; eta [kNonlinear], in an extended filter only. If use is false or the report is not kOk, no bit of
   // the estimate changes, and the instructions are the same. After BeginRow call StepRow, which spends credit
-  // (slices.hpp), until it returns true; then report().
+  // (slices.hpp), until it returns true; after the last row of the sample, StepRows likewise. Then report().
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use, const float* eta = nullptr) {
-    const int first = Columns::kAt.first[joint];
-    const std::uint32_t taken = FillRow<Layout, Columns>(joint, front, dense, eta, y, use, estimate_.row(), report_);
-    estimate_.BeginRow(first, joint, math::Masked(y, taken), 1.0f);
+    if (held_ == 0) estimate_.BeginRows();
+    const std::uint32_t taken =
+        FillRow<Layout, Columns, kRowsAtOnce>(joint, front, dense, eta, y, use, estimate_.row(held_), report_[joint]);
+    estimate_.BeginRow(held_, Columns::PlaceOf(joint), math::Masked(y, taken), 1.0f);
+    joint_[held_++] = static_cast<std::uint8_t>(joint);
   }
   bool StepRow(int& credit) {
-    const std::uint32_t* considered = AnyConsidered() ? considered_ : nullptr;
-    if (!estimate_.StepRow(considered, credit)) return false;
-    report_.innovation = estimate_.innovation();
-    report_.variance = estimate_.variance();
+    // Schmidt's form changes the covariance after each row, so rows cannot be taken together.
+    if (held_ == kRowsAtOnce || AnyConsidered()) return StepRows(credit);
+    credit -= kRowCost;
     return true;
   }
-  const UpdateReport& report(int) const { return report_; }  // of the last row
+  bool StepRows(int& credit) {
+    if (held_ == 0) return true;
+    if (!estimate_.StepRows(AnyConsidered() ? considered_ : nullptr, credit)) return false;
+    for (int i = 0; i < held_; ++i) {
+      report_[joint_[i]].innovation = estimate_.innovation(i);
+      report_[joint_[i]].variance = estimate_.variance(i);
+    }
+    held_ = 0;
+    return true;
+  }
+  const UpdateReport& report(int joint) const { return report_[joint]; }
 
   // The cost of the rows and the end of a sample (slices.hpp). A considered column makes it larger.
   int SampleCost() const {
     const int sum = turns_ > 0 ? Estimate::Work::SumCost(Columns::kShape, last_noise_) : 0;
-    return kEndCost + Estimate::kRowsCost + Layout::kJoints * ConsideredCost() + sum;
+    if (AnyConsidered())
+      return kEndCost + Estimate::kSingleRowsCost +
+             Layout::kJoints * Estimate::Work::SumCost(Columns::kShape, kSize - 1) + sum;
+    return kEndCost + Layout::kJoints / kRowsAtOnce * kRowCost + Estimate::kRowsCost + sum;
   }
 
   // Once after the rows of a sample. Adds process noise to a column whose joints move (bit i of `moving`: joint i), and
@@ -141,7 +156,7 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   const Estimate& estimate() const { return estimate_; }
 
  private:
-  static constexpr int kEndCost = 120;
+  static constexpr int kEndCost = 120, kRowCost = 25 + Layout::kDense;
 
   void BeginResetColumn() {
     if (reset_.begin == reset_.end) return;
@@ -150,7 +165,6 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   }
 
   bool AnyConsidered() const { return form == Form::kDense && prior_->any_considered; }
-  int ConsideredCost() const { return AnyConsidered() ? Estimate::Work::SumCost(Columns::kShape, kSize - 1) : 0; }
 
   // Where a sum of process noise starts. Dense form: at the last column with process noise, so all sums take the same
   // instructions. Block form: at the last front column of the joint, so the instructions depend on the joint alone.
@@ -160,7 +174,9 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
 
   const Prior<Layout>* prior_ = nullptr;
   Estimate estimate_;
-  UpdateReport report_;
+  UpdateReport report_[Layout::kJoints];
+  std::uint8_t joint_[kRowsAtOnce] = {};  // of the rows that wait to be taken together
+  int held_ = 0;                          // so many wait
   std::uint32_t considered_[(kSize + 31) / 32] = {};
   std::uint8_t turn_[kSize] = {};  // positions with noise
   int turns_ = 0, next_turn_ = 0, last_noise_ = 0;

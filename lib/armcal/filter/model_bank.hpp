@@ -128,6 +128,7 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
         e.d(Columns::kAt.front_end[i] - 1) = drifting_[i] < 0 ? 0.0f : kFirstSlope * kFirstSlope;
     }
     weights_.Restart();
+    held_ = 0;
     samples_ = 0;
     floor_count_ = 0;
   }
@@ -135,30 +136,37 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
   // Calls and slices are those of the other filters. The innovation and the variance of the report are those of the
   // mixture.
   void BeginRow(int joint, const float* front, const float* dense, float y, bool use) {
-    joint_ = joint;
-    y_ = math::Masked(y, FillRow<Layout, Columns>(joint, front, dense, nullptr, y, use, row_, report_));
+    if (held_ == 0)
+      for (float& h : rows_) h = 0.0f;
+    const std::uint32_t taken =
+        FillRow<Layout, Columns, kRowsAtOnce>(joint, front, dense, nullptr, y, use, rows_ + held_, report_[joint]);
+    y_[held_] = math::Masked(y, taken);
+    row_joint_[held_++] = joint;
     at_ = 0;
     begun_ = false;
   }
   bool StepRow(int& credit) {
-    const int first = Columns::kAt.first[joint_];
-    for (; at_ < kMembers && credit > 0; ++at_) {
-      Estimate& e = member_[at_];
-      if (!begun_) {
-        float* row = e.row();
-        for (int p = first; p < Columns::kSize; ++p) row[p] = row_[p];
-        e.BeginRow(first, joint_, y_, 1.0f);
-      }
-      begun_ = !e.StepRow(nullptr, credit);
-      if (begun_) return false;
-      weights_.Add(joint_, at_, e.innovation(), e.variance(), report_.accepted);
-    }
-    if (at_ < kMembers) return false;
-    credit -= RowCost(joint_);
-    Report();
+    if (held_ == kRowsAtOnce) return StepRows(credit);
+    credit -= kRowCost;
     return true;
   }
-  const UpdateReport& report(int) const { return report_; }  // of the last row
+  bool StepRows(int& credit) {
+    if (held_ == 0) return true;
+    for (; at_ < kMembers && credit > 0; ++at_) {
+      Estimate& e = member_[at_];
+      if (!begun_) Begin(e);
+      begun_ = !e.StepRows(nullptr, credit);
+      if (begun_) return false;
+      for (int i = 0; i < held_; ++i)
+        weights_.Add(row_joint_[i], at_, e.innovation(i), e.variance(i), report_[row_joint_[i]].accepted);
+    }
+    if (at_ < kMembers) return false;
+    for (int i = 0; i < held_; ++i) Report(i);
+    credit -= kRowsCost;
+    held_ = 0;
+    return true;
+  }
+  const UpdateReport& report(int joint) const { return report_[joint]; }
 
   void BeginEnd(std::uint32_t moving) {
     moving_ = moving;
@@ -178,8 +186,8 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
   }
   static constexpr int SampleCost() {
     int cost = kMembers * Estimate::kRowsCost + kEndCost + MixCost(kJoints);
-    for (int i = 0; i < kJoints; ++i) cost += RowCost(i) + PredictCost(i) + MixCost(i);
-    return cost;
+    for (int i = 0; i < kJoints; ++i) cost += PredictCost(i) + MixCost(i);
+    return cost + (kJoints + 1) / kRowsAtOnce * (kRowCost + kRowsCost);
   }
 
   // What the bank knew of a joint's front columns no longer counts. See KalmanFilter::BeginReset.
@@ -234,8 +242,8 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
   static constexpr float kOthers = 0.02f;  // the other front columns of the joint walk less, by this factor
   static constexpr std::uint32_t kMixEvery = 10;
 
-  // Costs, as measured: of a row beside the members' work, of the weights, of a prediction, of a mix.
-  static constexpr int RowCost(int i) { return 100 + 2 * (Columns::kSize - Columns::kAt.first[i]); }
+  // Costs, as measured: of a group of rows beside the members' work, of the weights, of a prediction, of a mix.
+  static constexpr int kRowCost = 25 + Layout::kDense, kRowsCost = 250;
   static constexpr int kEndCost = 500;
   static constexpr int PredictCost(int i) {
     const int slope = Columns::kAt.front_end[i] - 1;
@@ -251,16 +259,22 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
     for (int m = 0; m < kMembers; ++m) sum += weight[m] * member_[m].x(p);
     return sum;
   }
-  void Report() {
-    const float* weight = weights_.of(joint_);
+  void Begin(Estimate& e) {
+    e.BeginRows();
+    float* const row = e.row(0);
+    for (int k = 0; k < kRowsAtOnce * Columns::kSize; ++k) row[k] = rows_[k];
+    for (int i = 0; i < held_; ++i) e.BeginRow(i, Columns::PlaceOf(row_joint_[i]), y_[i], 1.0f);
+  }
+  void Report(int i) {
+    const float* weight = weights_.of(row_joint_[i]);
     float mean = 0.0f, variance = 0.0f;
-    for (int m = 0; m < kMembers; ++m) mean += weight[m] * member_[m].innovation();
+    for (int m = 0; m < kMembers; ++m) mean += weight[m] * member_[m].innovation(i);
     for (int m = 0; m < kMembers; ++m) {
-      const float apart = member_[m].innovation() - mean;
-      variance += weight[m] * (member_[m].variance() + apart * apart);
+      const float apart = member_[m].innovation(i) - mean;
+      variance += weight[m] * (member_[m].variance(i) + apart * apart);
     }
-    report_.innovation = mean;
-    report_.variance = variance;
+    report_[row_joint_[i]].innovation = mean;
+    report_[row_joint_[i]].variance = variance;
   }
 
   // Adds the slope to its column, in x and in U. The slope stands after its column, so this adds rows of U and leaves
@@ -311,10 +325,11 @@ class ModelBank : public WholeRows<ModelBank<Layout>> {
   const Prior<Layout>* prior_ = nullptr;
   Estimate member_[kMembers];
   ModeWeights<kJoints, kMembers> weights_;
-  float row_[Columns::kSize] = {}, y_ = 0.0f;
+  float rows_[kRowsAtOnce * Columns::kSize] = {}, y_[kRowsAtOnce] = {};  // rows that wait for the members
+  int row_joint_[kRowsAtOnce] = {}, held_ = 0;
   int drifting_[kJoints] = {};
   std::uint8_t turn_[kJoints] = {};
-  UpdateReport report_;
+  UpdateReport report_[kJoints];
   std::uint32_t moving_ = 0, samples_ = 0, floor_count_ = 0;
   int joint_ = 0, at_ = 0;
   bool begun_ = false;

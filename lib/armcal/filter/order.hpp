@@ -1,11 +1,13 @@
 // filter - in which order a factor holds the columns of a model, and at which row each column of it begins.
 //
-// A column's place in this order is its position. The front columns of a joint stand just before the first dense column
-// of the joint's row. Two things follow:
+// A column's place in this order is its position. The front columns of a joint stand before the first dense column of
+// the joint's row. Two things follow:
 //   Row i of the regressor is zero before position first[i]. So it does not touch the factor's columns before that.
 //   Front columns of two joints never meet in a row. So U between them stays zero, as long as process noise and
 //   considered columns do not couple them. The block form does not store those zeros: there a front column begins at
 //   the first front column of its joint, and a dense column begins at the top.
+// In the block form, the front columns of a joint stand before the whole block of dense columns (kBlockColumns) that
+// the joint's row begins in. So the columns of a block always stand side by side, for a few stored zeros.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +30,21 @@ enum class Beside : std::uint8_t {
 struct Front {
   std::uint8_t begin, end;  // positions
 };
+// So many shared columns are processed together. Blocks are counted from the last of `count` columns; the columns
+// before the first whole block are processed one by one. BlockBegin: the first column of the block that column j is in.
+inline constexpr int kBlockColumns = 4;
+constexpr int BlockBegin(int count, int j) {
+  const int before = (kBlockColumns - (count - j) % kBlockColumns) % kBlockColumns;
+  return j < before ? j : j - before;
+}
+// Which columns a row touches: front, and the shared columns from number `shared` on. In the dense form all columns are
+// shared; in the block form those that are not front columns. `shared` begins a block, and the row may be zero at the
+// first columns of it. first: the position of the row's first element.
+struct RowPlace {
+  std::uint8_t first, shared;
+  Front front;
+};
+inline constexpr RowPlace kNoRow = {255, 255, {0, 0}};
 
 // The look-up tables of an order, without the type of its layout. With these, one copy of the code that works on a
 // factor serves all filters of a form.
@@ -46,27 +63,20 @@ struct Shape<Form::kDense> : AnyShape {
   // Element (i, p) is number Origin(p) + i of a Factor. A column has elements from row Begin(p) on. (p, p) holds D.
   constexpr int Origin(int p) const { return 3 * size + p * (p + 1) / 2; }
   constexpr int Begin(int) const { return 0; }
-  constexpr int Begin(int, Front) const { return 0; }
-  // Above: the next position after p that a row touches; `size`: none. Below: the next one before p; -1: none.
-  constexpr int Above(int p, Front) const { return p + 1; }
-  constexpr int Below(int p, Front) const { return p - 1; }
+  // The shared columns: how many there are, and their positions. They begin at the top.
+  constexpr int Shared() const { return size; }
+  constexpr int At(int shared) const { return shared; }
 };
 template <>
 struct Shape<Form::kBlock> : AnyShape {
   const std::uint16_t* origin;
   const std::uint8_t* begin;
-  const std::uint8_t* above;  // by position: the next dense position after it; size: none
-  const std::int8_t* below;   // before it; -1: none
 
   static constexpr int kColumnCost = 8;
   constexpr int Origin(int p) const { return origin[p]; }
   constexpr int Begin(int p) const { return begin[p]; }
-  constexpr int Begin(int p, Front front) const { return p < front.end ? front.begin : 0; }  // if the row touches p
-  constexpr int Above(int p, Front front) const { return p + 1 < front.end ? p + 1 : above[p]; }
-  constexpr int Below(int p, Front front) const {
-    const int own = (p < front.end ? p : front.end) - 1;
-    return own > below[p] ? own : below[p];
-  }
+  constexpr int Shared() const { return states - fronts; }
+  constexpr int At(int shared) const { return position[fronts + shared]; }
 };
 
 template <class Layout, Form form, Beside beside>
@@ -78,6 +88,8 @@ struct Order {
                                : beside == Beside::kSlopes ? Layout::kJoints
                                                            : 0;
   static constexpr int kSize = Layout::kColumns + kMore;
+  static constexpr int kStates = Layout::kColumns + (beside == Beside::kEta ? Layout::kNonlinear : 0);
+  static constexpr int kShared = form == Form::kDense ? kSize : kStates - Layout::kFront;
 
   // What every order has, and below what the block form needs besides.
   struct Tables {
@@ -90,7 +102,7 @@ struct Order {
       int at = 0;
       for (int d = 0; d <= Layout::kDense; ++d) {
         for (int i = 0; i < kJoints; ++i)
-          if (Layout::kRowBegin[i] == d) at = PlaceFront(i, at);
+          if (FrontBefore(i) == d) at = PlaceFront(i, at);
         if (d < Layout::kDense) at = Place(Layout::kFront + d, at);
       }
       if (beside == Beside::kEta)
@@ -98,6 +110,9 @@ struct Order {
     }
 
    private:
+    static constexpr int FrontBefore(int i) {  // number of the dense column
+      return form == Form::kDense ? Layout::kRowBegin[i] : BlockBegin(kShared, Layout::kRowBegin[i]);
+    }
     constexpr int PlaceFront(int i, int at) {
       first[i] = static_cast<std::uint8_t>(at);
       for (int k = Layout::kFrontBegin[i]; k < Layout::kFrontBegin[i + 1]; ++k) at = Place(k, at);
@@ -114,21 +129,13 @@ struct Order {
   struct BlockTables {
     std::uint16_t origin[kSize] = {};
     std::uint8_t begin[kSize] = {};
-    std::uint8_t above[kSize] = {};
-    std::int8_t below[kSize] = {};
 
     constexpr BlockTables() {
-      for (int p = 0, elements = 3 * kSize, last = -1; p < kSize; ++p) {
+      for (int p = 0, elements = 3 * kSize; p < kSize; ++p) {
         for (int i = 0; i < kJoints; ++i)
           if (p >= kAt.first[i] && p < kAt.front_end[i]) begin[p] = kAt.first[i];
         origin[p] = static_cast<std::uint16_t>(elements - begin[p]);
         elements += p - begin[p] + 1;
-        below[p] = static_cast<std::int8_t>(last);
-        if (!IsFront(p)) last = p;
-      }
-      for (int p = kSize - 1, next = kSize; p >= 0; --p) {
-        above[p] = static_cast<std::uint8_t>(next);
-        if (!IsFront(p)) next = p;
       }
     }
   };
@@ -138,17 +145,18 @@ struct Order {
   static constexpr bool IsFront(int p) {
     return (kAt.column[p] < Layout::kFront) | (beside == Beside::kSlopes && kAt.column[p] >= Layout::kColumns);
   }
-  static constexpr Front FrontOf(int joint) {  // kJoints: none
-    if (form == Form::kDense || joint == kJoints) return {0, 0};
-    return {kAt.first[joint], kAt.front_end[joint]};
+  static constexpr RowPlace PlaceOf(int joint) {  // of a joint's row
+    const bool dense = form == Form::kDense;
+    const std::uint8_t first = kAt.first[joint];
+    const int shared = BlockBegin(kShared, dense ? first : Layout::kRowBegin[joint]);
+    return {first, static_cast<std::uint8_t>(shared), dense ? Front{0, 0} : Front{first, kAt.front_end[joint]}};
   }
   static constexpr BlockTables kBlockAt{};
 
   static constexpr auto MakeShape() {
-    constexpr int states = Layout::kColumns + (beside == Beside::kEta ? Layout::kNonlinear : 0);
-    constexpr AnyShape any = {kSize, Layout::kFront, Layout::kDense, states, kAt.position, kAt.column};
+    constexpr AnyShape any = {kSize, Layout::kFront, Layout::kDense, kStates, kAt.position, kAt.column};
     if constexpr (form == Form::kDense) return Shape<form>{any};
-    else return Shape<form>{any, kBlockAt.origin, kBlockAt.begin, kBlockAt.above, kBlockAt.below};
+    else return Shape<form>{any, kBlockAt.origin, kBlockAt.begin};
   }
   static constexpr Shape<form> kShape = MakeShape();
   static constexpr int kElements = kShape.Origin(kSize - 1) - 2 * kSize;

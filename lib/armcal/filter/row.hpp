@@ -43,30 +43,28 @@ ARMCAL_NOINLINE void CopyMasked(const float* __restrict value, int count, std::u
   math::internal::ByFours(count, [&](int k) ARMCAL_INLINE { h[k * stride] = math::Masked(value[k], mask); });
 }
 
-// h[position[k]] = value[k] for k < count. Returns the bits of the largest magnitude.
-ARMCAL_NOINLINE inline std::uint32_t Scatter(const float* value, const std::uint8_t* position, int count, float* h) {
-  std::uint32_t largest = 0;
-  for (int k = 0; k < count; ++k) {
-    largest = math::Max(largest, MagnitudeBits(value[k]));
-    h[position[k]] = value[k];
-  }
-  return largest;
+// h[position[k] * stride] = value[k] for k < count, or zero if the mask is.
+template <int stride>
+ARMCAL_NOINLINE void Scatter(const float* value, const std::uint8_t* position, int count, std::uint32_t mask,
+                             float* h) {
+  for (int k = 0; k < count; ++k) h[position[k] * stride] = math::Masked(value[k], mask);
 }
 
-// Writes the row of `joint` to h, from the position of its first element on. eta [kNonlinear] is read only if the order
-// has eta columns. If the row is not used, all of h is zero. Returns the mask of Admit. Context: background.
-template <class Layout, class Columns>
+// Writes the row of `joint` to h, which is zero: element p to h[p * stride]. eta [kNonlinear] is read only if the order
+// has eta columns. If the row is not used, h stays zero. Returns the mask of Admit. Context: background.
+template <class Layout, class Columns, int stride>
 std::uint32_t FillRow(int joint, const float* front, const float* dense, [[maybe_unused]] const float* eta, float y,
                       bool use, float* h, UpdateReport& report) {
   constexpr const auto& at = Columns::kAt.position;
-  const int first = Columns::kAt.first[joint], begin = Layout::kFrontBegin[joint], seen = Layout::kRowBegin[joint];
-  for (int p = first; p < Columns::kSize; ++p) h[p] = 0.0f;
-  std::uint32_t largest = Scatter(front, at + begin, Layout::kFrontBegin[joint + 1] - begin, h);
-  largest = math::Max(largest, Scatter(dense + seen, at + Layout::kFront + seen, Layout::kDense - seen, h));
+  const int begin = Layout::kFrontBegin[joint], width = Layout::kFrontBegin[joint + 1] - begin;
+  const int first = Layout::kRowBegin[joint], seen = Layout::kDense - first;
+  std::uint32_t largest = LargestOf(front, width, LargestOf(dense + first, seen, MagnitudeBits(y)));
+  if constexpr (Columns::kBeside == Beside::kEta) largest = LargestOf(eta, Layout::kNonlinear, largest);
+  const std::uint32_t taken = Admit(use, largest, report);
+  Scatter<stride>(front, at + begin, width, taken, h);
+  Scatter<stride>(dense + first, at + Layout::kFront + first, seen, taken, h);
   if constexpr (Columns::kBeside == Beside::kEta)
-    largest = math::Max(largest, Scatter(eta, at + Layout::kColumns, Layout::kNonlinear, h));
-  const std::uint32_t taken = Admit(use, math::Max(largest, MagnitudeBits(y)), report);
-  for (int p = first; p < Columns::kSize; ++p) h[p] = math::Masked(h[p], taken);
+    Scatter<stride>(eta, at + Layout::kColumns, Layout::kNonlinear, taken, h);
   return taken;
 }
 

@@ -30,19 +30,14 @@ struct UpdateReport {
   core::Status status = core::Status::kOk;  // kOk, kGated, kNotFinite, kOutOfRange (element beyond kRowLimit)
 };
 
-// The calls without slices, made of those in slices. Base of a Filter that has BeginRow, StepRow, report, BeginEnd and
-// StepEnd. Context: background.
+// The calls without slices, made of those in slices. Base of a Filter that has BeginRow, StepRow, StepRows, report,
+// BeginEnd and StepEnd. Context: background.
 //
-// A sample: for each row BeginRow, then StepRow until it returns true. Then StepRows until it returns true. Then
-// BeginEnd, and StepEnd until it returns true. If kTogether is false, a row is finished after StepRow: call report()
-// before the next BeginRow; StepRows does nothing. If kTogether is true, all rows are finished after StepRows: call
-// report() for all rows then.
+// A sample has at most one row of each joint: for each row BeginRow, then StepRow until it returns true. Then StepRows
+// until it returns true; then the reports of all rows stand. Then BeginEnd, and StepEnd until it returns true.
 template <class Filter>
 class WholeRows {
  public:
-  static constexpr bool kTogether = false;
-  bool StepRows(int&) { return true; }
-
   // A sample of one row. Arguments as of BeginRow.
   template <class... Row>
   UpdateReport Update(int joint, const Row&... row) {

@@ -1,10 +1,10 @@
-// math - inner loops of the filters: products of columns, Bierman's update, Givens rotations of one row or several.
+// math - inner loops of the filters: products of columns, Bierman's update, Givens rotations.
 //
-// A loop over two columns reads and writes their common vector once instead of twice. On a Cortex-M4F that takes seven
-// instructions for an element instead of eight, and the loop's counter and branch run half as often. Each element sees
-// the same operations in the same order as if one column came after the other, so the bits are the same. A
-// multiplication and an addition are never fused. So the bits are the same on all machines, and on a Cortex-M4F the
-// pair takes two cycles instead of three. Context: any.
+// A loop works on several rows of a sample and several columns of a factor at once. It loads and stores each element
+// once for all of them: two rows and four columns take six instructions for an element where one row and one column
+// take ten. Each element sees the same operations in the same order as if the rows and the columns came one after the
+// other, so the bits are the same. A multiplication and an addition are never fused. So the bits are the same on all
+// machines, and on a Cortex-M4F the pair takes two cycles instead of three. Context: any.
 #pragma once
 
 #include <cstdint>
@@ -24,18 +24,22 @@ namespace armcal::math {
 #endif
 
 namespace internal {
-template <class T>
-inline void BiermanElement(T& u, T& gain, T shift, T v) {
-  const T before = u, sum = gain;
-  u = before + sum * shift;
-  gain = sum + before * v;
-}
-template <class T>
-inline void FoldElement(T& x, T& r, T x0, T s) {
-  const T before = r, rest = x - x0 * before;
-  x = rest;
-  r = before + s * rest;
-}
+struct BiermanElement {
+  template <class T>
+  ARMCAL_INLINE void operator()(T& gain, T& u, T v, T shift) const {
+    const T before = u, sum = gain;
+    u = before + sum * shift;
+    gain = sum + before * v;
+  }
+};
+struct FoldElement {
+  template <class T>
+  ARMCAL_INLINE void operator()(T& x, T& r, T x0, T s) const {
+    const T before = r, rest = x - x0 * before;
+    x = rest;
+    r = before + s * rest;
+  }
+};
 // Calls turn(k) for all k < length, in groups of four as long as four are left. The loop is inlined together with the
 // turn, so that the compiler still knows which pointers do not overlap.
 template <class Turn>
@@ -57,53 +61,113 @@ ARMCAL_NOINLINE T Dot(const T* __restrict a, const T* __restrict b, int length, 
   internal::ByFours(length, [&](int k) ARMCAL_INLINE { sum += a[k] * b[k]; });
   return sum;
 }
-// The same for two columns a1 and a2 with one b. Shapes: [length]. sum1, sum2: what the two sums start with.
-template <class T>
-struct Two {
-  T first, second;
-};
-template <class T>
-ARMCAL_NOINLINE Two<T> Dots(const T* __restrict a1, const T* __restrict a2, const T* __restrict b, int length, T sum1,
-                            T sum2) {
-  internal::ByFours(length, [&](int k) ARMCAL_INLINE {
-    const T x = b[k];
-    sum1 += a1[k] * x;
-    sum2 += a2[k] * x;
-  });
-  return {sum1, sum2};
-}
-
-// x += step a. Shapes: [length].
-template <class T>
-void AddScaled(T* __restrict x, const T* __restrict a, T step, int length) {
-  for (int k = 0; k < length; ++k) x[k] += a[k] * step;
-}
-
-// One column of Bierman's measurement update: u += gain shift and gain += u v, both with the old u and the old gain.
-// Shapes: u, gain [length].
-template <class T>
-void BiermanColumn(T* __restrict u, T* __restrict gain, T shift, T v, int length) {
-  for (int k = 0; k < length; ++k) internal::BiermanElement(u[k], gain[k], shift, v);
-}
-// The same with column u1, then with u2. Shapes: [length].
-template <class T>
-ARMCAL_NOINLINE void BiermanColumns(T* __restrict u1, T* __restrict u2, T* __restrict gain, T shift1, T v1, T shift2,
-                                    T v2, int length) {
-  internal::ByFours(length, [&](int k) ARMCAL_INLINE {
-    T sum = gain[k];
-    internal::BiermanElement(u1[k], sum, shift1, v1);
-    internal::BiermanElement(u2[k], sum, shift2, v2);
-    gain[k] = sum;
-  });
-}
-
 // Subtracts x0 times r from x, then adds s times what is left of x to r. Shapes: x, r [length]. This is a Givens
 // rotation without square roots, and also a column of a rank-one sum. r changes by a small correction, so that little
 // is lost to rounding.
 template <class T>
 void Fold(T* __restrict x, T* __restrict r, T x0, T s, int length) {
-  for (int k = 0; k < length; ++k) internal::FoldElement(x[k], r[k], x0, s);
+  for (int k = 0; k < length; ++k) internal::FoldElement()(x[k], r[k], x0, s);
 }
+
+namespace internal {
+// Calls f for 0 .. count - 1, each a constant. Unrolled by hand: at -O2 a compiler keeps such loops and their arrays.
+template <class F, int... k>
+ARMCAL_INLINE inline void EachOf([[maybe_unused]] F f, std::integer_sequence<int, k...>) {
+  (f(std::integral_constant<int, k>{}), ...);
+}
+template <int count, class F>
+ARMCAL_INLINE inline void Each(F f) {
+  EachOf(f, std::make_integer_sequence<int, count>{});
+}
+
+// `turns` elements of each row and of each column (or stored row). They are loaded before the first store: a core that
+// issues in order (Cortex-M7) would otherwise wait for each element's chain before it starts the next one.
+template <class Element, int rows, int stored, int stride, int turns, class T>
+ARMCAL_INLINE inline void BlockTurn(T* __restrict x, T* const* r, const T* c) {
+  T own[turns * rows], kept[turns * stored];
+  Each<turns>([&](auto t) ARMCAL_INLINE {
+    Each<rows>([&](auto i) ARMCAL_INLINE { own[t * rows + i] = x[t * stride + i]; });
+    Each<stored>([&](auto j) ARMCAL_INLINE { kept[t * stored + j] = r[j][t]; });
+  });
+  Each<rows>([&](auto i) ARMCAL_INLINE {
+    Each<stored>([&](auto j) ARMCAL_INLINE {
+      constexpr int kAt = 2 * (i * stored + j);
+      Each<turns>([&](auto t)
+                      ARMCAL_INLINE { Element()(own[t * rows + i], kept[t * stored + j], c[kAt], c[kAt + 1]); });
+    });
+  });
+  Each<turns>([&](auto t) ARMCAL_INLINE {
+    Each<stored>([&](auto j) ARMCAL_INLINE { r[j][t] = kept[t * stored + j]; });
+    Each<rows>([&](auto i) ARMCAL_INLINE { x[t * stride + i] = own[t * rows + i]; });
+  });
+}
+// All elements: rows x, columns r [stored], `length` of each. c [rows][stored][2]: two numbers for each pair. If kEven,
+// the length is even.
+template <class Element, int rows, int stored, int stride, bool kEven, class T>
+ARMCAL_INLINE inline void EachTurn(T* __restrict x, T** r, const T* c, int length) {
+  constexpr int kTurns = rows * stored <= 10 ? 2 : 1;  // as many as the registers hold
+  const T* const end = r[0] + length;
+  const auto turns = [&](auto many) ARMCAL_INLINE {
+    BlockTurn<Element, rows, stored, stride, many>(x, r, c);
+    Each<stored>([&](auto j) ARMCAL_INLINE { r[j] += many; });
+    x += many * stride;
+  };
+  while (r[0] + (kTurns - 1) < end) turns(std::integral_constant<int, kTurns>{});
+  if constexpr (!kEven && kTurns == 2)
+    if (r[0] < end) turns(std::integral_constant<int, 1>{});
+}
+}  // namespace internal
+
+// Here several rows lie side by side: element k of row i is x[k * rows + i].
+
+// Adds to sum [columns][rows] the products of `columns` columns with `rows` rows. Shapes: u [columns][length].
+template <int rows, int columns, class T>
+ARMCAL_NOINLINE void Dots(const T* __restrict x, const T* const* u, int length, T* __restrict sum) {
+  using internal::Each;
+  T s[columns * rows];
+  const T* column[columns];
+  Each<columns * rows>([&](auto k) ARMCAL_INLINE { s[k] = sum[k]; });
+  Each<columns>([&](auto j) ARMCAL_INLINE { column[j] = u[j]; });
+  internal::ByFours(length, [&](int) ARMCAL_INLINE {
+    Each<rows>([&](auto i) ARMCAL_INLINE {
+      const T own = x[i];
+      Each<columns>([&](auto j) ARMCAL_INLINE { s[j * rows + i] += *column[j] * own; });
+    });
+    Each<columns>([&](auto j) ARMCAL_INLINE { ++column[j]; });
+    x += rows;
+  });
+  Each<columns * rows>([&](auto k) ARMCAL_INLINE { sum[k] = s[k]; });
+}
+
+// Bierman's measurement update of `columns` columns by `rows` rows: u += gain shift and gain += u v, both with the old
+// u and the old gain. Shapes: u [columns][length], gain `length` elements of each row, step [columns][rows][2]: v and
+// shift.
+template <int rows, int columns, class T>
+ARMCAL_NOINLINE void BiermanBlock(T* __restrict gain, T* const* u, const T* __restrict step, int length) {
+  using internal::Each;
+  T c[2 * rows * columns];
+  T* r[columns];
+  Each<columns>([&](auto j) ARMCAL_INLINE {
+    r[j] = u[j];
+    Each<rows>([&](auto i) ARMCAL_INLINE {
+      c[2 * (i * columns + j)] = step[2 * (j * rows + i)];
+      c[2 * (i * columns + j) + 1] = step[2 * (j * rows + i) + 1];
+    });
+  });
+  internal::EachTurn<internal::BiermanElement, rows, columns, rows, false>(gain, r, c, length);
+}
+
+// The same with `columns` columns r, one after the other. fold [columns][2]: x0 and s. Shapes: x [length], r
+// [columns][length].
+template <int columns, class T>
+ARMCAL_NOINLINE void FoldColumns(T* __restrict x, T* const* r, const T* __restrict fold, int length) {
+  T c[2 * columns];
+  T* each[columns];
+  internal::Each<2 * columns>([&](auto k) ARMCAL_INLINE { c[k] = fold[k]; });
+  internal::Each<columns>([&](auto j) ARMCAL_INLINE { each[j] = r[j]; });
+  internal::EachTurn<internal::FoldElement, 1, columns, 1, false>(x, each, c, length);
+}
+
 // Below: Givens rotations without square roots, which add a row to a unit upper triangle R. W. M. Gentleman, Least
 // squares computations by Givens transformations without square roots, 1973. The triangle stands for the information R'
 // diag(d) R. A row of zeros leaves every bit as it was.
@@ -129,61 +193,18 @@ T GivensPivot(T& d, T x0, T weight, T& s) {
 // The 1 itself is not stored. Each stored row is one element shorter than the one before. All have d > 0. `length`: how
 // many elements a row has after the eliminated ones.
 
-namespace internal {
-// Calls f for 0 .. count - 1, each a constant. Unrolled by hand: at -O2 a compiler keeps such loops and their arrays.
-template <class F, int... k>
-ARMCAL_INLINE inline void EachOf([[maybe_unused]] F f, std::integer_sequence<int, k...>) {
-  (f(std::integral_constant<int, k>{}), ...);
-}
-template <int count, class F>
-ARMCAL_INLINE inline void Each(F f) {
-  EachOf(f, std::make_integer_sequence<int, count>{});
-}
-
-// `turns` elements of each row. They are loaded before the first store: a core that issues in order (Cortex-M7) would
-// otherwise wait for each element's chain before it starts the next one.
-template <int rows, int stored, int stride, int turns, class T>
-ARMCAL_INLINE inline void FoldTurn(T* __restrict x, T* const* r, const T* c) {
-  T own[turns * rows], kept[turns * stored];
-  Each<turns>([&](auto t) ARMCAL_INLINE {
-    Each<rows>([&](auto i) ARMCAL_INLINE { own[t * rows + i] = x[t * stride + i]; });
-    Each<stored>([&](auto j) ARMCAL_INLINE { kept[t * stored + j] = r[j][t]; });
-  });
-  Each<rows>([&](auto i) ARMCAL_INLINE {
-    Each<stored>([&](auto j) ARMCAL_INLINE {
-      constexpr int kAt = 2 * (i * stored + j);
-      Each<turns>([&](auto t)
-                      ARMCAL_INLINE { FoldElement(own[t * rows + i], kept[t * stored + j], c[kAt], c[kAt + 1]); });
-    });
-  });
-  Each<turns>([&](auto t) ARMCAL_INLINE {
-    Each<stored>([&](auto j) ARMCAL_INLINE { r[j][t] = kept[t * stored + j]; });
-    Each<rows>([&](auto i) ARMCAL_INLINE { x[t * stride + i] = own[t * rows + i]; });
-  });
-}
-}  // namespace internal
-
 // The rest of the elimination, after GivensCorner: folds `rows` rows into `stored` stored rows. GivensCorner has
 // already done the first element after the eliminated ones; this does all others. If rows > 1, `length` must be odd,
 // because the loop may take two elements at a time.
 template <int rows, int stored, int stride, class T>
 ARMCAL_NOINLINE void FoldBlock(T* __restrict x, T* __restrict first, const T* __restrict rotation, int length) {
-  constexpr int kTurns = rows * stored <= 10 ? 2 : 1;  // as many as the registers hold
   T c[2 * rows * stored];
   T* r[stored];
   internal::Each<2 * rows * stored>([&](auto k) ARMCAL_INLINE { c[k] = rotation[k]; });
   r[0] = first + stored;
   internal::Each<stored - 1>([&](auto j) ARMCAL_INLINE { r[j + 1] = r[j] + (length + stored - 2 - j); });
-  x += (stored + 1) * stride;
-  const T* const end = r[0] + (length - 1);
-  const auto turns = [&](auto many) ARMCAL_INLINE {
-    internal::FoldTurn<rows, stored, stride, many>(x, r, c);
-    internal::Each<stored>([&](auto j) ARMCAL_INLINE { r[j] += many; });
-    x += many * stride;
-  };
-  while (r[0] + (kTurns - 1) < end) turns(std::integral_constant<int, kTurns>{});
-  if constexpr (rows == 1 && kTurns == 2)
-    if (r[0] < end) turns(std::integral_constant<int, 1>{});
+  internal::EachTurn<internal::FoldElement, rows, stored, stride, (rows > 1)>(x + (stored + 1) * stride, r, c,
+                                                                              length - 1);
 }
 
 // The part of an elimination that takes the rows one by one: it computes all pivots, and changes the elements up to the
@@ -213,7 +234,7 @@ ARMCAL_NOINLINE void GivensCorner(T* d, T* first, T* __restrict x, int length, c
         x0 = own[j];
         remaining = GivensPivot(diagonal[j], x0, remaining, s);
         Each<stored - j>([&](auto k)
-                             ARMCAL_INLINE { internal::FoldElement(own[j + 1 + k], corner[j * stored + k], x0, s); });
+                             ARMCAL_INLINE { internal::FoldElement()(own[j + 1 + k], corner[j * stored + k], x0, s); });
       }
       rotation[2 * j] = x0;
       rotation[2 * j + 1] = s;

@@ -50,12 +50,12 @@ constexpr bool kIsOne = std::is_same_v<decltype(std::declval<T>() < std::declval
 }  // namespace internal
 
 template <class T>
-T Min(const T& a, const T& b) {
+constexpr T Min(const T& a, const T& b) {
   if constexpr (internal::kIsOne<T>) return b < a ? b : a;
   else return Select(b < a, b, a);
 }
 template <class T>
-T Max(const T& a, const T& b) {
+constexpr T Max(const T& a, const T& b) {
   if constexpr (internal::kIsOne<T>) return a < b ? b : a;
   else return Select(a < b, b, a);
 }

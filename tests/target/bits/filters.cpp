@@ -26,19 +26,17 @@ void Run(const FilterCalls& filter) {
   const int slice = filter.slice_credit();
   int credit = slice;
   for (int sample = 1; sample <= kSamples; ++sample) {
-    const auto add = [&](int joint) {
+    for (int joint = 0; joint < 6; ++joint) {
+      filter.begin_row(rows.Next(joint, rows.Draw()));
+      while (!filter.step_row(credit)) credit += slice;
+    }
+    while (!filter.step_rows(credit)) credit += slice;
+    for (int joint = 0; joint < 6; ++joint) {
       const auto& report = filter.report(joint);
       digest.Add(report.innovation);
       digest.Add(report.variance);
       digest.Add(static_cast<std::uint32_t>(report.status) << 1 | report.accepted);
-    };
-    for (int joint = 0; joint < 6; ++joint) {
-      filter.begin_row(rows.Next(joint, rows.Draw()));
-      while (!filter.step_row(credit)) credit += slice;
-      if (!filter.together) add(joint);
     }
-    while (!filter.step_rows(credit)) credit += slice;
-    for (int joint = 0; joint < 6 && filter.together; ++joint) add(joint);
     filter.begin_end(sample % 7 == 0 ? 21u : 63u);
     while (!filter.step_end(credit)) credit += slice;
     if (sample % kPrinted == 0) Line("sample").Decimal(sample).Hex(digest.value()).End();

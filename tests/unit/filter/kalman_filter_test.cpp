@@ -20,9 +20,10 @@ TYPED_TEST_SUITE(EitherForm, Forms);
 
 template <class Any>
 void Feed(Any& filter, const std::vector<Row>& rows) {
-  for (const Row& r : rows) {
-    EXPECT_TRUE(filter.Update(r.joint, r.front, r.dense, r.y, true).accepted);
-    if (r.joint == Small::kJoints - 1) filter.EndSample(kAll);
+  for (std::size_t at = 0; at < rows.size(); at += Small::kJoints) {
+    (void)TakeRows(filter, &rows[at]);
+    for (int j = 0; j < Small::kJoints; ++j) EXPECT_TRUE(filter.report(j).accepted);
+    filter.EndSample(kAll);
   }
 }
 
@@ -59,8 +60,13 @@ TYPED_TEST(EitherForm, EachReport_IsTheTextbookInnovationAndVariance) {
   TypeParam filter;
   filter.Restart(bench.prior);
   Textbook textbook(bench.prior);
-  for (const Row& r : bench.Rows(40)) {
-    const UpdateReport got = filter.Update(r.joint, r.front, r.dense, r.y, true);
+  // Whole samples, and rows by themselves.
+  const std::vector<Row> rows = bench.Rows(40);
+  for (std::size_t at = 0; at < rows.size(); ++at) {
+    const Row& r = rows[at];
+    if (at >= 60) (void)filter.Update(r.joint, r.front, r.dense, r.y, true);
+    else if (r.joint == 0) (void)TakeRows(filter, &r);
+    const UpdateReport got = filter.report(r.joint);
     const UpdateReport expected = textbook.Update(Full<Small>(r), r.y, Vector::Zero(Small::kColumns));
     EXPECT_NEAR(got.innovation, expected.innovation, 2e-5);
     EXPECT_NEAR(got.variance / expected.variance, 1, 1e-4);
@@ -117,7 +123,7 @@ TEST(KalmanFilter, ConsideredColumns_CountAndDoNotMove) {
   filter.Restart(bench.prior);
   Textbook textbook(bench.prior);
   for (const Row& r : bench.Rows(300)) {
-    filter.Update(r.joint, r.front, r.dense, r.y, true);
+    if (r.joint == 0) (void)TakeRows(filter, &r);
     textbook.Update(Full<Small>(r), r.y, considered);
   }
   const SmallKalman::ReadOut out = Read(filter);
@@ -211,7 +217,8 @@ TYPED_TEST(EitherForm, FrontNoise_IsTheTextbooksInTurn) {
   Textbook textbook(bench.prior);
   int turn = 0;
   for (const Row& r : bench.Rows(300)) {
-    const UpdateReport got = filter.Update(r.joint, r.front, r.dense, r.y, true);
+    if (r.joint == 0) (void)TakeRows(filter, &r);
+    const UpdateReport got = filter.report(r.joint);
     const UpdateReport expected = textbook.Update(Full<Small>(r), r.y, Vector::Zero(Small::kColumns));
     EXPECT_NEAR(got.innovation, expected.innovation, 1e-4);
     EXPECT_NEAR(got.variance / expected.variance, 1, 1e-4);
@@ -233,12 +240,15 @@ TYPED_TEST(EitherForm, AnySlices_GiveTheSameBits) {
     whole.Restart(bench.prior);
     sliced.Restart(bench.prior);
     int slices = 0;
-    for (const Row& r : bench.Rows(100)) {
-      const UpdateReport expected = whole.Update(r.joint, r.front, r.dense, r.y, true);
-      sliced.BeginRow(r.joint, r.front, r.dense, r.y, true);
-      for (int credit = 0; (credit += 17, !sliced.StepRow(credit));) ++slices;
-      EXPECT_EQ(sliced.report(r.joint).innovation, expected.innovation);
-      EXPECT_EQ(sliced.report(r.joint).accepted, expected.accepted);
+    const std::vector<Row> rows = bench.Rows(300);
+    for (std::size_t at = 0; at < rows.size(); at += Small::kJoints) {
+      (void)TakeRows(whole, &rows[at]);
+      slices += TakeRows(sliced, &rows[at], 17);
+      for (int j = 0; j < Small::kJoints; ++j) {
+        EXPECT_EQ(sliced.report(j).innovation, whole.report(j).innovation);
+        EXPECT_EQ(sliced.report(j).variance, whole.report(j).variance);
+        EXPECT_EQ(sliced.report(j).accepted, whole.report(j).accepted);
+      }
       whole.EndSample(kAll);
       sliced.BeginEnd(kAll);
       for (int credit = 0; (credit += 17, !sliced.StepEnd(credit));) ++slices;
@@ -256,11 +266,9 @@ TEST(KalmanFilter, BlockForm_IsTheDenseOneInLessRoom_AndSaysWhatItCannotHold) {
   Block block;
   dense.Restart(bench.prior);
   block.Restart(bench.prior);
-  for (const Row& r : bench.Rows(1000)) {
-    dense.Update(r.joint, r.front, r.dense, r.y, true);
-    block.Update(r.joint, r.front, r.dense, r.y, true);
-    if (r.joint == Small::kJoints - 1) dense.EndSample(kAll), block.EndSample(kAll);
-  }
+  const std::vector<Row> rows = bench.Rows(1000);
+  Feed(dense, rows);
+  Feed(block, rows);
   const auto a = Read(dense);
   const auto b = Read(block);
   for (int k = 0; k < Small::kColumns; ++k) {

@@ -19,10 +19,13 @@ struct Bank : Bench {
     filter.Restart(prior);
   }
   void Sample(std::uint32_t moving = kAll) {
+    int all = kNoSlices;
     for (int j = 0; j < Small::kJoints; ++j) {
       const Row row = Next(j);
-      filter.Update(j, row.front, row.dense, row.y, (moving >> j) & 1u);
+      filter.BeginRow(j, row.front, row.dense, row.y, (moving >> j) & 1u);
+      (void)filter.StepRow(all);
     }
+    (void)filter.StepRows(all);
     filter.EndSample(moving);
   }
   std::vector<std::vector<unsigned char>> Kept() const {
@@ -60,13 +63,13 @@ TEST(ModelBank, AfterAStep_TheFastMemberTakesOver_OnThatJointAlone) {
 TEST(ModelBank, Report_IsTheMixturesInnovation_OfUnitSpread) {
   Bank bank;
   double square = 0;
-  for (int s = 0; s < 1000; ++s)
-    for (int j = 0; j < Small::kJoints; ++j) {
-      const Row row = bank.Next(j);
-      const UpdateReport r = bank.filter.Update(j, row.front, row.dense, row.y, true);
-      if (s >= 100) square += r.innovation * r.innovation / r.variance / (900 * Small::kJoints);
-      if (j == 2) bank.filter.EndSample(kAll);
+  for (int s = 0; s < 1000; ++s) {
+    bank.Sample();
+    for (int j = 0; j < Small::kJoints && s >= 100; ++j) {
+      const UpdateReport& r = bank.filter.report(j);
+      square += r.innovation * r.innovation / r.variance / (900 * Small::kJoints);
     }
+  }
   EXPECT_NEAR(square, 1, 0.1);  // 2700 normal squares: deviation 0.027
 }
 
@@ -87,12 +90,9 @@ TEST(ModelBank, AnySlices_GiveTheSameBits) {
   Bank whole, sliced;
   for (int s = 0; s < 100; ++s) {
     whole.Sample();
-    for (int j = 0; j < Small::kJoints; ++j) {
-      const Row row = sliced.Next(j);
-      sliced.filter.BeginRow(j, row.front, row.dense, row.y, true);
-      for (int credit = 0; (credit += 23, !sliced.filter.StepRow(credit));) {
-      }
-    }
+    Row rows[Small::kJoints];
+    for (int j = 0; j < Small::kJoints; ++j) rows[j] = sliced.Next(j);
+    (void)TakeRows(sliced.filter, rows, 23);
     sliced.filter.BeginEnd(kAll);
     for (int credit = 0; (credit += 23, !sliced.filter.StepEnd(credit));) {
     }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "armcal/filter/prior.hpp"
+#include "armcal/filter/slices.hpp"
 
 namespace armcal::filter::test {
 
@@ -140,6 +141,21 @@ typename Filter::ReadOut Read(const Filter& filter) {
 
 // Every bit that a filter keeps from row to row. What one row leaves in the work space has no say in the next: the
 // rows after must come out the same, too, which the tests of a refused row let them.
+// The rows of a sample, one of each joint, with `credit` more for each slice. Returns how many slices it took.
+template <class Filter>
+int TakeRows(Filter& filter, const Row* rows, int credit = kNoSlices) {
+  int slices = 1, left = credit;
+  const auto finish = [&](auto step) {
+    for (; !step(left); left += credit) ++slices;
+  };
+  for (const Row* r = rows; r < rows + Small::kJoints; ++r) {
+    filter.BeginRow(r->joint, r->front, r->dense, r->y, true);
+    finish([&](int& c) { return filter.StepRow(c); });
+  }
+  finish([&](int& c) { return filter.StepRows(c); });
+  return slices;
+}
+
 template <class Estimate>
 std::vector<unsigned char> EstimateBytes(const Estimate& e) {
   std::vector<float> all(e.elements(), e.elements() + Estimate::Columns::kElements);

@@ -152,13 +152,26 @@ struct Stress {
     kalman->Restart(prior);
     forgetting->Restart(prior);
   }
+  template <class Filter>
+  static void Begin(Filter& filter, int joint, const float* front, const float* dense, float y) {
+    int all = kNoSlices;
+    filter.BeginRow(joint, front, dense, y, true);
+    ASSERT_TRUE(filter.StepRow(all));
+  }
+  template <class Filter>
+  static void Finish(Filter& filter) {
+    int all = kNoSlices;
+    ASSERT_TRUE(filter.StepRows(all));
+    for (int j = 0; j < SixAxis::kJoints; ++j) ASSERT_TRUE(filter.report(j).accepted);
+    filter.EndSample(kAll);
+  }
   void Sample() {
     const auto& at = Kalman::Columns::kAt;
     float front[3], dense[SixAxis::kDense], y;
     for (int j = 0; j < SixAxis::kJoints; ++j) {
       rows.Next(j, front, dense, y);
-      ASSERT_TRUE(kalman->Update(j, front, dense, y, true).accepted);
-      ASSERT_TRUE(forgetting->Update(j, front, dense, y, true).accepted);
+      Begin(*kalman, j, front, dense, y);
+      Begin(*forgetting, j, front, dense, y);
       Vector h = Vector::Zero(n), ordered = Vector::Zero(n);
       for (int k = 0; k < 3; ++k) h(3 * j + k) = front[k];
       for (int k = 0; k < SixAxis::kDense; ++k) h(SixAxis::kFront + k) = dense[k];
@@ -166,8 +179,8 @@ struct Stress {
       kalman_oracle.Measure(ordered, y);
       triangle_oracle.Add(h, y);
     }
-    kalman->EndSample(kAll);
-    forgetting->EndSample(kAll);
+    Finish(*kalman);
+    Finish(*forgetting);
     for (int k = SixAxis::kFront; k < n; ++k) {
       double& d = kalman_oracle.d(at.position[k]);
       d = std::max(d, static_cast<double>(prior.link_floor));

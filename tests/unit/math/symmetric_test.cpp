@@ -90,19 +90,54 @@ TEST_F(Ud, DiagonalScaleAndSolve_AgreeWithDenseAlgebra) {
   EXPECT_LT((u * x - b).norm(), 1e-9);
 }
 
-// Two columns at once must be one after the other to the bit, at every length of the remainder.
-TEST_F(Ud, ColumnsInPairs_GiveTheBitsOfOneByOne) {
+// Rows and columns together must be one after the other to the bit, at every length of the remainder.
+template <int rows, int columns, class Random>
+void CompareBlocks(Random random) {
+  constexpr int kLength = 12, kPairs = rows * columns;
+  for (int length = 0; length <= kLength; ++length) {
+    const Matrix u = Matrix::NullaryExpr(kLength, columns, random);
+    const Matrix x = Matrix::NullaryExpr(rows, kLength, random);  // an element of each row side by side
+    const Matrix step = Matrix::NullaryExpr(2, kPairs, random);
+    Matrix expected_u = u, expected_x = x, got_u = u, got_x = x, sum = Matrix::Constant(rows, columns, 0.5);
+    double* column[columns];
+    for (int j = 0; j < columns; ++j) column[j] = got_u.col(j).data();
+    Dots<rows, columns>(x.data(), column, length, sum.data());
+    BiermanBlock<rows, columns>(got_x.data(), column, step.data(), length);
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j < columns; ++j) {
+        const double v = step(0, j * rows + i), shift = step(1, j * rows + i);
+        for (int k = 0; k < length; ++k) {
+          const double before = expected_u(k, j);
+          expected_u(k, j) += expected_x(i, k) * shift;
+          expected_x(i, k) += before * v;
+        }
+        EXPECT_NEAR(sum(i, j), 0.5 + u.col(j).head(length).dot(x.row(i).head(length)), 1e-14);
+      }
+    EXPECT_TRUE(got_u == expected_u && got_x == expected_x) << rows << " x " << columns << ", " << length;
+  }
+}
+
+TEST_F(Ud, BlocksOfRowsAndColumns_GiveTheBitsOfOneByOne) {
+  const auto next = [&] { return normal(random); };
+  CompareBlocks<1, 1>(next);
+  CompareBlocks<2, 1>(next);
+  CompareBlocks<2, 4>(next);
+  CompareBlocks<3, 4>(next);
+}
+
+TEST_F(Ud, FoldedColumns_GiveTheBitsOfOneByOne) {
   for (int length = 0; length < 12; ++length) {
-    const Vector a = Random(12), b = Random(12), x = Random(12);
-    Vector u1 = a, u2 = b, gain = x, v1 = a, v2 = b, pair = x;
-    BiermanColumn(u1.data(), gain.data(), 0.3, 1.7, length);
-    BiermanColumn(u2.data(), gain.data(), -0.2, 0.4, length);
-    BiermanColumns(v1.data(), v2.data(), pair.data(), 0.3, 1.7, -0.2, 0.4, length);
-    EXPECT_TRUE(u1 == v1 && u2 == v2 && gain == pair) << length;
-    const auto dots = Dots(a.data(), b.data(), x.data(), length, 0.5, 0.25);
-    EXPECT_EQ(dots.first, Dot(a.data(), x.data(), length, 0.5));
-    EXPECT_EQ(dots.second, Dot(b.data(), x.data(), length, 0.25));
-    EXPECT_NEAR(dots.first, 0.5 + a.head(length).dot(x.head(length)), 1e-14);
+    const Matrix r = Matrix::NullaryExpr(12, 4, [&] { return normal(random); });
+    const Matrix fold = Matrix::NullaryExpr(2, 4, [&] { return normal(random); });
+    Matrix expected_r = r, got_r = r;
+    Vector expected_x = Random(12), got_x = expected_x;
+    double* column[4];
+    for (int j = 0; j < 4; ++j) {
+      column[j] = got_r.col(j).data();
+      Fold(expected_x.data(), expected_r.col(j).data(), fold(0, j), fold(1, j), length);
+    }
+    FoldColumns<4>(got_x.data(), column, fold.data(), length);
+    EXPECT_TRUE(got_r == expected_r && got_x == expected_x) << length;
   }
 }
 

@@ -21,8 +21,8 @@ FILTER_KEYS = ["instructions", "solve", "read_out", "slice_max", "slice_min", "t
                "stack_bytes"]
 REGRESSOR_KEYS = ["instructions", "text_bytes", "stack_bytes"]
 ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "slice_min", "state_bytes"]
-CONTROLLER_KEYS = ["push", "feed_forward", "feed_forward_new", "step_learning", "step_checking", "step_saving", "request",
-                   "state_bytes"]
+CONTROLLER_KEYS = ["push", "feed_forward", "feed_forward_new", "step_learning", "step_resetting", "step_checking",
+                   "step_saving", "request", "other", "state_bytes"]
 READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "state_bytes", "stack_bytes"]
 NOT_THE_FILTERS = re.compile(r"Get_|Calls|MakeParts|\.rodata.*\.str")  # the bench's own part of an object
 # One filter's own: code that knows the layout, and the rotations that the forgetting filter alone has. One copy of the rest serves
@@ -148,7 +148,7 @@ def tables(figures, core, budgets):
     whole += grid(figures["controllers"], [
         ("longest call, two filters", 26, "", "controller"), ("push", 8, "", "push"), ("torque", 8, "", "feed_forward"),
         ("of a new table", 16, "", "feed_forward_new"), ("learning", 10, "", "step_learning"),
-        ("checking", 10, "", "step_checking"), ("saving", 8, "", "step_saving"), ("request", 9, "", "request"), state])
+        ("resetting", 11, "", "step_resetting"), ("checking", 10, "", "step_checking"), ("saving", 8, "", "step_saving"), ("request", 9, "", "request"), ("other", 7, "", "other"), state])
     if figures["read_outs"]:
         whole += grid(figures["read_outs"], [
             ("physical read-out", 24, "", "read_out"), ("instr.", 10, "", "instructions"), ("slices", 8, "", "slices"),

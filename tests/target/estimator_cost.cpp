@@ -165,8 +165,8 @@ struct Drive {
 };
 
 // Each figure is the longest call: of the tick, of one that takes a new table, of the background while it learns, while
-// it checks a signed table, and while it stores and adopts one; of a request, those that begin and end a trial
-// included.
+// it resets what it has learnt, while it checks a signed table, and while it stores and adopts one; of a request, those
+// that begin and end a trial included; of any other function that a firmware may call after Boot.
 void MeasureController() {
   static Drive drive;
   std::memset(memory, 0xFF, sizeof memory);
@@ -196,6 +196,17 @@ void MeasureController() {
     learn = slice > learn ? slice : learn;
   }
 
+  Range other;
+  std::uint32_t reset = 0;
+  for (int block = 0; block <= Model::kJoints; ++block) {
+    other.Add(CostOf([&] { (void)c.ResetLearning(block); }));
+    const std::uint32_t slice = work();
+    reset = slice > reset ? slice : reset;
+  }
+  other.Add(CostOf([&] { c.HoldLearning(true); }));
+  other.Add(CostOf([&] { c.HoldLearning(false); }));
+  other.Add(CostOf([&] { c.SetEnabledAxes(0); }));
+
   const std::uint16_t key[] = {link::reg::kUnlockKey >> 16, link::reg::kUnlockKey & 0xFFFF};
   (void)drive.Write(link::reg::kUnlock.address, 2, key);
   bool accepted = drive.Check(1);
@@ -217,6 +228,7 @@ void MeasureController() {
   }();
   feed = {};
   tick();
+  other.Add(CostOf([&] { c.ReportTrackingError(); }));
   if (!accepted || c.generation() != 4) return;  // defaults, a save, a trial and back
   port::runner::Line("controller")
       .Text(Model::kName)
@@ -224,9 +236,11 @@ void MeasureController() {
       .Value("feed_forward", fed)
       .Value("feed_forward_new", feed.most)
       .Value("step_learning", learn)
+      .Value("step_resetting", reset)
       .Value("step_checking", check)
       .Value("step_saving", save)
       .Value("request", read)
+      .Value("other", other.most)
       .Value("state_bytes", sizeof c)
       .End();
 }

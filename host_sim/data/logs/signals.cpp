@@ -28,7 +28,7 @@ constexpr double kLowest_Hz = 20;
 constexpr double kLeastCutoff_Hz = 2;  // a lower cut-off would take seconds to settle at either end of a log
 // Cut-off over the motion's band. The filter then removes 4 % of a signal at the edge of the band, and less below it.
 constexpr double kAboveMotion = 1.5;
-constexpr double kHighest_Hz = 60;      // above, the current loop no longer follows
+constexpr double kHighest_Hz = 60;  // above, the current loop no longer follows
 // Torque from encoder noise, as a share of the torque's own jitter. It then adds 0.25 % to the noise power.
 constexpr double kShareOfJitter = 0.07;
 // Noise of the speed, as a share of the speed over which friction changes its sign. Friction is a hundred times the
@@ -37,6 +37,7 @@ constexpr double kShareOfWidth = 0.05;
 constexpr double kEdgePeriods = 3;       // periods of the lowest cut-off at each end that are not settled
 constexpr double kWideGap = 5;           // sample times over which a spline may still bridge
 constexpr double kBridged = 0.25;        // periods of kLowest_Hz that a cubic may bridge
+constexpr double kRatesDiffer = 0.01;    // two rates of one log: from the median step and from its whole length
 constexpr double kIrregular = 1e-4;      // time jitter over sample time below which a grid counts as uniform
 constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
 
@@ -133,9 +134,8 @@ Samples InGap(const VectorXd& t, const Eigen::MatrixXd& q, Index last, Index mis
   Samples out{VectorXd(missing), {}};
   for (Index i = 0; i < missing; ++i)
     out.t[i] = t[last] + (t[last + 1] - t[last]) * static_cast<double>(i + 1) / static_cast<double>(missing + 1);
-  out.q = powers(out.t) * powers(t.segment(first, end - first))
-                              .colPivHouseholderQr()
-                              .solve(q.middleRows(first, end - first));
+  out.q = powers(out.t) *
+          powers(t.segment(first, end - first)).colPivHouseholderQr().solve(q.middleRows(first, end - first));
   return out;
 }
 
@@ -167,7 +167,7 @@ void DerivePiece(const Samples& seen, double step_s, const Piece& piece, Derivat
   Eigen::MatrixXd smooth = OnEvenGrid(t, q);
   // A position that needs no smoothing gets none: every filter rings where friction turns and acceleration jumps.
   for (Index j = 0; j < q.cols(); ++j)
-    if (out.cutoff_Hz[j] < kHighestOfRate * rate_Hz)
+    if (!IsHighest(out.cutoff_Hz[j], rate_Hz))
       smooth.col(j) = ZeroPhaseLowPass(smooth.col(j), out.cutoff_Hz[j], rate_Hz);
   const QuinticSpline spline(EvenGrid(t), smooth);
   const Index count = seen.t.size();
@@ -182,6 +182,8 @@ void DerivePiece(const Samples& seen, double step_s, const Piece& piece, Derivat
 }
 
 }  // namespace
+
+bool IsHighest(double cutoff_Hz, double rate_Hz) { return cutoff_Hz >= kHighestOfRate * rate_Hz * (1 - kRatesDiffer); }
 
 JointNoise EstimateNoise(const Log& log, int joint) {
   const std::vector<Piece> pieces = Pieces(log);

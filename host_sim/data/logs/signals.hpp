@@ -16,9 +16,12 @@ struct Derivatives {
   Eigen::VectorXi settled;     // [N] 0 within 3 periods of the lowest cut-off from an end or a wide gap, else 1
 };
 
-// Of the sample rate: no cut-off is higher, because the filter needs room below half the rate. A position with this
-// cut-off is not smoothed.
+// Of the sample rate: no cut-off is higher, because the filter needs room below half the rate.
 inline constexpr double kHighestOfRate = 0.4;
+
+// True for the highest cut-off: a position with this cut-off is not smoothed. Time stamps are rounded and jitter, so
+// the rate that the cut-off was chosen with and rate_Hz may differ by up to 1 %.
+bool IsHighest(double cutoff_Hz, double rate_Hz);
 
 // What the choice of a joint's cut-off rests on.
 struct JointNoise {

@@ -229,7 +229,7 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
     const double rate_Hz = out.rate_Hz();
     Eigen::VectorXd finer_Hz = each_Hz * bandwidth.scale;
     for (double& cutoff_Hz : finer_Hz)
-      if (cutoff_Hz >= logs::kHighestOfRate * rate_Hz * (1 - 1e-9)) cutoff_Hz *= kFiner;
+      if (logs::IsHighest(cutoff_Hz, rate_Hz)) cutoff_Hz *= kFiner;
     out = Derive(model, Finer(log), sensitivity, {0, 1, finer_Hz});
     out.per_sample = kFiner;
     for (Eigen::Index k = 0; k < out.scored.size(); ++k)

@@ -257,6 +257,24 @@ TEST(Signals, ACutoffOfTheUsersOwn_KeepsTheToneBelowAndTakesTheOneAbove) {
   EXPECT_EQ(half.cutoff_Hz[0], 0.5 * kCutoff_Hz);
 }
 
+// A log at 100 Hz has the highest cut-off, 40 Hz. Stamps in seconds since 1970 are rounded to 0.24 us as double, so its
+// median step and its length tell slightly different rates.
+TEST(Signals, ThePositionOfTheHighestCutoff_IsNotSmoothed_HoweverItsStampsAreRounded) {
+  constexpr double kTone_Hz = 35;
+  const VectorXd t = Uniform(20, 100);
+  const auto gain = [&](const VectorXd& stamps) {
+    Log log = MakeLog({{0.3, kTone_Hz}}, t, 0, 3.0);
+    log.t = stamps;
+    const Derivatives d = DeriveSignals(log, {1e-3 * Eigen::MatrixXd::Identity(1, 1)});
+    EXPECT_NEAR(d.cutoff_Hz[0], 40, 0.01);
+    return std::abs(Amplitudes(t, d.q.col(0), {0.3, kTone_Hz})[1]) / (0.2 / (kTau * kTone_Hz));
+  };
+  constexpr double kSince1970_s = 1700000000.123456;
+  const VectorXd rounded = (t.array() + kSince1970_s).matrix();
+  EXPECT_NEAR(gain(t), 1, 1e-3);
+  EXPECT_NEAR(gain((rounded.array() - rounded[0]).matrix()), 1, 1e-3);
+}
+
 TEST(Signals, ACutoffThatTheLogCannotHave_IsRefused) {
   const Log log = MakeLog({{0.3, 1.1}}, Uniform(10, 250), 1e-5, 3.0);
   const Sensitivity inertia{40.0 * Eigen::MatrixXd::Identity(1, 1)};

@@ -43,7 +43,7 @@ MatrixXd PickRows(const MatrixXd& m, int every) {
   return m.rows() == 0 ? m : MatrixXd(m(Eigen::seq(0, m.rows() - 1, every), Eigen::all));
 }
 
-// What columns without memory may read, at every m-th sample.
+// What columns may read at every m-th sample; those with memory at every one only.
 Quantities PickSamples(const Quantities& q, int every, calibration::Dataset& data) {
   data.s = {PickRows(q.data->s.t, every), PickRows(q.data->s.q, every), PickRows(q.data->s.qd, every),
             PickRows(q.data->s.qdd, every), PickRows(q.data->s.temp, every)};
@@ -51,6 +51,7 @@ Quantities PickSamples(const Quantities& q, int every, calibration::Dataset& dat
   data.channel = q.data->channel;
   Quantities out;
   out.data = &data;
+  if (every == 1) out.dt = q.dt, out.restart = q.restart;
   out.parts.rigid = PickRows(q.parts.rigid, every), out.parts.gravity = PickRows(q.parts.gravity, every);
   for (const auto& [from, to] : {std::pair{&q.parts.mass, &out.parts.mass}, std::pair{&q.parts.tilt, &out.parts.tilt},
                                  std::pair{&q.parts.stiffness, &out.parts.stiffness}})
@@ -72,33 +73,38 @@ Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, cons
 
 Thinned::Thinned(const Evidence& evidence, int rows) : all(evidence) {
   const auto averaged = [](const RowIndex& each) { return each.averaged(); };
-  if (std::none_of(evidence.index.begin(), evidence.index.end(), averaged))  // those rows are few already
+  int skip = 1;
+  if (std::none_of(evidence.index.begin(), evidence.index.end(), averaged))
     for (const Quantities& log : evidence.logs) every = std::max(every, log.data->samples() / rows);
+  else  // averages are few in each log, and hang together with those beside them
+    for (const RowIndex& each : evidence.index) skip = std::max(skip, each.size() / rows);
   every |= 1;  // odd: a sample in the middle
   reach = std::min(every / 2, static_cast<int>(0.5 * kSmooth_s / evidence.logs[0].dt[0]));
-  for (const Quantities& log : evidence.logs) {
+  for (std::size_t log = 0; log < evidence.logs.size(); log += static_cast<std::size_t>(skip)) {
     data.push_back(std::make_unique<calibration::Dataset>());
-    logs.push_back(PickSamples(log, every, *data.back()));
+    logs.push_back(PickSamples(evidence.logs[log], every, *data.back()));
   }
+  double before = 0, left = 0;
   for (const RowIndex& from : evidence.index) {
     kept.emplace_back(), index.emplace_back();
-    if (every == 1) {
-      index.back() = from;
-      for (int k = 0; k < from.size(); ++k) kept.back().push_back(k);
-      continue;
-    }
+    RowIndex& to = index.back();
     for (int k = 0; k < from.size(); ++k) {
-      if (from.sample[k] % every || !IsWhole(from, k, reach)) continue;
+      if (from.dataset[k] % skip || (every > 1 && (from.sample[k] % every || !IsWhole(from, k, reach)))) continue;
       kept.back().push_back(k);
-      index.back().dataset.push_back(from.dataset[k]);
-      index.back().segment_begin.push_back(1);
-      index.back().sample.push_back(from.sample[k] / every);
+      to.dataset.push_back(from.dataset[k] / skip);
+      to.segment_begin.push_back(every > 1 || from.segment_begin[k]);
+      to.sample.push_back(from.sample[k] / every);
     }
+    for (std::size_t log = 0; every == 1 && log < from.average.size(); log += static_cast<std::size_t>(skip))
+      to.average.push_back(from.average[log]);
+    if (from.weight.size()) to.weight = from.weight(kept.back());
+    before += from.size(), left += static_cast<double>(kept.back().size());
   }
+  if (skip > 1) of_logs = left / before;
 }
 
 Columns Thinned::Gather(const Candidate& candidate, const std::vector<double>& eta) const {
-  if (!candidate.has_memory()) return diagnosis::Gather(candidate, logs, index, eta);
+  if (every == 1 || !candidate.has_memory()) return diagnosis::Gather(candidate, logs, index, eta);
   Columns out = GatherColumns(candidate, all, eta);
   for (std::size_t r = 0; r < out.joints.size(); ++r) out.block[r] = AverageRows(out.block[r], out.joints[r]);
   return out;

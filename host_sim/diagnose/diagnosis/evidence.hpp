@@ -24,9 +24,9 @@ Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, cons
 
 // Every m-th sample of the evidence, for a rough search. The torque about such a sample is averaged, so that little of
 // the log is lost. Columns with memory are evaluated at all samples and averaged, too. The others are smooth over so
-// short a time and are evaluated at that sample only.
+// short a time and are evaluated at that sample only. Where rows are averages already, every m-th log is kept instead.
 struct Thinned {
-  // Keeps about `rows` samples a log.
+  // Keeps about `rows` samples a log, or as many averages of a joint.
   Thinned(const Evidence& evidence, int rows);
   Columns Gather(const Candidate& candidate, const std::vector<double>& eta) const;
   // averaged: the noise of these rows. What is whitened here keeps the size of slow columns, which are not whitened.
@@ -34,10 +34,11 @@ struct Thinned {
   Eigen::MatrixXd AverageRows(const Eigen::MatrixXd& m, int j) const;
   // The noise of an averaged row, and the share of a gain that averaging leaves; both for white noise.
   double noise() const { return 1 / std::sqrt(2.0 * reach + 1); }
-  double share() const { return (2.0 * reach + 1) / every; }
+  double share() const { return of_logs * (2.0 * reach + 1) / every; }
 
   const Evidence& all;
   int every = 1, reach = 0;  // a row stands for the samples that far about it
+  double of_logs = 1;        // share of the rows that the kept logs hold
   std::vector<std::unique_ptr<calibration::Dataset>> data;
   std::vector<Quantities> logs;
   std::vector<std::vector<int>> kept;  // [n] places in all.index[j]

@@ -113,8 +113,13 @@ nb::object Evaluate(const codegen::Model& model, nb::handle given_logs, const st
   return ToDict(json);
 }
 
-nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle test, bool turns, double cutoff_Hz,
-                    double gain_tolerance) {
+diagnosis::AtTurns AtTurnsOf(std::optional<bool> turns) {
+  if (!turns) return diagnosis::AtTurns::kWhereAveraged;
+  return *turns ? diagnosis::AtTurns::kAlways : diagnosis::AtTurns::kNever;
+}
+
+nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle test, std::optional<bool> turns,
+                    double cutoff_Hz, double gain_tolerance) {
   const std::vector<logs::Log> logs = ReadLogs(train, "train");
   const logs::Log held_out = ReadTest(test);
   CheckFrequency(cutoff_Hz, "cutoff_Hz");
@@ -126,8 +131,8 @@ nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle te
     const nb::gil_scoped_release others_run;
     codegen::Catalogue catalogue = codegen::LoadCatalogue();
     auto declared = std::make_unique<codegen::Model>(model.robot(), catalogue);
-    analysis::Diagnosed run(std::move(declared), std::move(catalogue), logs, {turns, cutoff_Hz, gain_tolerance},
-                            Into(notes));
+    analysis::Diagnosed run(std::move(declared), std::move(catalogue), logs,
+                            {AtTurnsOf(turns), cutoff_Hz, gain_tolerance}, Into(notes));
     for (const std::string& line : analysis::Untold(*run.model, run.train)) notes.push_back(line);
     run.Judge(held_out, model.robot().name, "", Into(notes));
     json = std::move(run.json);
@@ -160,10 +165,11 @@ void BindAnalyses(nb::module_& m) {
              "it the robot file's own values.")
             .c_str());
   m.def("diagnose", &Diagnose, nb::arg("robot"), nb::arg("train"), nb::arg("test"), nb::kw_only(),
-        nb::arg("turns") = false, nb::arg("cutoff_Hz") = 0.0, nb::arg("gain_tolerance") = 0.0,
+        nb::arg("turns") = nb::none(), nb::arg("cutoff_Hz") = 0.0, nb::arg("gain_tolerance") = 0.0,
         text("Finds what the model lacks on the training logs, and judges it on the held-out log. Returns what armcal "
              "diagnose --json writes, as a dict, and under model_file the robot file with the terms, as text. turns: "
-             "look at the rows near turns and at rest, too. gain_tolerance: share by which a joint's torque may be "
+             "look at the rows near turns and at rest, too; None: where the torque shows only slow motion. "
+             "gain_tolerance: share by which a joint's torque may be "
              "off; 0: the robot file's, or 0.1.")
             .c_str());
 }

@@ -122,9 +122,14 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
   AddCutoff(*verb, o->how.cutoff_Hz);
-  verb->add_flag(
-      "--turns", o->how.at_turns,
-      "look at the rows near turns and at rest, too: friction that builds up over a displacement, or sticks");
+  auto* never = verb->add_flag_callback(
+      "--no-turns", [o] { o->how.at_turns = diagnosis::AtTurns::kNever; }, "leave out rows near turns and at rest");
+  verb->add_flag_callback(
+          "--turns", [o] { o->how.at_turns = diagnosis::AtTurns::kAlways; },
+          "look at rows near turns and at rest, where friction builds up or sticks; default: where the torque shows "
+          "only "
+          "slow motion")
+      ->excludes(never);
   verb->add_option("--gain-tolerance", o->how.gain_tolerance,
                    "share by which each joint's torque may be off: for the mass of a payload that the held-out log "
                    "carries; default: the robot file's, or 0.1")

@@ -55,7 +55,8 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& o
     add("--train", c.train), add("--test", c.test);
     add("--json", {file(".json")}), add("--report", {file(".html")}), add("--model-out", {file(".toml")});
     if (!one.channels.empty()) add("--channels", {one.channels});
-    if (one.how.at_turns) add("--turns", {});
+    if (one.how.at_turns == diagnosis::AtTurns::kAlways) add("--turns", {});
+    if (one.how.at_turns == diagnosis::AtTurns::kNever) add("--no-turns", {});
     if (one.how.cutoff_Hz > 0) add("--cutoff", {fmt::format("{}", one.how.cutoff_Hz)});
     if (one.how.gain_tolerance > 0) add("--gain-tolerance", {fmt::format("{}", one.how.gain_tolerance)});
     const int code = RunProgram(words, file(".log"));

@@ -15,7 +15,7 @@
 namespace armcal::analysis {
 
 struct DiagnoseOptions {
-  bool at_turns = false;
+  diagnosis::AtTurns at_turns = diagnosis::AtTurns::kWhereAveraged;
   double cutoff_Hz = 0;       // as CheckedLogs has it
   double gain_tolerance = 0;  // of each joint's torque; 0: the robot file's
 };

@@ -96,7 +96,7 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
 
 Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
                      std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow,
-                     bool at_turns)
+                     AtTurns at_turns)
     : model_(model), work_(std::make_unique<Work>(model, catalogue, std::move(train))) {
   Work& w = *work_;
   if (!narrow.empty()) {
@@ -105,7 +105,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   }
   Selector select(w);
   // What friction does near turns and at rest is larger there than most of what else is missing, so it comes first.
-  if (at_turns) w.chosen = select.AtTurns();
+  if (at_turns != AtTurns::kNever) w.chosen = select.FirstAtTurns(at_turns == AtTurns::kWhereAveraged);
   if (!w.chosen.empty()) w.Polish();
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);

@@ -16,6 +16,10 @@ namespace armcal::diagnosis {
 // A term is accepted where noise alone gains as much in one search of 100 000. Above one in 100 it is not looked at.
 inline constexpr double kLogRare = -11.5, kLogLikely = -4.6;
 
+// Which joints' rows near turns and at rest are looked at, too. kWhereAveraged: where the band is limited, so that an
+// average reaches over a turn.
+enum class AtTurns { kNever, kWhereAveraged, kAlways };
+
 // Another candidate, as it was found beside a term.
 struct Rival {
   const codegen::EffectRecord* record = nullptr;
@@ -95,7 +99,7 @@ class Diagnosis {
   // looked at, too.
   Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,
             std::vector<const calibration::Dataset*> train, std::vector<const calibration::Dataset*> narrow = {},
-            bool at_turns = false);
+            AtTurns at_turns = AtTurns::kNever);
   ~Diagnosis();
 
   const Finding& finding() const { return finding_; }

@@ -170,20 +170,20 @@ bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
 }
 
 // So many of the joint's rows are near turns or at rest that they are worth a look.
-bool Selector::StandsOrTurns(int j) const {
+bool Selector::StandsOrTurns(int j, bool averaged_only) const {
   int slides = 0, sound = 0;
   for (const auto* log : w_.logged) {
-    if (log->sound.size() == 0) return false;
+    if (log->sound.size() == 0 || (averaged_only && !log->averaged(j))) return false;
     slides += log->used.col(j).sum(), sound += log->sound.col(j).sum();
   }
   return sound - slides > std::max(kFewTurns, static_cast<int>(kTurnShare * sound));
 }
 
-std::vector<Chosen> Selector::AtTurns() {
+std::vector<Chosen> Selector::FirstAtTurns(bool averaged_only) {
   std::vector<Candidate*> candidates;
   std::vector<char> shown(static_cast<std::size_t>(w_.model.joints()), 0);
   for (const auto& c : w_.candidates) {
-    if (!c->record().search.at_turns || !StandsOrTurns(c->rows()[0])) continue;
+    if (!c->record().search.at_turns || !StandsOrTurns(c->rows()[0], averaged_only)) continue;
     candidates.push_back(c.get());
     shown[static_cast<std::size_t>(c->rows()[0])] = 1;
   }
@@ -349,6 +349,29 @@ bool Selector::MotionIsClean(const std::vector<int>& joints) const {
                      [&](int j) { return e.joint[static_cast<std::size_t>(j)].exogenous; });
 }
 
+// Near turns and at rest least is known of friction, and much that is not there fits what is left of it. So what is not
+// about these rows must show in the others.
+bool Selector::ShowsInSliding(const Found& f, Columns c, const std::vector<NoiseModel>& noise) const {
+  const auto turns = [this](int j) { return w_.turns[static_cast<std::size_t>(j)] != 0; };
+  if (f.candidate->record().search.at_turns || std::none_of(c.joints.begin(), c.joints.end(), turns)) return true;
+  BaseRows rows = w_.rows;
+  std::vector<NoiseModel> white(noise.size());
+  const auto slides = [this](int j) -> Eigen::ArrayXd {
+    return (w_.sliding[static_cast<std::size_t>(j)].array() > 0.5).cast<double>();
+  };
+  for (int j = 0; j < rows.joints(); ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    white[at].innovation = SlowNoise(noise[at]);
+    if (!turns(j)) continue;
+    rows.design[at].array().colwise() *= slides(j);
+    rows.target[at].array() *= slides(j);
+    rows.Multiply(j);
+  }
+  for (std::size_t r = 0; r < c.joints.size(); ++r)
+    if (turns(c.joints[r])) c.block[r].array().colwise() *= slides(c.joints[r]);
+  return LogChance(f, Metric(rows, white).Try(c).gain) < kLogRare;
+}
+
 bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
                       std::size_t k, Chosen& out) {
   const Found& f = ranked[k];
@@ -375,6 +398,10 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   }
   if (!StaysAtLowerBandwidth(f, terms, gain, noise)) {
     refused_[f.candidate] = "it does not keep its gain where speed and acceleration are derived with a lower bandwidth";
+    return false;
+  }
+  if (!ShowsInSliding(f, c, noise)) {
+    refused_[f.candidate] = "it shows near turns and at rest only";
     return false;
   }
   bool on_bound = false;

@@ -22,7 +22,7 @@ class Selector {
 
   // The first terms of all: of the records that count the rows near turns and at rest, at most one a joint. The joints
   // that got one are fitted there from now on.
-  std::vector<Chosen> AtTurns();
+  std::vector<Chosen> FirstAtTurns(bool averaged_only);
 
   // Searches a chosen term again with the others in; false if it no longer earns its place.
   bool StillEarns(Chosen& term, const std::vector<const Chosen*>& others);
@@ -34,13 +34,14 @@ class Selector {
   std::vector<Found> Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds);
   void Rescore(const Grounds& grounds, Found& f) const;
   bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const;
-  bool StandsOrTurns(int joint) const;
+  bool StandsOrTurns(int joint, bool averaged_only) const;
   bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   // Best first: by score, but a named cause before a curve that explains little more.
   void Sort(std::vector<Found>& ranked);
   bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
                              const std::vector<NoiseModel>& noise);
   bool MotionIsClean(const std::vector<int>& joints) const;
+  bool ShowsInSliding(const Found& f, Columns c, const std::vector<NoiseModel>& noise) const;
   bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
               std::size_t k, Chosen& out);
 

@@ -20,11 +20,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-// Of the ratio of mean squares in sliding to those near turns and at rest. With 0.5 these rows would leave as much as
-// those in sliding, and the terms that are about them would hardly be fitted. With 0 what is not known of rest would
-// bend the parameters of sliding.
-constexpr double kTurnWeight = 0.25;
+// Of the ratio of mean squares in sliding to those near turns and at rest. Once the terms that are about these rows are
+// known, what is left of them is noise, and each row weighs as its noise asks for. Before, it is mostly what is looked
+// for, and would hardly be fitted. Without any weight, what is not known of rest would bend the parameters of sliding.
+constexpr double kKnownTurns = 0.5, kUnknownTurns = 0.25;
 constexpr int kPasses = 3;
+constexpr std::size_t kKept = 64;   // columns of terms
 constexpr double kTakesOver = 0.9;  // share of a named column that a curve can give
 constexpr double kHeld = 1e6;       // weight of a curve's part along a named column, over that of the rows
 constexpr double kSettled = 1e-3;   // relative change of the residuals' spread after which nothing else moves
@@ -149,6 +150,7 @@ RowIndex UsedRows(const std::vector<const calibration::Dataset*>& logs, int join
 
 void Diagnosis::Work::IndexRows() {
   evidence.index.clear();
+  gathered.clear();
   for (int j = 0; j < model.joints(); ++j) evidence.index.push_back(UsedRows(train, j));
   WeighRows();
 }
@@ -180,7 +182,9 @@ void Diagnosis::Work::WeighTurns(const std::vector<const Chosen*>& terms) {
       square[slides] += e[k] * e[k], count[slides] += 1;
     }
     if (count[0] > 0 && count[1] > 0 && square[0] > 0)
-      turn_weight[j] = std::clamp(std::pow(square[1] / count[1] / (square[0] / count[0]), kTurnWeight), 1e-3, 1.0);
+      turn_weight[j] = std::clamp(
+          std::pow(square[1] / count[1] / (square[0] / count[0]), terms.empty() ? kUnknownTurns : kKnownTurns), 1e-3,
+          1.0);
   }
   MakeTrain();
   if (narrow) narrow->turn_weight = turn_weight, narrow->MakeTrain();
@@ -373,6 +377,13 @@ VectorXd Diagnosis::Work::SlopeOverModelTorque(const std::vector<const Chosen*>&
   return sum;
 }
 
+const Columns& Diagnosis::Work::ColumnsOf(const Chosen& term) {
+  const auto [at, fresh] = gathered.try_emplace({term.candidate, term.eta});
+  if (fresh || term.candidate->record().depends_on_estimate)
+    at->second = GatherColumns(*term.candidate, evidence, term.eta);
+  return at->second;
+}
+
 void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   const int active = static_cast<int>(declared.active.size());
   const auto follows = [](const Chosen* t) { return t->candidate->record().depends_on_estimate; };
@@ -380,8 +391,9 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   if (model.depends_on_estimate() || regressor.empty()) StartRows();
   rows.mean.resize(active);
   for (int a = 0; a < active; ++a) rows.mean[a] = prior.mean[declared.active[a]];
-  std::vector<Columns> added;
-  for (const Chosen* t : terms) added.push_back(GatherColumns(*t->candidate, evidence, t->eta));
+  if (gathered.size() > kKept) gathered.clear();
+  std::vector<const Columns*> added;
+  for (const Chosen* t : terms) added.push_back(&ColumnsOf(*t));
   for (int j = 0; j < model.joints(); ++j) {
     std::erase_if(rows.columns[j], [&](int c) { return c >= active; });
     const auto declared_columns = static_cast<Eigen::Index>(rows.columns[j].size());
@@ -392,13 +404,13 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
     bent[j] = 0;
     if (const VectorXd slope = SlopeOverModelTorque(terms, j); slope.size()) Bend(j, slope), same = 0;
     int at = active;
-    for (const Columns& c : added) {
-      if (const auto r = std::find(c.joints.begin(), c.joints.end(), j); r != c.joints.end()) {
-        rows.design[j].conservativeResize(Eigen::NoChange, rows.design[j].cols() + c.count());
-        rows.design[j].rightCols(c.count()) = c.block[static_cast<std::size_t>(r - c.joints.begin())];
-        for (int i = 0; i < c.count(); ++i) rows.columns[j].push_back(at + i);
+    for (const Columns* c : added) {
+      if (const auto r = std::find(c->joints.begin(), c->joints.end(), j); r != c->joints.end()) {
+        rows.design[j].conservativeResize(Eigen::NoChange, rows.design[j].cols() + c->count());
+        rows.design[j].rightCols(c->count()) = c->block[static_cast<std::size_t>(r - c->joints.begin())];
+        for (int i = 0; i < c->count(); ++i) rows.columns[j].push_back(at + i);
       }
-      at += c.count();
+      at += c->count();
     }
     rows.Multiply(j, same);
   }
@@ -406,7 +418,7 @@ void Diagnosis::Work::Prepare(const std::vector<const Chosen*>& terms) {
   std::vector<std::pair<int, const MatrixXd*>> curves;
   for (std::size_t t = 0; t < terms.size(); ++t) {
     if (terms[t]->found.precision.size()) curves.emplace_back(size, &terms[t]->found.precision);
-    size += added[t].count();
+    size += added[t]->count();
   }
   rows.precision = curves.empty() ? MatrixXd() : MatrixXd::Zero(size, size);
   for (const auto& [at, precision] : curves)

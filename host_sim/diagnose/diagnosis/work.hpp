@@ -65,6 +65,8 @@ struct Diagnosis::Work {
   std::set<codegen::InputId> Reads(const std::vector<const Chosen*>& terms, const Candidate* further = nullptr) const;
   // The evidence's model torque and its parts at the estimate, as far as something reads them.
   void FollowEstimate(const std::set<codegen::InputId>& reads);
+  // The term's columns. Those that no estimate changes are kept for the next time.
+  const Columns& ColumnsOf(const Chosen& term);
   // Refreshes base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
   Eigen::VectorXd SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j);
@@ -103,6 +105,7 @@ struct Diagnosis::Work {
   BaseRows rows;
   Estimate estimate;
   std::vector<Chosen> chosen;
+  std::map<std::pair<const Candidate*, std::vector<double>>, Columns> gathered;  // of ColumnsOf
   std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept if it does not depend on the estimate
   std::vector<char> bent;                               // [joint] 1: its declared rows must be filled anew
   Eigen::VectorXd followed;                             // the estimate that the evidence is at ...

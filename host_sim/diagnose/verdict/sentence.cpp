@@ -75,6 +75,7 @@ std::string CauseText(const DiagnosisView& v, std::size_t term) {
         ": {:.3g} {} RMS of joint {} on the held-out log, where the declared model leaves {:.3g} {} and "
         "the model with all terms {:.3g} {}",
         torque[main], unit, main + 1, before[main], unit, after[main], unit);
+    if (t.record->search.at_turns) out += "; it shows near turns and at rest, where a joint that sticks looks the same";
     out += InPhase(t, v.motion);
   } else if (t.training_only) {
     out += ": explains a time of the training log";
@@ -163,8 +164,8 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
     out.push_back(fmt::format("torque above {:.3g} Hz: it was filtered away before the logs were saved", saved_Hz));
   out.push_back(
       fmt::format("rows at rest, near a turn and beside gaps: {} % of the samples of joints 1 to {}; presliding "
-                  "and breakaway show there{}",
-                  left_out, n, v.finding->at_turns.empty() ? " (--turns looks at them)" : ""));
+                  "and breakaway show there",
+                  left_out, n));
   if (!standing.empty())
     out.push_back(
         fmt::format("joint{} {}: at rest in the training logs", standing.size() > 1 ? "s" : "", JointGroup(standing)));

@@ -81,7 +81,7 @@ def diagnose(
     train: Log | Sequence[Log],
     test: Log,
     *,
-    turns: bool = False,
+    turns: bool | None = None,
     cutoff_Hz: float = 0.0,
     gain_tolerance: float = 0.0,
 ) -> dict[str, Any]:

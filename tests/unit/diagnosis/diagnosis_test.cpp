@@ -81,7 +81,7 @@ struct Case {
 
   // change: what happens to a log beside the effect.
   Case(const Effect& effect, std::uint64_t seed, const std::function<void(Dataset&)>& change = {},
-       bool at_turns = false)
+       AtTurns at_turns = AtTurns::kNever)
       : arm(TwoLink(), seed), train(arm.Run(20, 10 * seed, effect)), test(arm.Run(20, 10 * seed + 1, effect)) {
     if (change) change(train), change(test);
     diagnosis = std::make_unique<Diagnosis>(arm.model(), tests::Records(), std::vector<const Dataset*>{&train},
@@ -113,20 +113,38 @@ struct Case {
 };
 
 // Slow motion with many turns, and rows near them that count.
+constexpr double kNearTurn_radps = 0.06;
+void LeaveOutTurns(Dataset& d) {
+  for (int j = 0; j < d.joints(); ++j)
+    for (int k = 0; k < d.samples(); ++k) d.used(k, j) &= std::abs(d.s.qd(k, j)) > kNearTurn_radps;
+}
+
 TEST(Diagnosis, SpringsThatSlip_AreNamedHysteresis_AndSlidingFrictionIsNot) {
-  const auto slow = [](Dataset& d) {
-    for (int j = 0; j < d.joints(); ++j)
-      for (int k = 0; k < d.samples(); ++k) d.used(k, j) &= std::abs(d.s.qd(k, j)) > 0.06;
-  };
-  Case c(Springs(1, 3), 7, slow, true);
+  Case c(Springs(1, 3), 7, LeaveOutTurns, AtTurns::kAlways);
   ASSERT_FALSE(c.finding().terms.empty());
   EXPECT_TRUE(c.Names("hysteresis", 1)) << c.Said();
   const HeldOut held_out = c.diagnosis->Judge(c.test);
   const double before = calibration::Rms(c.test, held_out.before, false)[0],
                after = calibration::Rms(c.test, held_out.after, false)[0];
   EXPECT_LT(after, 0.5 * before);
-  Case nothing({}, 8, slow, true);
+  Case nothing({}, 8, LeaveOutTurns, AtTurns::kAlways);
   EXPECT_TRUE(nothing.finding().terms.empty()) << nothing.Said();
+}
+
+// A torque over position, near turns alone or everywhere.
+TEST(Diagnosis, WhatShowsNearTurnsOnly_IsNoTermBesideHysteresis) {
+  for (const bool everywhere : {false, true}) {
+    Case c(
+        Springs(1, 3), 7,
+        [&](Dataset& d) {
+          LeaveOutTurns(d);
+          for (int k = 0; k < d.samples(); ++k)
+            if (everywhere || std::abs(d.s.qd(k, 0)) < kNearTurn_radps) d.tau(k, 0) += std::sin(3 * d.s.q(k, 0));
+        },
+        AtTurns::kAlways);
+    EXPECT_TRUE(c.Names("hysteresis", 1)) << c.Said();
+    EXPECT_EQ(c.finding().terms.size() > 1, everywhere) << c.Said();
+  }
 }
 
 TEST(Diagnosis, RationalStribeck_IsNamedAtItsJoint) {

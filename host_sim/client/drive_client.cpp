@@ -42,7 +42,8 @@ _modbus* ToHost(const std::string& host, const std::string& port) {
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
   if (const int error = getaddrinfo(host.c_str(), port.c_str(), &hints, &found); error != 0)
-    throw LinkError(fmt::format("{}: cannot find this host: {}", host, gai_strerror(error)));
+    throw LinkError(fmt::format("{}: cannot find this host: {}; check the name, or give its IP address", host,
+                                gai_strerror(error)));
   freeaddrinfo(found);
   return modbus_new_tcp_pi(host.c_str(), port.c_str());
 }
@@ -79,7 +80,9 @@ void DriveClient::Connect() {
   if (!fresh) throw LinkError(fmt::format("{}: {}", name_, modbus_strerror(errno)));
   modbus_set_slave(fresh.get(), unit_);
   if (modbus_connect(fresh.get()) != 0)
-    throw LinkError(fmt::format("{}: cannot connect: {}", name_, modbus_strerror(errno)));
+    throw LinkError(fmt::format("{}: cannot connect: {}; {}", name_, modbus_strerror(errno),
+                                line_ ? "is the adapter plugged in, and is this its name?"
+                                      : "is a drive running there, and is this its port?"));
   if (line_) {
     if (const int got = SetSpeed(modbus_get_socket(fresh.get()), line_->baud);
         got == 0 || std::abs(got - line_->baud) > line_->baud / 50)

@@ -68,7 +68,7 @@ nlohmann::ordered_json Json(const logs::Look& look, const logs::Proposal& propos
 
 int Run(const ChannelsOptions& o) {
   if (!o.out.empty() && std::filesystem::exists(o.out) && !o.overwrite)
-    throw io::InputError(o.out + ": is there already; --overwrite takes its place");
+    throw io::InputError(o.out + ": is there already; --overwrite replaces it");
   const logs::Look look = logs::LookAt(o.log, {o.definitions.begin(), o.definitions.end()});
   for (const std::string& note : look.notes) SayAside(o.log + ": " + note);
   PrintSights(look);

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "armcal/core/version.hpp"
+#include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/faults.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -38,7 +40,26 @@ std::vector<std::string> LongNames(const CLI::App& verb) {
 std::string Unknown(const std::string& what, const std::string& word, const std::vector<std::string>& known) {
   if (std::find(known.begin(), known.end(), word) != known.end()) return {};
   const std::string nearest = io::Nearest(word, known);
-  return fmt::format("no {} {}{}", what, word, nearest.empty() ? "" : "; the nearest is " + nearest);
+  return fmt::format("no {} {}; {}", what, word, nearest.empty() ? "--help lists them" : "the nearest is " + nearest);
+}
+
+// One line for the first word that is no verb or no option; empty: every word is known.
+std::string Misspelt(const CLI::App& app, const CLI::App* verb, int argc, const char* const* argv) {
+  if (verb == nullptr) {
+    std::vector<std::string> names;
+    for (const CLI::App* known : Verbs(app)) names.push_back(known->get_name());
+    const std::string first = argv[1];
+    return first.starts_with("-") ? Unknown("option", first.substr(0, first.find('=')), LongNames(app))
+                                  : Unknown("verb", first, names);
+  }
+  for (int k = 2; k < argc; ++k) {
+    const std::string word = argv[k];
+    if (word == "--") break;
+    if (!word.starts_with("--")) continue;
+    if (const std::string text = Unknown("option", word.substr(0, word.find('=')), LongNames(*verb)); !text.empty())
+      return text;
+  }
+  return {};
 }
 
 // Troff reads a dot or a quote at the start of a line as a request, and a backslash anywhere.
@@ -132,28 +153,41 @@ std::string Version() {
   return fmt::format("armcal {}.{}.{}", ARMCAL_VERSION >> 16, ARMCAL_VERSION >> 8 & 0xff, ARMCAL_VERSION & 0xff);
 }
 
-std::string Misspelt(const CLI::App& app, int argc, const char* const* argv) {
-  if (argc < 2) return {};
-  std::vector<std::string> names;
+std::string WrongUse(const CLI::App& app, int argc, const char* const* argv, const CLI::ParseError& error) {
+  if (argc < 2) return "armcal: expected a verb; armcal --help lists them";
   const CLI::App* verb = nullptr;
-  for (const CLI::App* known : Verbs(app)) {
-    names.push_back(known->get_name());
-    if (names.back() == argv[1]) verb = known;
-  }
-  const std::string first = argv[1];
-  if (verb == nullptr) {
-    if (!first.starts_with("-")) return "armcal: " + Unknown("verb", first, names);
-    const std::string text = Unknown("option", first.substr(0, first.find('=')), LongNames(app));
-    return text.empty() ? text : "armcal: " + text;
-  }
-  for (int k = 2; k < argc; ++k) {
-    const std::string word = argv[k];
-    if (word == "--") break;
-    if (!word.starts_with("--")) continue;
-    if (const std::string text = Unknown("option", word.substr(0, word.find('=')), LongNames(*verb)); !text.empty())
-      return "armcal " + verb->get_name() + ": " + text;
-  }
-  return {};
+  for (const CLI::App* known : Verbs(app))
+    if (known->get_name() == argv[1]) verb = known;
+  const std::string program = verb == nullptr ? "armcal" : "armcal " + verb->get_name();
+  const std::string misspelt = Misspelt(app, verb, argc, argv);
+  if (!misspelt.empty()) return program + ": " + misspelt;
+  std::string what = error.what();
+  constexpr std::string_view kConvert = "Could not convert: ";
+  if (what.starts_with(kConvert))  // "Could not convert: --seed = abc"
+    what = what.substr(kConvert.size()).replace(what.find(" = ") - kConvert.size(), 3, " ") + ": expected a number";
+  else if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr)  // "--robot: 1 required TEXT missing"
+    what = what.substr(0, what.find(':')) + ": expected a value behind it";
+  else if (dynamic_cast<const CLI::ValidationError*>(&error) != nullptr)  // "--seconds: -3: expected a number from 0"
+    what.replace(what.find(": "), 2, " ");
+  return program + ": " + what + "; see " + program + " --help";
+}
+
+CLI::Validator OneOf(const std::vector<std::string>& words) {
+  std::string expected;
+  for (std::size_t k = 0; k < words.size(); ++k)
+    expected += (k == 0 ? "" : k + 1 == words.size() ? " or " : ", ") + words[k];
+  const auto check = [words, expected](const std::string& text) {
+    return std::find(words.begin(), words.end(), text) != words.end() ? std::string() : text + ": expected " + expected;
+  };
+  return {check, fmt::format("{{{}}}", fmt::join(words, ","))};
+}
+
+CLI::Validator AboveZero() {
+  CLI::Validator check = CLI::PositiveNumber;
+  check.operation([](std::string& text) {
+    return CLI::PositiveNumber(text).empty() ? std::string() : text + ": expected a number above 0";
+  });
+  return check;
 }
 
 void AddPages(CLI::App& app, std::function<int()>& action) {
@@ -165,7 +199,7 @@ void AddPages(CLI::App& app, std::function<int()>& action) {
   verb->callback([&app, &action, folder] {
     action = [&app, folder] {
       const std::filesystem::path out = *folder;
-      std::filesystem::create_directories(out / "man1");
+      io::MakeFolder(out / "man1");
       files::WriteWholeFile(out / "man1" / "armcal.1", TopPage(app));
       for (const CLI::App* one : Verbs(app))
         files::WriteWholeFile(out / "man1" / ("armcal-" + one->get_name() + ".1"), VerbPage(*one));

@@ -2,16 +2,36 @@
 // pages of the manual.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 namespace armcal::tool {
 
 // "armcal 0.1.0"
 std::string Version();
 
-// One line for the first word that is no verb or no option, with the nearest one; empty: every word is known.
-std::string Misspelt(const CLI::App& app, int argc, const char* const* argv);
+// One line about a command line that could not be read. The first word that is no verb or no option comes before all
+// other mistakes, with the nearest one that there is.
+std::string WrongUse(const CLI::App& app, int argc, const char* const* argv, const CLI::ParseError& error);
+
+// What a value must be, for CLI::Option::check. Their messages say what was expected.
+CLI::Validator OneOf(const std::vector<std::string>& words);
+CLI::Validator AboveZero();
+template <class Number>
+CLI::Validator Between(Number low, Number high) {
+  const CLI::Range range(low, high);
+  const std::string expected =
+      fmt::format("expected {} from {:.7g} to {:.7g}", std::is_integral_v<Number> ? "an integer" : "a number",
+                  static_cast<double>(low), static_cast<double>(high));
+  CLI::Validator check = range;
+  check.operation(
+      [range, expected](std::string& text) { return range(text).empty() ? std::string() : text + ": " + expected; });
+  return check;
+}
 
 // armcal pages: manual pages and the words that bash completes, written from the definition of `app`.
 void AddPages(CLI::App& app, std::function<int()>& action);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
@@ -121,7 +122,7 @@ class Demo {
  public:
   explicit Demo(const DemoOptions& o) : o_(o), tool_(OwnProgram()) {
     scenario_ = ScenarioPath(o.scenario);
-    fs::create_directories(o.out);
+    io::MakeFolder(o.out);
     for (const char* old : {"drive.nor", "truth_1.bin", "truth_2.bin", "result.json", "report.html"})
       fs::remove(fs::path(o.out) / old);
   }

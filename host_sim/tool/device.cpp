@@ -15,6 +15,7 @@
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/client/writer_seat.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/interrupt.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -313,15 +314,15 @@ void AddDevice(CLI::App& app, Action& action) {
              "show state, residuals and consistency once a second, until Ctrl-C\nexample: armcal watch --connect "
              "127.0.0.1:1502",
              o, RunWatch);
-  verb->add_option("--count", o->count, "so many times (default: until Ctrl-C)")->check(CLI::Range(1, 1000000));
+  verb->add_option("--count", o->count, "so many times (default: until Ctrl-C)")->check(Between(1, 1000000));
   o = options();
   verb = Add(app, action, "scan",
              "find drives: units of a serial line, or ports of a host\nexit code 3: none\nexample: armcal scan "
              "/dev/ttyUSB0 --to 10\nexample: armcal scan 192.168.0.10 --from 502 --to 502",
              o, RunScan, false);
   verb->add_option("line", o->connect, "serial line or host")->required();
-  verb->add_option("--from", o->from, "first unit or port")->capture_default_str()->check(CLI::Range(1, 65535));
-  verb->add_option("--to", o->to, "last one")->capture_default_str()->check(CLI::Range(1, 65535));
+  verb->add_option("--from", o->from, "first unit or port")->capture_default_str()->check(Between(1, 65535));
+  verb->add_option("--to", o->to, "last one")->capture_default_str()->check(Between(1, 65535));
   o = options();
   verb = app.add_subcommand("map", "print the register map of this version\nexample: armcal map --csv > registers.csv");
   auto* json =

@@ -9,6 +9,7 @@
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
 #include "host_sim/identify/calibration/table_ceilings.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -133,7 +134,7 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--gain-tolerance", o->how.gain_tolerance,
                    "share by which each joint's torque may be off: for the mass of a payload that the held-out log "
                    "carries; default: the robot file's, or 0.1")
-      ->check(CLI::Range(1e-6, 0.9));
+      ->check(Between(1e-6, 0.9));
   verb->add_option("--json", o->json, "write the verdict here");
   verb->add_option("--report", o->report, "write a self-contained page here");
   verb->add_option("--model-out", o->model_out, "write the robot file with the terms here");

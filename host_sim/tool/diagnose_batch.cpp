@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/progress.hpp"
@@ -70,7 +71,7 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& o
 // NAME.json, .html, .toml and .log of each case go to `out`. one: how each log is read. jobs: at a time; 0: one a core.
 verdict::Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const DiagnoseOptions& one, const fs::path& out,
                               int jobs) {
-  fs::create_directories(out);
+  io::MakeFolder(out);
   verdict::Verdicts verdicts;
   report::Progress progress(fmt::format("{} logs", cases.size()));
   std::mutex mutex;

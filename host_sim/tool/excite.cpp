@@ -9,6 +9,7 @@
 #include "host_sim/identify/excitation/compose.hpp"
 #include "host_sim/identify/excitation/optimise.hpp"
 #include "host_sim/identify/excitation/target.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/interrupt.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -204,20 +205,20 @@ void AddExcite(CLI::App& app, Action& action) {
   verb->add_option("--out", o->out, "trajectory file to write: t,q1..qn")->required();
   verb->add_option("--purpose", o->purpose,
                    "train: 4 periods and slow moves; test: another series, 2 periods, few slow moves")
-      ->check(CLI::IsMember({"train", "test"}))
+      ->check(OneOf({"train", "test"}))
       ->capture_default_str();
   verb->add_option("--seed", o->seed, "of the random starts")->capture_default_str();
-  verb->add_option("--periods", o->periods, "Fourier periods to play (default: by purpose)")->check(CLI::Range(1, 100));
+  verb->add_option("--periods", o->periods, "Fourier periods to play (default: by purpose)")->check(Between(1, 100));
   verb->add_option("--period", o->period_s, "length of a period in seconds")
-      ->check(CLI::Range(1.0, 1000.0))
+      ->check(Between(1.0, 1000.0))
       ->capture_default_str();
   verb->add_option("--curve", o->curve, "what the period is made of")
-      ->check(CLI::IsMember({"fourier", "sine", "polynomial", "spline"}))
+      ->check(OneOf({"fourier", "sine", "polynomial", "spline"}))
       ->capture_default_str();
   auto* criterion =
       verb->add_option("--criterion", o->criterion,
                        "condition: cond(K); d-optimal: det(K'K); friction: accuracy of friction, low speeds included")
-          ->check(CLI::IsMember({"condition", "d-optimal", "friction"}))
+          ->check(OneOf({"condition", "d-optimal", "friction"}))
           ->capture_default_str();
   auto* separate = verb->add_option("--separate", o->separate,
                                     "effects to tell apart: record, record:joint or record:joint-joint, ...")
@@ -226,21 +227,21 @@ void AddExcite(CLI::App& app, Action& action) {
   verb->add_option("--from", o->from, "with --separate: verdict (diagnose --json) with what was found of them")
       ->needs(separate);
   verb->add_option("--search", o->search, "gradient, or the survey's genetic algorithm")
-      ->check(CLI::IsMember({"gradient", "genetic"}))
+      ->check(OneOf({"gradient", "genetic"}))
       ->capture_default_str();
   verb->add_option("--harmonics", o->harmonics, "terms of the Fourier series; other curves have twice as many")
-      ->check(CLI::Range(1, 20))
+      ->check(Between(1, 20))
       ->capture_default_str();
   verb->add_option("--seconds", o->seconds, "time for the search; Ctrl-C ends it early")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(Between(0.0, 1e6))
       ->capture_default_str();
   verb->add_option("--starts", o->starts, "searches at most; with time enough the result follows from the seed")
-      ->check(CLI::Range(1, 1000000));
+      ->check(Between(1, 1000000));
   verb->add_option("--step", o->step_s, "grid of the file in seconds")
-      ->check(CLI::Range(0.0005, 0.05))
+      ->check(Between(0.0005, 0.05))
       ->capture_default_str();
   verb->add_option("--margin", o->margin, "share of every limit that is kept free")
-      ->check(CLI::Range(0.01, 0.9))
+      ->check(Between(0.01, 0.9))
       ->capture_default_str();
   verb->add_flag("--no-slow", o->no_slow, "leave the slow moves out");
   verb->add_option("--json", o->json, "write the figures here");

@@ -8,6 +8,7 @@
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/data/report/progress.hpp"
 #include "host_sim/identify/calibration/table_ceilings.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -20,12 +21,19 @@ struct FlashOptions {
   int limit_s = link::reg::kUsualTrial_s;  // of a trial
 };
 
+// Read before the drive is called, so that a wrong file is named even where no drive answers.
+struct ToFlash {
+  explicit ToFlash(const FlashOptions& o) : model(LoadModel(o.robot)), file(calibration::ReadTable(o.table)) {}
+  codegen::Model model;
+  calibration::TableFile file;
+};
+
 // The words that the file means for this drive. Parameters that the data hardly determined keep the drive's value
 // unless forced.
-std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptions& o, calibration::TableFile& sent,
-                                    std::vector<std::string>& missing) {
-  const codegen::Model model = LoadModel(o.robot);
-  const calibration::TableFile layout = LayoutOf(drive, model), file = calibration::ReadTable(o.table);
+std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptions& o, const ToFlash& read,
+                                    calibration::TableFile& sent, std::vector<std::string>& missing) {
+  const auto& [model, file] = read;
+  const calibration::TableFile layout = LayoutOf(drive, model);
   if (file.joint.size() != layout.joint.size())
     throw io::InputError(
         fmt::format("{}: {} joints, the drive has {}", o.table, file.joint.size(), layout.joint.size()));
@@ -51,11 +59,12 @@ std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptio
 
 int Flash(const FlashOptions& o) {
   const std::optional<client::Key> key = ReadKeyOption(o.key);
+  const ToFlash read(o);
   client::DriveClient drive = ConnectTo(o.connect);
   calibration::TableFile sent;
   std::vector<std::string> missing;
-  const auto words = WordsFor(drive, o, sent, missing);
-  if (const std::string beyond = calibration::BeyondCeiling(LoadModel(o.robot), sent); !beyond.empty())
+  const auto words = WordsFor(drive, o, read, sent, missing);
+  if (const std::string beyond = calibration::BeyondCeiling(read.model, sent); !beyond.empty())
     throw io::InputError(fmt::format("{}: {}, by [ceilings] of {}", o.table, beyond, o.robot));
   for (const std::string& name : missing) fmt::print("not in {}, kept as in the drive: {}\n", o.table, name);
   int kept = 0;
@@ -91,10 +100,11 @@ int Flash(const FlashOptions& o) {
 }
 
 int Verify(const FlashOptions& o) {
+  const ToFlash read(o);
   client::DriveClient drive = ConnectTo(o.connect);
   calibration::TableFile wanted;
   std::vector<std::string> missing;
-  const auto words = WordsFor(drive, o, wanted, missing);
+  const auto words = WordsFor(drive, o, read, wanted, missing);
   const auto active = client::ReadActiveTable(drive);
   const calibration::TableFile is = calibration::DecodeTable(active, wanted);
   int differ = 0;
@@ -138,7 +148,7 @@ void AddFlash(CLI::App& app, Action& action) {
   verb->add_option("--limit", o->limit_s, "seconds after which a trial ends by itself")
       ->needs(trial)
       ->capture_default_str()
-      ->check(CLI::Range(1, int{link::reg::kLongestTrial_s}));
+      ->check(Between(1, int{link::reg::kLongestTrial_s}));
   verb->callback([o, &action] {
     action = [o] { return Reported(o->json, [&] { return Flash(*o); }, {{"readback_ok", false}}); };
   });
@@ -150,8 +160,9 @@ void AddVerify(CLI::App& app, Action& action) {
                          "compare the table in force with a file\nexample: armcal verify --connect 127.0.0.1:1502 "
                          "--robot er20_like --table build/table.toml",
                          o);
-  verb->callback(
-      [o, &action] { action = [o] { return Reported(o->json, [&] { return Verify(*o); }, {{"same", false}}); }; });
+  verb->callback([o, &action] {
+    action = [o] { return Reported(o->json, [&] { return Verify(*o); }, {{"same", false}}); };
+  });
 }
 
 }  // namespace armcal::tool

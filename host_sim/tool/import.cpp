@@ -53,7 +53,7 @@ int Run(const ImportOptions& o) {
   const std::string name = o.name.empty() ? StemOf(o.out.empty() ? o.urdf : o.out) : o.name;
   const std::filesystem::path out = o.out.empty() ? StemOf(o.urdf) + ".toml" : o.out;
   if (std::filesystem::exists(out) && !o.overwrite)
-    throw io::InputError(out.string() + ": is there already; --overwrite takes its place");
+    throw io::InputError(out.string() + ": is there already; --overwrite replaces it");
   const codegen::ImportedRobot robot = codegen::ImportUrdf({o.urdf, o.tip, Held(o.fixed)}, name, out);
   files::WriteWholeFile(out, robot.text);
   const codegen::Robot read = codegen::ReadRobot(out);

@@ -46,9 +46,9 @@ int Main(int argc, char** argv) {
     app.parse(argc, argv);
     return action();
   } catch (const CLI::ParseError& e) {
-    const std::string misspelt = e.get_exit_code() == 0 ? "" : Misspelt(app, argc, argv);
-    if (!misspelt.empty()) return std::fprintf(stderr, "%s\n", misspelt.c_str()), kBadInput;
-    return app.exit(e) == 0 ? kOk : kBadInput;
+    if (e.get_exit_code() == 0) return app.exit(e), kOk;  // --help, --version
+    std::fprintf(stderr, "%s\n", WrongUse(app, argc, argv, e).c_str());
+    return kBadInput;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "armcal: %s\n", e.what());
     return ExitCodeOf(e);

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 
 #include "codegen/src/io/input_error.hpp"
 
@@ -36,9 +37,15 @@ std::string ProgramFor(const std::string& stem, const std::string& robot, const 
                        const std::string& what) {
   const std::filesystem::path beside = std::filesystem::path(OwnProgram()).parent_path() / (stem + "-" + robot);
   const std::string program = chosen.empty() ? beside.string() : chosen;
-  if (!std::filesystem::is_regular_file(program))
-    throw io::InputError(program + ": no " + what + " has been built for robot " + robot);
-  return program;
+  if (std::filesystem::is_regular_file(program)) return program;
+  std::set<std::string> built;
+  for (const auto& e : std::filesystem::directory_iterator(beside.parent_path()))
+    if (const std::string name = e.path().filename().string(); name.starts_with(stem + "-"))
+      built.insert(name.substr(stem.size() + 1));
+  std::string known;
+  for (const std::string& one : built) known += (known.empty() ? "" : ", ") + one;
+  throw io::InputError(program + ": no " + what + " has been built for robot " + robot +
+                       (known.empty() ? "" : "; there is one for " + known));
 }
 
 void Become(const std::vector<std::string>& words) {

@@ -7,6 +7,7 @@
 #include "host_sim/data/logs/log.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/interrupt.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -71,7 +72,8 @@ int RunRecord(const client::RecordOptions& o) {
   VectorXd tracking;
   if (log.qref.size() > 0) {
     const auto always = [](Eigen::Index, int) { return true; };
-    tracking = RmsOf(log, [&](Eigen::Index k, int j) { return log.q(k, j) - log.qref(k, j); }, always);
+    tracking = RmsOf(
+        log, [&](Eigen::Index k, int j) { return log.q(k, j) - log.qref(k, j); }, always);
     json["tracking_rms_rad"] = verdict::ToList(tracking);
     table.header.push_back("tracking error rms / mrad");
   }
@@ -126,17 +128,17 @@ void AddRecord(CLI::App& app, Action& action) {
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--robot", o->robot, "robot file or name")->required();
   verb->add_option("--trajectory", o->trajectory, "trajectory of armcal excite, for a drive that plays it");
-  verb->add_option("--seconds", o->seconds, "instead: so long, whatever the arm does")->check(CLI::Range(1.0, 86400.0));
+  verb->add_option("--seconds", o->seconds, "instead: so long, whatever the arm does")->check(Between(1.0, 86400.0));
   verb->add_flag("--lean", o->lean, "position, current and flags only, for a serial line; packed if the drive can");
   verb->add_option("--out", o->out, "log to write (.csv or .csv.gz)")->required();
   verb->add_option("--samples", o->samples,
                    "also write the drive's processed samples, with the committed model's torque as tauff");
   verb->add_option("--speed", o->speed_percent, "percent of the trajectory's speed, for a first slow pass")
       ->capture_default_str()
-      ->check(CLI::Range(1, 100));
+      ->check(Between(1, 100));
   verb->add_option("--decimation", o->decimation,
                    "ticks averaged into one record (default: the estimator's; 1 keeps gear ripple)")
-      ->check(CLI::Range(1, 16));
+      ->check(Between(1, 16));
   verb->add_option("--json", o->json, "write the figures here");
   verb->callback([o, &action] { action = [o] { return Reported(o->json, [&] { return RunRecord(*o); }); }; });
 }

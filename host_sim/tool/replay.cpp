@@ -11,6 +11,7 @@
 #include "host_sim/identify/replay/position_error.hpp"
 #include "host_sim/identify/replay/refine.hpp"
 #include "host_sim/identify/search/parallel.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/given.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -202,21 +203,21 @@ void AddReplay(CLI::App& app, Action& action) {
   verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
   verb->add_option("--start-samples", o->start_samples,
                    "the state at the start is a parabola through this many samples")
-      ->check(CLI::Range(3, 1000000));
-  verb->add_option("--step", o->step_s, "longest step of the simulation (s)")->check(CLI::Range(1e-6, 1.0));
+      ->check(Between(3, 1000000));
+  verb->add_option("--step", o->step_s, "longest step of the simulation (s)")->check(Between(1e-6, 1.0));
   verb->add_option("--refine", o->refine,
                    "log(s) to fit the parameters to, by output error of many short runs (multiple shooting)");
   verb->add_option("--period", o->refinement.block_s,
                    "length of the blocks that are left out or drawn (s): the period of the training motion; default: "
                    "a quarter of each log")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   verb->add_option("--segment", o->refinement.segment_s,
                    "length of a run (s); default: chosen by blocks of the training logs that are left out in turn")
-      ->check(CLI::PositiveNumber);
-  verb->add_option("--tries", o->refinement.tries, "starting points")->check(CLI::Range(1, 1000));
+      ->check(AboveZero());
+  verb->add_option("--tries", o->refinement.tries, "starting points")->check(Between(1, 1000));
   verb->add_option("--seed", o->refinement.seed, "of what is drawn");
   verb->add_option("--refits", o->refits, "refit that often on blocks drawn anew, each time from drawn starting points")
-      ->check(CLI::Range(0, 1000));
+      ->check(Between(0, 1000));
   AddCutoff(*verb, o->cutoff_Hz);
   verb->add_option("--json", o->json, "write everything here; --table takes it as parameters");
   verb->callback([o, &action] { action = [o] { return RunReplay(*o); }; });

@@ -2,6 +2,8 @@
 #include <fmt/core.h>
 
 #include "codegen/src/generator/emit.hpp"
+#include "codegen/src/io/atomic_write.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/compiled_firmware.hpp"
 #include "host_sim/tool/process.hpp"
 #include "host_sim/tool/verb.hpp"
@@ -34,7 +36,7 @@ int RunSimulate(const SimulateOptions& o) {
   const fs::path robot = RobotPath(o.robot);
   const fs::path scenario = ScenarioPath(o.scenario);
   if (!o.drive.empty() && !fs::is_regular_file(o.drive)) throw io::InputError(o.drive + ": no such program");
-  if (const auto folder = fs::path(o.storage).parent_path(); !folder.empty()) fs::create_directories(folder);
+  if (const auto folder = fs::path(o.storage).parent_path(); !folder.empty()) io::MakeFolder(folder);
   std::vector<std::string> words =
       o.drive.empty() ? DriveFor({codegen::ReadRobot(robot), LoadCatalogue()}) : std::vector<std::string>{o.drive};
   words.insert(words.end(), {"--scenario", scenario.string(), "--robot", robot.string(), "--storage", o.storage,
@@ -60,9 +62,9 @@ void AddSimulate(CLI::App& app, Action& action) {
   verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->capture_default_str();
   verb->add_option("--robot", o->robot, "robot file or name")->capture_default_str();
   verb->add_option("--drive", o->drive, "drive program (default: the one of the robot)");
-  verb->add_option("--port", o->port, "TCP port, 0: any free one")->capture_default_str()->check(CLI::Range(0, 65535));
+  verb->add_option("--port", o->port, "TCP port, 0: any free one")->capture_default_str()->check(Between(0, 65535));
   verb->add_option("--read-port", o->read_port, "a second TCP port that serves reading alone, 0: any free one")
-      ->check(CLI::Range(0, 65535));
+      ->check(Between(0, 65535));
   verb->add_option("--serial", o->serial, "also serve Modbus RTU on this terminal: 115200 baud, even parity, unit 1");
   verb->add_option("--storage", o->storage, "file that plays the drive's flash memory")->capture_default_str();
   verb->add_option("--truth-log", o->truth_log,

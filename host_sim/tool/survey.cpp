@@ -10,6 +10,7 @@
 #include "host_sim/data/report/progress.hpp"
 #include "host_sim/study/survey/publish.hpp"
 #include "host_sim/study/survey/tables.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/interrupt.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -82,21 +83,21 @@ void AddSurvey(CLI::App& app, Action& action) {
   auto o = std::make_shared<SurveyOptions>();
   verb->add_option("--table", o->tables,
                    "5 to 12, trajectories, priors, shipped, laws, choice, online, figures (default: all)")
-      ->check(CLI::IsMember({"5", "6", "7", "8", "9", "10", "11", "12", "trajectories", "priors", "shipped", "laws",
-                             "choice", "online", "figures"}));
-  verb->add_option("--draws", o->draws, "random draws of prior and noise")->check(CLI::PositiveNumber);
+      ->check(OneOf({"5", "6", "7", "8", "9", "10", "11", "12", "trajectories", "priors", "shipped", "laws", "choice",
+                     "online", "figures"}));
+  verb->add_option("--draws", o->draws, "random draws of prior and noise")->check(AboveZero());
   verb->add_option("--slow-draws", o->slow_draws, "draws of the methods of (25), which take seconds each")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   verb->add_option("--seed", o->seed, "of all draws and searches");
   verb->add_option("--search-seconds", o->search_s,
                    "of each trajectory search at most; with time enough, results follow from the seed")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   verb->add_option("--searches", o->searches,
                    "starts of each trajectory search at most (default: 60, of (4) 12, of the genetic algorithm 2)")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   verb->add_option("--feedforward", o->feedforward,
                    "what the simulated controller knows: the set parameters, as in the survey, or CAD values")
-      ->check(CLI::IsMember({"set", "cad"}))
+      ->check(OneOf({"set", "cad"}))
       ->capture_default_str();
   verb->add_option("--robot", o->robot, "robot file or name: its CAD values are the set parameters");
   verb->add_option("--data", o->data, "folder of measured logs (default: measured in ARMCAL_DATA)");

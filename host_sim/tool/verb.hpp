@@ -75,12 +75,7 @@ int Reported(const std::string& path, Work work,
 
 // A scenario file by its path, or by its name in host_sim/scenarios. Throws io::InputError if there is none.
 inline std::filesystem::path ScenarioPath(const std::string& scenario) {
-  const std::filesystem::path path = std::filesystem::is_regular_file(scenario)
-                                         ? std::filesystem::path(scenario)
-                                         : Home() / "host_sim" / "scenarios" / (scenario + ".toml");
-  if (!std::filesystem::is_regular_file(path))
-    throw io::InputError("scenario " + scenario + ": expected a file, or a name in host_sim/scenarios");
-  return path;
+  return codegen::NamedFile("scenario", scenario, Home() / "host_sim" / "scenarios");
 }
 
 }  // namespace armcal::tool

@@ -195,4 +195,14 @@ std::map<std::string, EffectRecord> ReadCatalogue(const std::filesystem::path& f
   return out;
 }
 
+const EffectRecord& FindRecord(const std::map<std::string, EffectRecord>& catalogue, const std::string& where,
+                               const std::string& name) {
+  if (const auto found = catalogue.find(name); found != catalogue.end()) return found->second;
+  std::vector<std::string> known;
+  for (const auto& [key, record] : catalogue) known.push_back(key);
+  const std::string nearest = io::Nearest(name, known);
+  throw io::InputError(where + ": no effect " + name + "; " +
+                       (nearest.empty() ? "docs/effects.md lists them" : "the nearest is " + nearest));
+}
+
 }  // namespace armcal::codegen

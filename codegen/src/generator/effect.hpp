@@ -92,4 +92,8 @@ EffectRecord ReadEffect(const std::filesystem::path& path);
 // All *.toml of a folder by name, in alphabetical order.
 std::map<std::string, EffectRecord> ReadCatalogue(const std::filesystem::path& folder);
 
+// InputError, which begins with `where`: there is no such record.
+const EffectRecord& FindRecord(const std::map<std::string, EffectRecord>& catalogue, const std::string& where,
+                               const std::string& name);
+
 }  // namespace armcal::codegen

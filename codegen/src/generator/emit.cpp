@@ -126,7 +126,7 @@ GeneratedFiles Emit(const Model& m) {
 }
 
 void WriteFiles(const GeneratedFiles& files, const std::filesystem::path& folder) {
-  std::filesystem::create_directories(folder);
+  io::MakeFolder(folder);
   for (const auto& [name, text] : files.text) io::AtomicWrite(folder / name, text);
 }
 

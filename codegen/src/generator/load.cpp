@@ -2,6 +2,7 @@
 #include "codegen/src/generator/load.hpp"
 
 #include <cstdlib>
+#include <set>
 
 #include "codegen/src/io/input_error.hpp"
 
@@ -40,14 +41,19 @@ fs::path Home() {
       "codegen/robots: not found from here; set ARMCAL_HOME to the armcal checkout or to PREFIX/share/armcal");
 }
 
-fs::path RobotPath(const std::string& name_or_path) {
+fs::path NamedFile(const std::string& what, const std::string& name_or_path, const fs::path& folder) {
   if (fs::is_regular_file(name_or_path)) return name_or_path;
-  const fs::path folder = Home() / "codegen" / "robots", path = folder / (name_or_path + ".toml");
-  if (fs::is_regular_file(path)) return path;
-  std::string known;
+  std::set<std::string> names;
   for (const auto& e : fs::directory_iterator(folder))
-    if (e.path().extension() == ".toml") known += (known.empty() ? "" : ", ") + e.path().stem().string();
-  throw io::InputError("robot " + name_or_path + ": expected a file or one of " + known);
+    if (e.path().extension() == ".toml") names.insert(e.path().stem().string());
+  if (names.contains(name_or_path)) return folder / (name_or_path + ".toml");
+  std::string known;
+  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
+  throw io::InputError(what + " " + name_or_path + ": no such file or name, expected a file or one of " + known);
+}
+
+fs::path RobotPath(const std::string& name_or_path) {
+  return NamedFile("robot", name_or_path, Home() / "codegen" / "robots");
 }
 
 Catalogue LoadCatalogue() { return ReadCatalogue(Home() / "codegen" / "effects"); }

@@ -15,6 +15,11 @@ std::filesystem::path Home();
 // Where to look last: a program that is installed beside its own copy of robots and effects says so once, at its start.
 void SetInstalledHome(const std::filesystem::path& folder);
 
+// A file's path, or a name of a TOML file in `folder`. InputError says `what` was looked for, and names those there
+// are.
+std::filesystem::path NamedFile(const std::string& what, const std::string& name_or_path,
+                                const std::filesystem::path& folder);
+
 // A robot file's path, or a name in codegen/robots. InputError names the robots there are.
 std::filesystem::path RobotPath(const std::string& name_or_path);
 

@@ -14,13 +14,6 @@ namespace {
 
 const char* const kFrictionLaw = "coulomb_viscous";  // the record of the robot's own friction, model (3) of the survey
 
-const EffectRecord& Find(const Catalogue& catalogue, const Robot& robot, const std::string& name) {
-  const auto it = catalogue.find(name);
-  if (it == catalogue.end())
-    throw io::InputError(robot.path + ": effect." + name + ": expected the name of an effect record");
-  return it->second;
-}
-
 bool Contains(const std::vector<int>& list, int value) {
   return std::find(list.begin(), list.end(), value) != list.end();
 }
@@ -55,7 +48,7 @@ BodyRows Model::TiltedRows(int axis) {
 // parameters, too.
 BodyRows Model::TiltRows(const Catalogue& catalogue) {
   const bool any = std::any_of(robot_.effect.begin(), robot_.effect.end(), [&](const EffectUse& use) {
-    return !Find(catalogue, robot_, use.effect).adds_base.empty();
+    return !FindRecord(catalogue, robot_.path, use.effect).adds_base.empty();
   });
   BodyRows rows;
   for (int axis = 0; any && axis < 3; ++axis) {
@@ -109,14 +102,14 @@ void Model::AddEffects(const Catalogue& catalogue) {
   law.effect = kFrictionLaw;
   for (int j = 0; j < joints(); ++j) {
     const bool replaced = std::any_of(uses.begin(), uses.end(), [&](const EffectUse& use) {
-      return Find(catalogue, robot_, use.effect).replaces == kFrictionLaw && Contains(use.joints, j);
+      return FindRecord(catalogue, robot_.path, use.effect).replaces == kFrictionLaw && Contains(use.joints, j);
     });
     if (!replaced) law.joints.push_back(j);
   }
   if (!law.joints.empty()) uses.insert(uses.begin(), law);
   for (const EffectUse& use : uses) {
     const std::string where = robot_.path + ": effect." + use.effect;
-    const EffectRecord& found = Find(catalogue, robot_, use.effect);
+    const EffectRecord& found = FindRecord(catalogue, robot_.path, use.effect);
     if (!found.on_target)
       throw io::InputError(where + ": expected an effect that a model can hold; " + found.name +
                            " is for the host only");

@@ -11,6 +11,13 @@
 
 namespace armcal::io {
 
+void MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw InputError(folder.string() + ": this folder cannot be made: " + error.message() + "; choose another place");
+}
+
 void AtomicWrite(const std::filesystem::path& path, std::string_view bytes) {
   std::error_code error;
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), error);
@@ -24,7 +31,7 @@ void AtomicWrite(const std::filesystem::path& path, std::string_view bytes) {
   if (out && !error) return;
   const std::string why = error ? ": " + error.message() : "";
   std::filesystem::remove(part, error);
-  throw InputError(path.string() + ": cannot be written" + why);
+  throw InputError(path.string() + ": cannot be written" + why + "; choose another place");
 }
 
 }  // namespace armcal::io

@@ -17,6 +17,7 @@
 
 #include "codegen/src/io/faults.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/require_file.hpp"
 
 namespace armcal::io {
 
@@ -34,9 +35,7 @@ class TomlReader {
   }
   // What Fail says; thrown only where nobody collects.
   void Report(std::string_view key, const std::string& expected) const {
-    if (mute_ || (!Has(key) && misspelt_.contains(key))) return;
-    if (!faults_) Fail(key, expected);
-    faults_->Add(Line(key, expected));
+    if (Has(key) || !misspelt_.contains(key)) Keep(Line(key, expected));
   }
   bool Has(std::string_view key) const { return !!Node(key); }
 
@@ -136,8 +135,8 @@ class TomlReader {
     }
     return out;
   }
-  // A misspelt key is an error, not a silence. The line names the nearest key that is not there yet; that one is then
-  // not called missing besides.
+  // A misspelt key is an error, not a silence. The line names the nearest key that is not there yet, or all of them if
+  // none is near. The nearest one is then not called missing besides.
   void AllowOnly(std::span<const std::string_view> keys, std::span<const std::string_view> more = {}) const {
     std::vector<std::string_view> absent;
     for (const auto list : {keys, more})
@@ -148,7 +147,7 @@ class TomlReader {
       const auto known = [key](auto list) { return std::find(list.begin(), list.end(), key) != list.end(); };
       if (known(keys) || known(more)) continue;
       const std::string nearest = Nearest(key, absent);
-      Report(key, "no such key here" + (nearest.empty() ? "" : "; the nearest is " + nearest));
+      Keep(Unknown(key, nearest.empty() ? OneOf(absent) : "; the nearest is " + nearest));
       if (!nearest.empty()) misspelt_.insert(nearest);
     }
   }
@@ -157,11 +156,8 @@ class TomlReader {
   }
   // The same, where the keys depend on what is read: refuses keys that nobody has asked for.
   void Finish() const {
-    std::string known;
-    for (const std::string& key : asked_) known += " " + key;
     for (const auto& [key, value] : table_)
-      if (!asked_.contains(key.str()))
-        throw InputError(file_ + ": " + prefix_ + std::string(key.str()) + ": unknown key, expected one of:" + known);
+      if (!asked_.contains(key.str())) throw InputError(Unknown(key.str(), OneOf(asked_)));
   }
   const toml::table& table() const { return table_; }
   const std::string& file() const { return file_; }
@@ -171,6 +167,20 @@ class TomlReader {
 
   std::string Line(std::string_view key, const std::string& expected) const {
     return file_ + ": " + prefix_ + std::string(key) + ": " + (Has(key) ? "" : "missing, ") + "expected " + expected;
+  }
+  std::string Unknown(std::string_view key, const std::string& remedy) const {
+    return file_ + ": " + prefix_ + std::string(key) + ": unknown key" + remedy;
+  }
+  template <class Keys>
+  static std::string OneOf(const Keys& keys) {
+    std::string out;
+    for (const auto& key : keys) out += (out.empty() ? ", expected one of: " : ", ") + std::string(key);
+    return out.empty() ? ", expected none" : out;
+  }
+  void Keep(const std::string& line) const {
+    if (mute_) return;
+    if (!faults_) throw InputError(line);
+    faults_->Add(line);
   }
   template <class Holds>
   double Checked(std::string_view key, const char* expected, Holds holds) const {
@@ -193,12 +203,15 @@ class TomlReader {
 };
 
 inline toml::table ParseToml(const std::filesystem::path& path) {
-  if (!std::filesystem::is_regular_file(path)) throw InputError(path.string() + ": no such file");
+  RequireFile(path);
   try {
     return toml::parse_file(path.string());
   } catch (const toml::parse_error& e) {
+    std::string what(e.description());  // "Error while parsing key-value pair: expected '=', saw ','"
+    constexpr std::string_view kWhile = "Error while parsing ";
+    what = what.starts_with(kWhile) ? " in " + what.substr(kWhile.size()) : ": " + what;
     throw InputError(path.string() + ": line " + std::to_string(e.source().begin.line) + ", column " +
-                     std::to_string(e.source().begin.column) + ": " + std::string(e.description()));
+                     std::to_string(e.source().begin.column) + ": wrong TOML" + what);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <numbers>
 
+#include "codegen/src/io/file_kind.hpp"
 #include "codegen/src/io/toml_reader.hpp"
 #include "codegen/src/robot/body.hpp"
 #include "codegen/src/robot/frames.hpp"
@@ -339,7 +340,7 @@ void RefuseOtherFiles(const std::filesystem::path& path) {
   file >> first;
   if (path.extension() != ".urdf" && path.extension() != ".xacro" && first != '<') return;
   const std::string stem = path.stem().stem().string();
-  throw io::InputError(path.string() + ": a URDF, expected a robot file; armcal makes one: armcal import " +
+  throw io::InputError(path.string() + ": is a URDF, expected a robot file; armcal makes one: armcal import " +
                        path.string() + " -o " + stem + ".toml");
 }
 
@@ -358,11 +359,9 @@ Robot ReadRobot(const std::filesystem::path& path) {
   if (std::filesystem::is_regular_file(path)) RefuseOtherFiles(path);
   const toml::table table = io::ParseToml(path);
   if (table.empty()) throw io::InputError(path.string() + ": nothing in it, expected a robot file");
+  io::RequireKind(table, path, io::FileKind::kRobot);
   io::Faults faults;
   const io::TomlReader in(table, path.string(), "", &faults);
-  if (in.Has("schema") && in.Has("parameter"))
-    throw io::InputError(path.string() +
-                         ": a parameter table, expected a robot file; give it as --table beside --robot");
   Robot r;
   r.path = path.string();
   ReadHead(in, r);

@@ -11,6 +11,7 @@
 #include <sstream>
 #include <utility>
 
+#include "codegen/src/io/require_file.hpp"
 #include "codegen/src/robot/frames.hpp"
 
 namespace armcal::codegen {
@@ -398,8 +399,8 @@ std::string Expanded(const std::filesystem::path& path) {
 }  // namespace
 
 std::string UrdfText(const std::filesystem::path& path) {
+  io::RequireFile(path);
   std::ifstream in(path);
-  if (!in) throw io::InputError(path.string() + ": no such file");
   std::ostringstream text;
   text << in.rdbuf();
   const bool macros = path.extension() == ".xacro" || text.str().find("<xacro:") != std::string::npos;

@@ -52,7 +52,7 @@ class McapReader {
   };
 
   void Cut(std::size_t at) const {
-    if (messages_ == 0) throw io::InputError("is cut short, before its first message");
+    if (messages_ == 0) throw io::InputError("is cut short, before its first message; copy or record it again");
     taker_.note(fmt::format("the end of the file is missing; {} messages are read, up to byte {} of {}", messages_, at,
                             file_.size()));
   }

@@ -53,7 +53,7 @@ class Scanner {
   }
 
   [[noreturn]] void Fail(const std::string& what) const {
-    throw io::InputError(where_ + ":" + std::to_string(number_) + ": " + what);
+    throw io::InputError(where_ + (number_ > 0 ? ":" + std::to_string(number_) : "") + ": " + what);
   }
 
  private:
@@ -63,19 +63,37 @@ class Scanner {
   int number_ = 0;
 };
 
+// A table of another program, such as .xlsx, has bytes that no text has.
+bool IsText(std::string_view line) {
+  return std::all_of(line.begin(), line.end(),
+                     [](char c) { return static_cast<unsigned char>(c) >= ' ' || c == '\t' || c == '\r'; });
+}
+
+bool IsNumber(std::string_view field) {
+  double value = 0;
+  const char* const stop = field.data() + field.size();
+  const auto [end, error] = std::from_chars(field.data(), stop, value);
+  return end == stop && error == std::errc();
+}
+
 std::vector<std::string> ScanHeader(Scanner& scan) {
   if (!scan.NextLine() || scan.blank()) scan.Fail("is empty, expected a header line with column names");
-  if (scan.line().find(',') == std::string_view::npos && scan.line().find(';') != std::string_view::npos) {
-    scan.Fail("columns are separated by ';', expected ',' (and '.' in numbers)");
+  if (!IsText(scan.line())) scan.Fail("is no text, expected a CSV file");
+  if (scan.line().find(',') == std::string_view::npos) {
+    if (scan.line().find(';') != std::string_view::npos)
+      scan.Fail("columns are separated by ';', expected ',' (and '.' in numbers)");
+    if (scan.line().find('\t') != std::string_view::npos) scan.Fail("columns are separated by tabs, expected ','");
   }
   std::vector<std::string> names;
   std::unordered_set<std::string> known;
   std::string_view field;
   while (scan.NextField(field)) {
     const std::string name(Trim(field));
+    if (IsNumber(name) && name.find('.') != name.npos)  // a column may be called 0
+      scan.Fail("'" + name + "' is a number, expected a header line with column names");
     if (names.size() == kMostColumns) scan.Fail("more than " + std::to_string(kMostColumns) + " columns");
     if (name.empty()) scan.Fail("column " + std::to_string(names.size() + 1) + " has no name");
-    if (!known.insert(name).second) scan.Fail("column '" + name + "' appears twice");
+    if (!known.insert(name).second) scan.Fail("column '" + name + "' appears twice, expected a name for each column");
     names.push_back(name);
   }
   return names;
@@ -94,7 +112,7 @@ double Number(const Scanner& scan, std::string_view field, const std::string& na
   double value = NAN;
   const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
   if (end != field.data() + field.size() || field.empty() || error == std::errc::invalid_argument) {
-    scan.Fail("column '" + name + "': '" + std::string(field) + "' is not a number");
+    scan.Fail("column '" + name + "': '" + std::string(field) + "', expected a number");
   }
   if (error == std::errc::result_out_of_range) value = std::strtod(std::string(field).c_str(), nullptr);
   if (!std::isfinite(value)) scan.Fail("column '" + name + "': '" + std::string(field) + "', expected a finite number");
@@ -184,9 +202,7 @@ std::vector<std::string> NumericColumns(const std::filesystem::path& path) {
     for (std::size_t c = 0; scan.NextField(field) && c < header.size(); ++c) {
       field = Trim(field);
       if (kind[c] != kUnknown || IsMissing(field)) continue;
-      double value = 0;
-      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-      kind[c] = error == std::errc() && end == field.data() + field.size() ? kNumbers : kOther;
+      kind[c] = IsNumber(field) ? kNumbers : kOther;
       --open;
     }
   }
@@ -208,7 +224,7 @@ void WriteCsv(const std::filesystem::path& path, const NumericTable& table, cons
       const double value = table.values(r, c);
       char* const room = number + sizeof number;
       const auto end = std::isnan(value) ? number
-                       : precision == 0 ? std::to_chars(number, room, value).ptr
+                       : precision == 0  ? std::to_chars(number, room, value).ptr
                                         : std::to_chars(number, room, value, std::chars_format::general, precision).ptr;
       text.append(number, end) += ',';
     }

@@ -13,6 +13,7 @@
 #include "armcal/core/sha256.hpp"
 #include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/require_file.hpp"
 
 namespace armcal::files {
 namespace {
@@ -29,12 +30,6 @@ constexpr std::size_t kExpansion = 60, kExpansionFree_bytes = std::size_t{16} <<
 
 // Small files are many: robot files, tables, and what a fuzzer makes.
 constexpr std::size_t kPortion_bytes = std::size_t{1} << 16;
-
-void RequireRegular(const fs::path& path) {
-  std::error_code error;
-  if (!fs::exists(path, error)) throw io::InputError(path.string() + ": no such file");
-  if (fs::is_directory(path, error)) throw io::InputError(path.string() + ": is a folder, expected a file");
-}
 
 // The text as a gzip file without name and time, so that equal texts give equal bytes.
 std::string Compressed(std::string_view text) {
@@ -67,7 +62,7 @@ std::string Compressed(std::string_view text) {
 }  // namespace
 
 std::string ReadWholeFile(const fs::path& path) {
-  RequireRegular(path);
+  io::RequireFile(path);
   GzHandle in(gzopen(path.c_str(), "rb"));
   if (!in) throw io::InputError(path.string() + ": cannot be opened");
   gzbuffer(in.get(), kPortion_bytes);
@@ -85,7 +80,7 @@ std::string ReadWholeFile(const fs::path& path) {
     int code = Z_OK;
     gzerror(in.get(), &code);
     if (got < 0 || (code != Z_OK && code != Z_STREAM_END)) {
-      throw io::InputError(path.string() + ": gzip data is damaged or cut short");
+      throw io::InputError(path.string() + ": gzip data is damaged or cut short; copy or record it again");
     }
     if (got == 0) break;
     used += static_cast<std::size_t>(got);
@@ -132,7 +127,7 @@ std::string FileHash(const fs::path& path) {
     for (const std::string& line : lines) text += line;
     return Sha256(text);
   }
-  RequireRegular(path);
+  io::RequireFile(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw io::InputError(path.string() + ": cannot be opened");
   core::Sha256 hash;

@@ -1,8 +1,6 @@
 // logs - reads a channel map.
 #include "host_sim/data/logs/channels.hpp"
 
-#include <toml++/toml.h>
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -10,8 +8,8 @@
 #include <numbers>
 #include <string_view>
 
-#include "codegen/src/io/input_error.hpp"
-#include "host_sim/data/files/files.hpp"
+#include "codegen/src/io/file_kind.hpp"
+#include "codegen/src/io/toml_reader.hpp"
 #include "host_sim/data/logs/table.hpp"
 
 namespace armcal::logs {
@@ -67,18 +65,21 @@ struct Rule {
 constexpr Rule kRules[] = {{"q", "position", true},        {"tau", "torque", true},        {"qd", "speed", false},
                            {"qdd", "acceleration", false}, {"qref", "position", false},    {"tauff", "torque", false},
                            {"ext", "torque", false},       {"temp", "temperature", false}, {"flag", "flag", false}};
+// The first one of its dimension.
+constexpr std::string_view DefaultUnit(std::string_view dimension) {
+  for (const Unit& unit : kUnits)
+    if (unit.dimension == dimension) return unit.name;
+  return "";
+}
+
 constexpr std::string_view kLinkTorque = "tau_link";  // the other torque of a log that has two
 constexpr double kSingular = 1e-9;                    // of the product of the rows' lengths
 constexpr double kSamePower = 1e-3;
 
 class MapReader {
  public:
-  explicit MapReader(const std::filesystem::path& path) : file_(path.string()) {
-    try {
-      root_ = toml::parse(files::ReadWholeFile(path), file_);
-    } catch (const toml::parse_error& e) {
-      throw io::InputError(file_ + ":" + std::to_string(e.source().begin.line) + ": " + std::string(e.description()));
-    }
+  explicit MapReader(const std::filesystem::path& path) : file_(path.string()), root_(io::ParseToml(path)) {
+    io::RequireKind(root_, path, io::FileKind::kChannelMap);
   }
 
   ChannelMap Read() {
@@ -104,7 +105,10 @@ class MapReader {
       const std::string key = rule.key == "tau" ? torque : std::string(rule.key);
       const toml::table* table = root_[key].as_table();
       if (table == nullptr) {
-        if (rule.required) Fail(key, "expected a table with column and unit");
+        if (rule.required)
+          Fail(key, std::string(root_.contains(key) ? "" : "missing, ") +
+                        "expected a table, as in { column = \"a{}\", unit = \"" +
+                        std::string(DefaultUnit(rule.dimension)) + "\" }");
         continue;
       }
       const bool optional = (*table)["optional"].value_or(false);

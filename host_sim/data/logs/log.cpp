@@ -28,6 +28,8 @@ std::optional<JointName> SplitName(const std::string& name) {
   return JointName{name.substr(0, digit), std::stoi(name.substr(digit))};
 }
 
+const std::string kOurColumns = "expected t, q1..qn, tau1..taun (other names need a channel map: --channels)";
+
 constexpr const char* kQuantities[] = {"q", "tau", "qd", "qdd", "qref", "tauff", "ext", "temp", "flag"};
 
 bool IsQuantity(const std::string& name) {
@@ -45,8 +47,7 @@ ChannelMap OurNames(const std::string& file, const std::vector<std::string>& hea
     present.push_back(split->quantity);
   }
   if (joints == 0) {
-    throw io::InputError(file +
-                         ":1: no column 'q1', expected t, q1..qn, tau1..taun (foreign names: give a channel map)");
+    throw io::InputError(file + ":1: no column 'q1', " + kOurColumns);
   }
   ChannelMap map{joints, {"t"}, {}, file};
   for (const char* quantity : kQuantities) {
@@ -60,7 +61,9 @@ ChannelMap OurNames(const std::string& file, const std::vector<std::string>& hea
 
 class Columns {
  public:
-  explicit Columns(const Table& table) : from_(table), table_(table.numbers) {}
+  // `instead` ends the message about a missing column.
+  Columns(const Table& table, std::string instead)
+      : from_(table), table_(table.numbers), instead_(std::move(instead)) {}
 
   Eigen::Index Find(const std::string& name) const {
     const auto at = std::find(table_.names.begin(), table_.names.end(), name);
@@ -69,9 +72,7 @@ class Columns {
 
   Eigen::VectorXd Take(const Channel& channel) const {
     const Eigen::Index c = Find(channel.column);
-    if (c < 0)
-      throw io::InputError(from_.where + ": expected a column '" + channel.column + "'" +
-                           (from_.has.empty() ? "" : "; " + from_.has));
+    if (c < 0) throw io::InputError(from_.where + ": no column '" + channel.column + "', " + instead_);
     return (channel.gain * table_.values.col(c).array() + channel.bias).matrix();
   }
 
@@ -91,6 +92,7 @@ class Columns {
  private:
   const Table& from_;
   const files::NumericTable& table_;
+  std::string instead_;
 };
 
 Eigen::MatrixXd& Block(Log& log, const std::string& quantity) {
@@ -120,7 +122,8 @@ void ListGaps(Log& log) {
 
 // The file's rows as they stand.
 RawLog Raw(const std::string& file, Table table, const ChannelMap& map) {
-  const Columns columns(table);
+  const Columns columns(
+      table, map.source == file ? kOurColumns : "which the channel map " + map.source + " names; " + table.has);
   RawLog raw;
   raw.log.joints = map.joints;
   raw.log.source = file;

@@ -108,6 +108,15 @@ Table FromRecording(const std::filesystem::path& path, const ChannelMap& map) {
   return table;
 }
 
+// What may be meant instead of a column that is missing.
+std::string OtherColumns(const std::vector<std::string>& names) {
+  if (names.empty()) return "it names all others";
+  constexpr std::size_t kMost = 20;
+  std::string text = "it does not name";
+  for (std::size_t k = 0; k < std::min(kMost, names.size()); ++k) text += (k > 0 ? ", " : " ") + names[k];
+  return text + (names.size() > kMost ? ", ..." : "");
+}
+
 }  // namespace
 
 Series SeriesOf(bags::Stream& stream, std::int64_t begin_ns) {
@@ -124,7 +133,9 @@ Series SeriesOf(bags::Stream& stream, std::int64_t begin_ns) {
 
 Table ReadTable(const std::filesystem::path& path, const ChannelMap& map) {
   if (bags::IsRecording(path)) return FromRecording(path, map);
-  return bags::IsMat(path) ? FromMat(path, map) : FromCsv(path, map);
+  Table table = bags::IsMat(path) ? FromMat(path, map) : FromCsv(path, map);
+  table.has = OtherColumns(table.numbers.ignored);
+  return table;
 }
 
 }  // namespace armcal::logs

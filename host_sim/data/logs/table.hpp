@@ -20,7 +20,7 @@ inline constexpr const char* kRecorderTimeColumn = "__log_time";
 struct Table {
   files::NumericTable numbers;          // NaN: no number; the columns of the map as far as the file has them
   std::string where;                    // stands before messages about columns: "log.csv:1"
-  std::string has = {};                 // what the file has instead of a missing column, for messages
+  std::string has = {};                 // what a missing column could be, for messages
   int first_line = 2;                   // the number that messages give the first row
   std::vector<std::string> notes = {};  // what reading changed or left out
 };

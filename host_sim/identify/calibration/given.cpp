@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/require_file.hpp"
 #include "codegen/src/robot/body.hpp"
 
 namespace armcal::calibration {
@@ -159,8 +160,8 @@ Given GivenByJson(const codegen::Model& model, const std::filesystem::path& path
 }
 
 Given GivenByFile(const codegen::Model& model, const std::filesystem::path& path) {
+  io::RequireFile(path);
   std::ifstream in(path);
-  if (!in) throw io::InputError(path.string() + ": cannot be read, expected a table or identify's JSON");
   char first = 0;
   in >> first;
   return first == '{' ? GivenByJson(model, path) : GivenByTable(model, ReadTable(path), path.string());

@@ -8,6 +8,7 @@
 
 #include "armcal/model/parameters.hpp"
 #include "codegen/src/generator/emit.hpp"
+#include "codegen/src/io/file_kind.hpp"
 #include "codegen/src/io/toml_reader.hpp"
 #include "host_sim/data/files/files.hpp"
 
@@ -190,11 +191,8 @@ void WriteTable(const std::filesystem::path& path, const TableFile& t) {
 
 TableFile ReadTable(const std::filesystem::path& path) {
   const toml::table toml = io::ParseToml(path);
+  io::RequireKind(toml, path, io::FileKind::kTable);
   const io::TomlReader in(toml, path.string());
-  if (in.Has("gravity_mps2") || in.Has("dh") || in.Has("urdf"))
-    throw io::InputError(path.string() +
-                         ": a robot file, expected a parameter table, which armcal identify --table-out writes; a "
-                         "robot file is given as --robot");
   in.AllowOnly({"robot", "note", "schema", "bumpless", "blend_ms", "forgetting", "joint", "parameter"});
   TableFile t;
   t.robot = in.Text("robot");

@@ -52,17 +52,17 @@ void Estimate(const codegen::EffectRecord& record, const std::vector<int>& joint
 void Add(const std::string& name, const codegen::Catalogue& records, const std::vector<codegen::EffectUse>& values,
          codegen::Robot& robot) {
   const Wanted wanted = Parse(name);
-  const auto record = records.find(wanted.record);
-  if (record == records.end()) throw io::InputError(name + ": expected the name of an effect record");
-  if (record->second.friction_law) return;  // every model has it
+  const codegen::EffectRecord& record = codegen::FindRecord(records, name, wanted.record);
+  if (record.friction_law) return;  // every model has it
   bool found = false;
-  for (const std::vector<int>& joints : codegen::JointSets(record->second, robot.joints())) {
+  for (const std::vector<int>& joints : codegen::JointSets(record, robot.joints())) {
     if (!wanted.joints.empty() && joints != wanted.joints) continue;
-    Estimate(record->second, joints, values, robot);
+    Estimate(record, joints, values, robot);
     found = true;
   }
   if (!found)
-    throw io::InputError(name + ": expected joints of " + robot.name + " that " + wanted.record + " can have");
+    throw io::InputError(name + ": expected joints of " + robot.name + " (1 to " + std::to_string(robot.joints()) +
+                         ") that " + wanted.record + " can have");
 }
 
 // Random states, slow ones among them. No path has them all, so effects that they do not tell apart, no motion does.

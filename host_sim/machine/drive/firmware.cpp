@@ -58,11 +58,12 @@ class Compiled final : public Firmware {
       if (!core::IsOk(line_.Open(access.serial))) return access.serial + ": expected a terminal that can be opened";
       modbus_.emplace(controller_.engine(), line_.serial(), port_linux::SteadyClock(tick_), kAddress, kSilence_ms);
     }
-    if (!core::IsOk(server_.Listen(access.address, static_cast<std::uint16_t>(access.port)))) return server_.error();
+    if (!core::IsOk(server_.Listen(access.address, static_cast<std::uint16_t>(access.port))))
+      return server_.error() + "; choose another --port";
     if (access.read_address.empty()) return "";
     reader_.emplace(Bytes(read_service_), port_linux::SteadyClock(tick_));
     if (!core::IsOk(reader_->Listen(access.read_address, static_cast<std::uint16_t>(access.read_port))))
-      return reader_->error();
+      return reader_->error() + "; choose another --read-port";
     return "";
   }
   int port() const override { return server_.port(); }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "codegen/src/io/file_kind.hpp"
 #include "host_sim/machine/plant/frame_keys.hpp"
 
 namespace armcal::plant {
@@ -76,6 +77,7 @@ std::vector<Undeclared> Scenario::undeclared() const {
 
 Scenario ReadScenario(const std::string& path) {
   const toml::table table = io::ParseToml(path);
+  io::RequireKind(table, path, io::FileKind::kScenario);
   const io::TomlReader keys(table, path);
   Scenario scenario;
   scenario.path = path;

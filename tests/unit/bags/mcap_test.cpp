@@ -62,7 +62,7 @@ TEST_F(Mcap, CutAtAnyLength_IsReadUpToTheLastWholeChunk_OrRefused) {
   for (std::size_t length = 8; length < whole.size(); ++length) {
     const std::string error = ErrorFor(whole.substr(0, length));
     if (length < 8 + Header().size() + first.size()) {
-      ASSERT_EQ(error, ": is cut short, before its first message") << length;
+      ASSERT_EQ(error, ": is cut short, before its first message; copy or record it again") << length;
       continue;
     }
     ASSERT_EQ(error, "") << length;

@@ -54,7 +54,8 @@ TEST(Bench, WhatIsCompared_ComputesTheSame) {
 }
 
 TEST(Bench, RobotWithoutAProgram_IsNamed) {
-  ExpectOneLine(Tool({"bench", "--robot", "two_link"}), 2, "no bench program has been built for robot two_link");
+  ExpectOneLine(Tool({"bench", "--robot", "two_link"}), 2,
+                "no bench program has been built for robot two_link; there is one for ");
 }
 
 // Another arm's kinematics under er20_like's name: the program must notice that it compares two arms.

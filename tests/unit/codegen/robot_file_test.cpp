@@ -129,10 +129,10 @@ TEST_F(RobotFile, OfDhRows_SaysAllFaultsAtOnce) {
        {": source: missing, expected a string", ": gravity_mps2: missing, expected 3 numbers",
         ": joint[1].torque_noise_Nm: missing, expected a number above zero"}},
       {{{"torque_noise_Nm", "torque_noize_Nm"}},
-       {"joint[1].torque_noize_Nm: expected no such key here; the nearest is torque_noise_Nm"}},
+       {"joint[1].torque_noize_Nm: unknown key; the nearest is torque_noise_Nm"}},
       {{{"gravity_mps2", "gravity_mps"}, {"v_min_mps", "vmin_mps"}},
-       {"gravity_mps: expected no such key here; the nearest is gravity_mps2",
-        "joint[2].vmin_mps: expected no such key here; the nearest is v_min_mps"}},
+       {"gravity_mps: unknown key; the nearest is gravity_mps2",
+        "joint[2].vmin_mps: unknown key; the nearest is v_min_mps"}},
       {{{"[-170.0, 170.0]", "[170.0, -170.0]"}}, {"joint[1].position_limit_deg: expected [lower, upper] with lower"}},
       {{{"d_m = 0.30", "d_m = 300.0"}}, {"joint[1].d_m: expected metres (millimetres?)"}},
       {{{"[0.0, 0.5]", "[0.0, 500.0]"}}, {"joint[2].position_limit_m: expected metres (millimetres?)"}},
@@ -147,9 +147,9 @@ TEST_F(RobotFile, OfDhRows_SaysAllFaultsAtOnce) {
       {{{"a_m = 0.0", "a_m = inf"}}, {"joint[1].a_m: expected a finite number"}},
       {{{"\"revolute\"", "\"rotary\""}}, {"joint[1].type: expected \"revolute\" or \"prismatic\""}},
       {{{"speed_limit_degps = 120.0", "speed_limit_mps = 2.0"}},
-       {"joint[1].speed_limit_mps: expected no such key here; the nearest is speed_limit_degps"}},
+       {"joint[1].speed_limit_mps: unknown key; the nearest is speed_limit_degps"}},
       {{{"gear_ratio = 50.0", "gear_ratio = 0.0"}, {"torque_constant_NmpA = 0.05", "rotor = 1e-4"}},
-       {"joint[1].motor.gear_ratio: expected a ratio, not zero", "joint[1].motor.rotor: expected no such key here",
+       {"joint[1].motor.gear_ratio: expected a ratio, not zero", "joint[1].motor.rotor: unknown key",
         "joint[1].motor.torque_constant_NmpA: missing, expected a number above zero"}},
       {{{"dh = \"modified\"\n", "dh = \"craig\"\n"}}, {"dh: expected \"modified\" or \"standard\""}},
       {{{"dh = \"modified\"\n", ""}, {"type = \"prismatic\"\n", "type = 3\n"}},
@@ -220,8 +220,7 @@ TEST_F(RobotFile, ThatNamesAUrdf_SaysAllFaultsOfBoth) {
       {{},
        {{"[[joint]]\nname = \"r2\"\nacceleration_limit_radps2 = 10.0\ntorque_noise_Nm = 0.1\nv_min_radps = 0.01\n", ""},
         {"v_min_radps", "v_min_rad"}},
-       {"joint: expected a [[joint]] table with name = \"r2\"",
-        "joint[1].v_min_rad: expected no such key here; the nearest is"}},
+       {"joint: expected a [[joint]] table with name = \"r2\"", "joint[1].v_min_rad: unknown key; the nearest is"}},
       {{},
        {{"urdf = \"arm.urdf\"", "urdf = \"arm.urdf\"\ntip = \"L3\""}},
        {"link \"L3\": expected a link of the URDF as the tip; the nearest is l3"}},
@@ -249,7 +248,9 @@ TEST_F(RobotFile, ThatIsAnotherKindOfFile_SaysWhatToDo) {
   Write("arm.urdf.xacro", GoodUrdf(), {});
   Expect("arm.urdf.xacro", {"arm.urdf.xacro -o arm.toml"});
   Write("table.toml", "robot = \"arm\"\nschema = 1\n[[parameter]]\nname = \"m1\"\n", {});
-  Expect("table.toml", {"a parameter table, expected a robot file"});
+  Expect("table.toml", {": is a parameter table, expected a robot file; give this file as --table"});
+  Write("map.toml", "joints = 1\nq = { column = \"q{}\", unit = \"rad\" }\n", {});
+  Expect("map.toml", {": is a channel map, expected a robot file; give this file as --channels"});
 }
 
 // Joints that lead elsewhere are held: the arm is the chain to the tip, with all of them as parts of its bodies.

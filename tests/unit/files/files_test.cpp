@@ -54,14 +54,14 @@ TEST(Files, AtomicWrite_WhereItCannot_LeavesNoPartAndKeepsTheOld) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "target/inside");  // a folder that is not empty cannot be replaced
   EXPECT_EQ(ErrorOf([&] { WriteWholeFile(folder / "target", "text"); }),
-            (folder / "target").string() + ": cannot be written: Is a directory");
+            (folder / "target").string() + ": cannot be written: Is a directory; choose another place");
   EXPECT_TRUE(std::filesystem::is_directory(folder / "target/inside"));
   int entries = 0;
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder / ".")) ++entries;
   EXPECT_EQ(entries, 1);
   WriteWholeFile(folder / "file", "text");
   EXPECT_EQ(ErrorOf([&] { WriteWholeFile(folder / "file/below.csv", "text"); }),
-            (folder / "file/below.csv").string() + ": cannot be written: Not a directory");
+            (folder / "file/below.csv").string() + ": cannot be written: Not a directory; choose another place");
 }
 
 TEST(Files, ReadWholeFile_GzipCutShort_IsRefused) {
@@ -73,13 +73,15 @@ TEST(Files, ReadWholeFile_GzipCutShort_IsRefused) {
   const std::string bytes(std::istreambuf_iterator<char>(in), {});
   for (const std::size_t size : {bytes.size() / 2, bytes.size() - 4}) {
     const auto cut = folder.Write("cut.gz", bytes.substr(0, size));
-    EXPECT_EQ(ErrorOf([&] { ReadWholeFile(cut); }), cut.string() + ": gzip data is damaged or cut short");
+    EXPECT_EQ(ErrorOf([&] { ReadWholeFile(cut); }),
+              cut.string() + ": gzip data is damaged or cut short; copy or record it again");
   }
 }
 
 TEST(Files, ReadWholeFile_MissingOrFolder_SaysSo) {
   const TemporaryFolder folder;
-  EXPECT_EQ(ErrorOf([&] { ReadWholeFile(folder / "none"); }), (folder / "none").string() + ": no such file");
+  EXPECT_EQ(ErrorOf([&] { ReadWholeFile(folder / "none"); }),
+            (folder / "none").string() + ": no such file; check the path");
   std::filesystem::create_directories(folder / "sub");
   EXPECT_EQ(ErrorOf([&] { ReadWholeFile(folder / "sub"); }),
             (folder / "sub").string() + ": is a folder, expected a file");

@@ -61,7 +61,9 @@ TEST(Channels, MissingForeignColumn_IsNamedAsInTheLog) {
   const TemporaryFolder folder;
   const auto path = folder.Write("log.csv", "ms,pos1,motor,force\n0,1,2,3\n4,1,2,3\n");
   const ChannelMap map = ReadChannelMap(folder.Write("map.toml", kMap));
-  EXPECT_EQ(ErrorOf([&] { ReadLog(path, map, 2); }), path.string() + ":1: expected a column 'pos2'");
+  EXPECT_EQ(ErrorOf([&] { ReadLog(path, map, 2); }), path.string() + ":1: no column 'pos2', which the channel map " +
+                                                         (folder / "map.toml").string() +
+                                                         " names; it names all others");
 }
 
 TEST(Channels, TimeInNanoseconds_IsReadAsSeconds) {
@@ -202,7 +204,7 @@ TEST(Channels, BadMap_NamesKeyAndExpected) {
   EXPECT_EQ(error("offset", "ofset"),
             ": q.ofset: unknown key, expected column, unit, scale, offset, optional or matrix");
   EXPECT_EQ(error("[tau]", "[qref]").substr(0, 5), ": tau");
-  EXPECT_EQ(error("joints = 2", "joints = = 2").substr(0, 3), ":2:");
+  EXPECT_EQ(error("joints = 2", "joints = = 2").substr(0, 9), ": line 2,");
 }
 
 }  // namespace

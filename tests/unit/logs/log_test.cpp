@@ -87,19 +87,25 @@ TEST(Log, TooSmallNumber_IsZero) {
 
 TEST(Log, BadFile_NamesLineColumnAndExpected) {
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1")), "");
-  EXPECT_EQ(ErrorFor(""), ":0: is empty, expected a header line with column names");
+  EXPECT_EQ(ErrorFor(""), ": is empty, expected a header line with column names");
   EXPECT_EQ(ErrorFor(Small("t;q1;tau1")), ":1: columns are separated by ';', expected ',' (and '.' in numbers)");
-  EXPECT_EQ(ErrorFor(Small("t,q1,q1")), ":1: column 'q1' appears twice");
+  EXPECT_EQ(ErrorFor(Small("t\tq1\ttau1")), ":1: columns are separated by tabs, expected ','");
+  EXPECT_EQ(ErrorFor(Small("0.008,-0.1,2")), ":1: '0.008' is a number, expected a header line with column names");
+  EXPECT_EQ(ErrorFor(Small("PK\x03\x04")), ":1: is no text, expected a CSV file");
+  EXPECT_EQ(ErrorFor(Small("t,q1,q1")), ":1: column 'q1' appears twice, expected a name for each column");
   EXPECT_EQ(ErrorFor(Small("t,q1,")), ":1: column 3 has no name");
-  EXPECT_EQ(ErrorFor(Small("time,q1,tau1")), ":1: expected a column 't'");
-  EXPECT_EQ(ErrorFor(Small("t,q1,torque1")), ":1: expected a column 'tau1'");
-  EXPECT_EQ(ErrorFor(Small("t,q2,tau2")), ":1: expected a column 'q1'");
+  EXPECT_EQ(ErrorFor(Small("time,q1,tau1")),
+            ":1: no column 't', expected t, q1..qn, tau1..taun (other names need a channel map: --channels)");
+  EXPECT_EQ(ErrorFor(Small("t,q1,torque1")),
+            ":1: no column 'tau1', expected t, q1..qn, tau1..taun (other names need a channel map: --channels)");
+  EXPECT_EQ(ErrorFor(Small("t,q2,tau2")),
+            ":1: no column 'q1', expected t, q1..qn, tau1..taun (other names need a channel map: --channels)");
   EXPECT_EQ(ErrorFor(Small("t,pos,torque")),
-            ":1: no column 'q1', expected t, q1..qn, tau1..taun (foreign names: give a channel map)");
+            ":1: no column 'q1', expected t, q1..qn, tau1..taun (other names need a channel map: --channels)");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1")), ":4: has 2 fields, expected 3 as in the header");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,2,3")), ":4: has 4 fields, expected 3 as in the header");
-  EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,two")), ":4: column 'tau1': 'two' is not a number");
-  EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,2 3")), ":4: column 'tau1': '2 3' is not a number");
+  EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,two")), ":4: column 'tau1': 'two', expected a number");
+  EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,2 3")), ":4: column 'tau1': '2 3', expected a number");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,-inf")), ":4: column 'tau1': '-inf', expected a finite number");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1", "0.008,1,1e999")), ":4: column 'tau1': '1e999', expected a finite number");
   EXPECT_EQ(ErrorFor(Small("t,q1,tau1"), kMinSamples), ": has 10 samples, expected at least 200");

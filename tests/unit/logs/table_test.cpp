@@ -55,8 +55,9 @@ TEST(RecordedLog, WithoutAMapOrAColumn_IsRefusedInOneLine) {
   text.replace(text.find("effort"), 6, "torque");
   const ChannelMap map = ReadChannelMap(folder.Write("map.toml", text));
   EXPECT_EQ(ErrorOf([&] { ReadLog(path, map); }),
-            path.string() +
-                ": expected a column '/joint_states/shoulder/torque'; its topics are /joint_states "
+            path.string() + ": no column '/joint_states/shoulder/torque', which the channel map " +
+                (folder / "map.toml").string() +
+                " names; its topics are /joint_states "
                 "(sensor_msgs/msg/JointState)");
 }
 

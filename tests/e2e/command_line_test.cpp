@@ -1,4 +1,4 @@
-// end-to-end tests - misspell the command line, complete it in bash, and read the manual pages.
+// end-to-end tests - complete the command line in bash, and read the manual pages.
 #include <set>
 #include <sstream>
 
@@ -6,30 +6,6 @@
 
 namespace armcal::tests {
 namespace {
-
-TEST(CommandLine, AMisspeltWord_IsAnsweredWithTheNearest) {
-  struct Case {
-    std::vector<std::string> words;
-    std::string line;
-  };
-  for (const Case& c : std::vector<Case>{
-           {{"exite"}, "armcal: no verb exite; the nearest is excite\n"},
-           {{"identity", "--robot", "er20_like"}, "armcal: no verb identity; the nearest is identify\n"},
-           {{"diagnos"}, "armcal: no verb diagnos; the nearest is diagnose\n"},
-           {{"zzzzzzzz"}, "armcal: no verb zzzzzzzz\n"},
-           {{"--verson"}, "armcal: no option --verson; the nearest is --version\n"},
-           {{"identify", "--robt", "er20_like", "--train", "a.csv"},
-            "armcal identify: no option --robt; the nearest is --robot\n"},
-           {{"excite", "--robot", "er20_like", "--out", "x.csv", "--sed=3"},
-            "armcal excite: no option --sed; the nearest is --seed\n"},
-           {{"flash", "--conect", "127.0.0.1:502"}, "armcal flash: no option --conect; the nearest is --connect\n"}}) {
-    const Outcome o = Tool(c.words);
-    EXPECT_EQ(o.code, 2) << c.line;
-    EXPECT_EQ(o.err, c.line);
-    EXPECT_EQ(o.out, "");
-  }
-  EXPECT_NE(Tool({"identify", "--train", "a.csv"}).err.find("--robot is required"), std::string::npos);
-}
 
 // What bash offers behind these words; the last one is not finished.
 std::set<std::string> Completed(const fs::path& completion, const std::string& words) {

@@ -149,11 +149,7 @@ TEST_F(Health, LearningOnHold_UsesNoRow_AndABlockIsReset) {
   EXPECT_EQ(Tool({"learning", "--connect", drive_.address(), "--hold", "--resume"}).code, 2);
 }
 
-TEST_F(Health, WhatIsNoDrive_IsALinkError) {
-  const TakenPort closed(false);
-  ExpectOneLine(Tool({"health", "--connect", closed.address()}), 3, closed.address());
-  ExpectOneLine(Tool({"health", "--connect", "nowhere"}), 2, "HOST:PORT");
-  ExpectOneLine(Tool({"health", "--connect", "/dev/does-not-exist"}), 3, "/dev/does-not-exist");
+TEST(SerialLine, ThatIsNone_IsBadInput) {
   for (const char* wrong : {"/dev/null:12", "/dev/null:9600:M", "/dev/null:9600:EE", "/dev/null:9600:E:300",
                             "/dev/null:9600:E:1:1", "/dev/null:"})
     ExpectOneLine(Tool({"health", "--connect", wrong}), 2, "300 to 12000000 baud");

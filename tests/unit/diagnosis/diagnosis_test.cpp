@@ -131,6 +131,21 @@ TEST(Diagnosis, SpringsThatSlip_AreNamedHysteresis_AndSlidingFrictionIsNot) {
   EXPECT_TRUE(nothing.finding().terms.empty()) << nothing.Said();
 }
 
+// An average of a limited band reaches over a turn.
+TEST(Diagnosis, RowsNearTurns_AreLookedAtByThemselvesWhereTheBandIsLimited) {
+  for (const bool limited : {false, true}) {
+    Case c(
+        Springs(1, 3), 7,
+        [&](Dataset& d) {
+          LeaveOutTurns(d);
+          if (limited) d.band_Hz.setConstant(d.joints(), 6);
+          d = calibration::Delayed(d, 0);  // makes the averages
+        },
+        AtTurns::kWhereAveraged);
+    EXPECT_EQ(c.finding().at_turns.empty(), !limited) << c.Said();
+  }
+}
+
 // A torque over position, near turns alone or everywhere.
 TEST(Diagnosis, WhatShowsNearTurnsOnly_IsNoTermBesideHysteresis) {
   for (const bool everywhere : {false, true}) {

@@ -1,5 +1,7 @@
 // end-to-end tests - record over a serial line that is slow, late and noisy, from a drive that does not wait.
 #include <atomic>
+#include <cmath>
+#include <fstream>
 
 #include "armcal/core/crc.hpp"
 #include "tests/e2e/tool.hpp"
@@ -37,7 +39,24 @@ struct Line {
 // What a commissioning on a common adapter meets: 115200 baud, 16 ms latency, three bytes in 10,000 damaged.
 constexpr test::Cable Common(unsigned seed) { return {10473, 0.016, 3e-4, seed}; }
 
-// A lean recording of so many seconds. No record is lost, and none is missing between the first and the last one.
+// No record is missing between the first and the last one. How many there are beside the motion's own depends on how
+// busy the machine is.
+void ExpectNoneMissing(const fs::path& log, double seconds, double rate_Hz) {
+  std::ifstream in(log);
+  std::string row;
+  std::getline(in, row);
+  ASSERT_TRUE(row.starts_with("t,")) << row;
+  int samples = 0, gaps = 0;
+  for (double before = 0; std::getline(in, row); ++samples) {
+    const double t = std::stod(row);
+    gaps += samples > 0 && std::abs((t - before) * rate_Hz - 1) > 0.5;
+    before = t;
+  }
+  EXPECT_EQ(gaps, 0);
+  EXPECT_GE(samples, rate_Hz * seconds);
+}
+
+// A lean recording of so many seconds; no record is lost.
 void ExpectAllPackedRecords(unsigned seed, double seconds) {
   Line line("slow_line_packed", Common(seed));
   const Outcome o = line.Record({"--lean"}, "", std::to_string(seconds));
@@ -47,7 +66,7 @@ void ExpectAllPackedRecords(unsigned seed, double seconds) {
   EXPECT_FALSE(json["partial"]);
   EXPECT_EQ(json["decimation"], 8) << "125 records a second: " << o.out;
   EXPECT_EQ(json["positions_not_told"], 0);
-  EXPECT_NEAR(json["samples"], 125 * seconds, 130);
+  ExpectNoneMissing(line.folder / "log.csv", seconds, 125);
   std::printf("seed %u, %.0f s: %d samples, %d damaged bytes, %d repeated requests\n", seed, seconds,
               static_cast<int>(json["samples"]), line.cable.errors(), static_cast<int>(json["repeated_requests"]));
 }
@@ -71,8 +90,7 @@ void ExpectAllPlainRecords(unsigned seed, double seconds) {
   const auto json = line.Json();
   EXPECT_FALSE(json["packed"]);
   EXPECT_FALSE(json["partial"]);
-  const double rate_Hz = 1000 / json["decimation"].get<double>();
-  EXPECT_NEAR(json["samples"], rate_Hz * seconds, 0.02 * rate_Hz * seconds + rate_Hz);
+  ExpectNoneMissing(line.folder / "log.csv", seconds, 1000 / json["decimation"].get<double>());
   std::printf("seed %u, %.0f s without packed records: decimation %d, %d samples, %d damaged bytes\n", seed, seconds,
               static_cast<int>(json["decimation"]), static_cast<int>(json["samples"]), line.cable.errors());
 }
@@ -99,7 +117,7 @@ TEST(SlowLine, RepliesThatComeLate_AreDropped) {
   const Outcome o = line.Record({"--lean"}, "", "3");
   ASSERT_EQ(o.code, 0) << o.err << o.out;
   EXPECT_FALSE(line.Json()["partial"]);
-  EXPECT_NEAR(line.Json()["samples"], 375, 10);
+  ExpectNoneMissing(line.folder / "log.csv", 3, 125);
 }
 
 TEST(LongSlowLine, PackedRecordsOfAMinute_AllArrive_TwentyTimes) { ForSeeds(20, ExpectAllPackedRecords); }

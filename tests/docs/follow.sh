@@ -4,7 +4,7 @@
 # A block whose first line is a comment with a path is that file; "sh" is run; "text" and "diff" are what the last "sh"
 # printed. FOLDER is emptied; ARMCAL stands for build/host/armcal. A program that a page leaves running is named by a file *.pid.
 set -euo pipefail
-page=$(realpath "$1") folder=$2 armcal=$(realpath "$3") top=$PWD
+page=$(realpath "$1") folder=$(realpath -m "$2") armcal=$(realpath "$3") top=$PWD
 
 rm -rf "$folder"
 # A page that fails leaves no drive behind.

@@ -146,22 +146,6 @@ TEST(Diagnosis, RowsNearTurns_AreLookedAtByThemselvesWhereTheBandIsLimited) {
   }
 }
 
-// A torque over position, near turns alone or everywhere.
-TEST(Diagnosis, WhatShowsNearTurnsOnly_IsNoTermBesideHysteresis) {
-  for (const bool everywhere : {false, true}) {
-    Case c(
-        Springs(1, 3), 7,
-        [&](Dataset& d) {
-          LeaveOutTurns(d);
-          for (int k = 0; k < d.samples(); ++k)
-            if (everywhere || std::abs(d.s.qd(k, 0)) < kNearTurn_radps) d.tau(k, 0) += std::sin(3 * d.s.q(k, 0));
-        },
-        AtTurns::kAlways);
-    EXPECT_TRUE(c.Names("hysteresis", 1)) << c.Said();
-    EXPECT_EQ(c.finding().terms.size() > 1, everywhere) << c.Said();
-  }
-}
-
 TEST(Diagnosis, RationalStribeck_IsNamedAtItsJoint) {
   Case c(RationalStribeck(2, 0.4), 1);
   EXPECT_TRUE(c.Names("stribeck", 2)) << c.Said();

@@ -77,7 +77,8 @@ Thinned::Thinned(const Evidence& evidence, int rows) : all(evidence) {
   if (std::none_of(evidence.index.begin(), evidence.index.end(), averaged))
     for (const Quantities& log : evidence.logs) every = std::max(every, log.data->samples() / rows);
   else  // averages are few in each log, and hang together with those beside them
-    for (const RowIndex& each : evidence.index) skip = std::max(skip, each.size() / rows);
+    for (const RowIndex& each : evidence.index)
+      if (each.averaged()) skip = std::max(skip, each.size() / rows);
   every |= 1;  // odd: a sample in the middle
   reach = std::min(every / 2, static_cast<int>(0.5 * kSmooth_s / evidence.logs[0].dt[0]));
   for (std::size_t log = 0; log < evidence.logs.size(); log += static_cast<std::size_t>(skip)) {

@@ -169,8 +169,7 @@ void BindAnalyses(nb::module_& m) {
         text("Finds what the model lacks on the training logs, and judges it on the held-out log. Returns what armcal "
              "diagnose --json writes, as a dict, and under model_file the robot file with the terms, as text. turns: "
              "look at the rows near turns and at rest, too; None: where the torque shows only slow motion. "
-             "gain_tolerance: share by which a joint's torque may be "
-             "off; 0: the robot file's, or 0.1.")
+             "gain_tolerance: share by which a joint's torque may be off; 0: the robot file's, or 0.1.")
             .c_str());
 }
 

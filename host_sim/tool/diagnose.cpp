@@ -128,8 +128,7 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_flag_callback(
           "--turns", [o] { o->how.at_turns = diagnosis::AtTurns::kAlways; },
           "look at rows near turns and at rest, where friction builds up or sticks; default: where the torque shows "
-          "only "
-          "slow motion")
+          "only slow motion")
       ->excludes(never);
   verb->add_option("--gain-tolerance", o->how.gain_tolerance,
                    "share by which each joint's torque may be off: for the mass of a payload that the held-out log "

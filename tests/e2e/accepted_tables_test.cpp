@@ -184,7 +184,7 @@ TEST(LongAcceptedTables, OfModelsDiagnosedFromMeasuredLogs) {
   diagnosed("kuka_lwr4", {lwr4[2]}, lwr4[0], kLwr4Channels);
   const std::string ur10e = (measured / "ur10e" / "ur-20_02_1").string();
   for (const std::string& robot : {std::string("tests/e2e/ur10e.toml"), Ur10e(measured, folder)})
-    for (const Names& more : {Names{}, Names{"--turns"}})
+    for (const Names& more : {Names{}, Names{"--no-turns"}})
       diagnosed(robot, {ur10e + "2-50sec_12harm.csv.gz", ur10e + "0-30sec_12harm.csv.gz"},
                 ur10e + "2-40sec_12harm.csv.gz", kUr10eChannels, more);
   Names records = Logs(measured / "kr300_benchmark", "train");

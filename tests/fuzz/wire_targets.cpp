@@ -85,6 +85,19 @@ class Clients {
             {stage.begin() + static_cast<std::ptrdiff_t>(at),
              stage.begin() + static_cast<std::ptrdiff_t>(std::min(at + 120, stage.size()))});
   }
+  // What all devices are asked for, by number: 0, 1, 2, 4 or 5.
+  void Request(int what, Source& in, const std::vector<std::uint16_t>& stage) {
+    namespace reg = link::reg;
+    if (what == 0) {
+      std::vector<std::uint8_t> pdu(in.Byte());
+      for (std::uint8_t& byte : pdu) byte = in.Byte();
+      Ask(pdu);
+    } else if (what == 1) {
+      Unlock();
+    } else {
+      Command(what == 2 ? reg::kOpen : what == 4 ? reg::kCheck : reg::kSave, stage);
+    }
+  }
 
  private:
   link::PduEngine& engine_;
@@ -143,7 +156,6 @@ void Tcp(const std::uint8_t* bytes, std::size_t count) {
 }
 
 void Engine(const std::uint8_t* bytes, std::size_t count) {
-  namespace reg = link::reg;
   const auto drive = std::make_unique<test::TestDevice>();
   Source in{bytes, count};
   const std::vector<std::uint16_t> before = drive->active;
@@ -156,39 +168,24 @@ void Engine(const std::uint8_t* bytes, std::size_t count) {
     const std::uint8_t what = in.Byte();
     clients.Choose(what / 8);
     switch (what % 8) {
-      case 0: {
-        std::vector<std::uint8_t> pdu(in.Byte());
-        for (std::uint8_t& byte : pdu) byte = in.Byte();
-        clients.Ask(pdu);
-        break;
-      }
-      case 1:
-        clients.Unlock();
-        break;
-      case 2:
-        clients.Command(reg::kOpen, stage);
-        break;
       case 3:
         stage = test::MakeTable(in.Byte());
         stage[2 + in.Byte() % 250u] = in.Word();
         clients.Stage(stage);
         break;
-      case 4:
-        clients.Command(reg::kCheck, stage);
-        break;
-      case 5:
-        clients.Command(reg::kSave, stage);
-        break;
       case 6:
         drive->application.enabled = in.Byte() % 4 == 0;
         now_ms += in.Word();
         break;
-      default:
+      case 7:
         for (int tick = 0; tick < 30; ++tick)
           if (drive->raw.Offer(now_ms + static_cast<std::uint32_t>(tick)).last) {
             const std::uint16_t record[8] = {};
             (void)drive->raw.Push(record, 1);
           }
+        break;
+      default:
+        clients.Request(what % 8, in, stage);
         break;
     }
     if (!drive->application.built.empty()) checked.push_back(drive->application.built);
@@ -232,29 +229,11 @@ void Controller(const std::uint8_t* bytes, std::size_t count) {
     const std::uint8_t what = in.Byte();
     clients.Choose(what / 16);
     switch (what % 16) {
-      case 0: {
-        std::vector<std::uint8_t> pdu(in.Byte());
-        for (std::uint8_t& byte : pdu) byte = in.Byte();
-        clients.Ask(pdu);
-        break;
-      }
-      case 1:
-        clients.Unlock();
-        break;
-      case 2:
-        clients.Command(reg::kOpen, stage);
-        break;
       case 3:  // the model's own table, bumpless, with up to three words changed
         stage = usual;
         stage[5] = 1, stage[7] = 500;
         for (unsigned k = in.Byte() % 4u; k > 0; --k) stage[in.Word() % stage.size()] = in.Word();
         clients.Stage(stage);
-        break;
-      case 4:
-        clients.Command(reg::kCheck, stage);
-        break;
-      case 5:
-        clients.Command(reg::kSave, stage);
         break;
       case 6:
         clients.Command(reg::kTrial, stage);
@@ -274,7 +253,10 @@ void Controller(const std::uint8_t* bytes, std::size_t count) {
       case 11:
         time.tick += in.Word();
         break;
-      default: {
+      case 12:
+      case 13:
+      case 14:
+      case 15: {
         controller::SetPoint<n> set;
         model::RawSample<n> raw;
         for (int j = 0; j < n; ++j) {
@@ -293,6 +275,9 @@ void Controller(const std::uint8_t* bytes, std::size_t count) {
         }
         break;
       }
+      default:
+        clients.Request(what % 16, in, stage);
+        break;
     }
     for (int step = 0; step < 40 && drive->Step(); ++step) {
     }

@@ -224,7 +224,7 @@ void WriteCsv(const std::filesystem::path& path, const NumericTable& table, cons
       const double value = table.values(r, c);
       char* const room = number + sizeof number;
       const auto end = std::isnan(value) ? number
-                       : precision == 0  ? std::to_chars(number, room, value).ptr
+                       : precision == 0 ? std::to_chars(number, room, value).ptr
                                         : std::to_chars(number, room, value, std::chars_format::general, precision).ptr;
       text.append(number, end) += ',';
     }

@@ -125,11 +125,12 @@ std::string TableText(const codegen::EffectUse& use) {
 }
 
 // Joints on which a drive would refuse the friction of the new model's own table.
-Joints Pushing(const codegen::Model& model, const codegen::Catalogue& catalogue, const Finding& finding) {
+Joints Pushing(const codegen::Model& model, const codegen::Catalogue& catalogue, const Finding& finding,
+               const std::vector<codegen::EffectUse>& beside) {
   codegen::Robot robot = model.robot();
   for (const Term& t : finding.terms)
     if (IsWritten(t)) robot.effect.push_back(UseOf(model, finding, t, {}));
-  for (const codegen::EffectUse& use : FrictionBeside(model, finding)) robot.effect.push_back(use);
+  robot.effect.insert(robot.effect.end(), beside.begin(), beside.end());
   const codegen::Model next(robot, catalogue);
   return calibration::BeyondCeilings(next, calibration::DefaultTable(next)).joints;
 }
@@ -138,7 +139,8 @@ Joints Pushing(const codegen::Model& model, const codegen::Catalogue& catalogue,
 
 NewModel ModelFile(const codegen::Model& model, const codegen::Catalogue& catalogue, const Finding& finding,
                    const std::string& provenance) {
-  NewModel out{Declared(model.robot().path), Pushing(model, catalogue, finding)};
+  const std::vector<codegen::EffectUse> beside = FrictionBeside(model, finding);
+  NewModel out{Declared(model.robot().path), Pushing(model, catalogue, finding, beside)};
   for (const Term& t : finding.terms) {
     if (!t.confirmed) continue;
     out.text += Comments(t, provenance);
@@ -150,7 +152,7 @@ NewModel ModelFile(const codegen::Model& model, const codegen::Catalogue& catalo
       out.text += "# Beyond the logs this friction would push. So it starts from zero, and armcal identify fits it.\n";
     out.text += TableText(UseOf(model, finding, t, out.from_zero));
   }
-  for (const codegen::EffectUse& use : FrictionBeside(model, finding))
+  for (const codegen::EffectUse& use : beside)
     out.text += "\n# The friction that was fitted beside what was found.\n" + TableText(use);
   return out;
 }

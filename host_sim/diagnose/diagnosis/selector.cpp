@@ -351,9 +351,11 @@ bool Selector::MotionIsClean(const std::vector<int>& joints) const {
 
 // Near turns and at rest least is known of friction, and much that is not there fits what is left of it. So what is not
 // about these rows must show in the others.
-bool Selector::ShowsInSliding(const Found& f, Columns c, const std::vector<NoiseModel>& noise) const {
+bool Selector::ShowsInSliding(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const {
   const auto turns = [this](int j) { return w_.turns[static_cast<std::size_t>(j)] != 0; };
-  if (f.candidate->record().search.at_turns || std::none_of(c.joints.begin(), c.joints.end(), turns)) return true;
+  if (f.candidate->record().search.at_turns || std::none_of(columns.joints.begin(), columns.joints.end(), turns))
+    return true;
+  Columns c = columns;
   BaseRows rows = w_.rows;
   std::vector<NoiseModel> white(noise.size());
   const auto slides = [this](int j) -> Eigen::ArrayXd {

@@ -41,7 +41,7 @@ class Selector {
   bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
                              const std::vector<NoiseModel>& noise);
   bool MotionIsClean(const std::vector<int>& joints) const;
-  bool ShowsInSliding(const Found& f, Columns c, const std::vector<NoiseModel>& noise) const;
+  bool ShowsInSliding(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const;
   bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
               std::size_t k, Chosen& out);
 

@@ -11,7 +11,7 @@ set -euo pipefail
 host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
   libeigen3-dev liborocos-kdl-dev libmodbus-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev zlib1g-dev
   libgtest-dev googletest dpkg-dev file mbpoll liburdfdom-dev libkdl-parser-dev libtinyxml2-dev libpagmo-dev libboost-dev
-  libjs-dygraphs libssl-dev liblz4-dev libzstd-dev libsqlite3-dev libmatio-dev)
+  libjs-dygraphs libssl-dev liblz4-dev libzstd-dev libsqlite3-dev libmatio-dev libfcl-dev)
 cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   qemu-system-arm python3)
 fuzz_packages=(clang libclang-rt-dev)

@@ -2,10 +2,13 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <map>
+#include <optional>
 
 #include <unistd.h>
 
 #include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/identify/collision/clearance.hpp"
 #include "host_sim/identify/excitation/compose.hpp"
 #include "host_sim/identify/excitation/optimise.hpp"
 #include "host_sim/identify/excitation/target.hpp"
@@ -17,13 +20,13 @@ namespace armcal::tool {
 namespace {
 
 struct ExciteOptions {
-  std::string robot, out, json, from;
+  std::string robot, out, json, from, cell;
   std::string purpose = "train", curve = "fourier", criterion = "condition", search = "gradient";
   std::vector<std::string> separate;
   std::uint64_t seed = 1;
   int periods = 0, harmonics = 5, starts = 0;
-  double seconds = 20, period_s = 10, step_s = 0.004, margin = 0.05;
-  bool no_slow = false;
+  double seconds = 20, period_s = 10, step_s = 0.004, margin = 0.05, clearance_m = 0.02;
+  bool no_slow = false, clearance_asked = false;
 };
 
 constexpr int kTrainPeriods = 4, kTestPeriods = 2, kTrainSpeeds = 6, kTestSpeeds = 2;
@@ -36,7 +39,50 @@ excitation::Target MakeTarget(const codegen::Robot& robot, const ExciteOptions& 
   return {robot, records, o.criterion == "d-optimal" ? Kind::kDOptimal : Kind::kCondition};
 }
 
-excitation::Optimum Search(const excitation::Target& target, const ExciteOptions& o) {
+// What checks for collisions. Empty: nothing can; `why` says what is missing. InputError: but it was asked for.
+std::optional<collision::Clearance> MakeClearance(const codegen::Robot& robot, const ExciteOptions& o,
+                                                  std::string& why) {
+  why = collision::WhyUncheckable(robot);
+  if (!why.empty() && (!o.cell.empty() || o.clearance_asked))
+    throw io::InputError(robot.path + ": collisions cannot be checked: " + why);
+  if (!why.empty()) return std::nullopt;
+  try {
+    return collision::Clearance(robot, o.cell.empty() ? collision::Cell() : collision::ReadCell(o.cell), o.clearance_m);
+  } catch (const io::InputError& e) {
+    if (!o.cell.empty() || o.clearance_asked) throw;
+    why = e.what();  // a mesh of a kind that is not read
+    return std::nullopt;
+  }
+}
+
+void PrintClearance(const collision::Clearance& clearance, const collision::Nearest& nearest) {
+  if (clearance.pairs() == 0) fmt::print("collisions: no pair of solids to check\n");
+  else
+    fmt::print("collisions: {} pairs keep {:.1f} mm; nearest {:.1f} mm at {:.3f} s, {} and {}\n", clearance.pairs(),
+               1e3 * clearance.margin_m(), 1e3 * nearest.distance_m,
+               excitation::kCheckStep_s * static_cast<double>(nearest.sample), nearest.a, nearest.b);
+  std::map<std::string, std::vector<std::string>> by_reason;
+  for (const auto& [a, b, reason] : clearance.unchecked()) by_reason[reason].push_back(a + " - " + b);
+  for (const auto& [reason, pairs] : by_reason) fmt::print("  not checked, {}: {}\n", reason, fmt::join(pairs, ", "));
+  if (!clearance.shapeless().empty())
+    fmt::print("  not checked, no shape on what these joints move: {}\n", fmt::join(clearance.shapeless(), ", "));
+}
+
+nlohmann::ordered_json ClearanceJson(const collision::Clearance& clearance, const collision::Nearest& nearest) {
+  nlohmann::ordered_json json{{"margin_m", clearance.margin_m()}, {"pairs", clearance.pairs()}};
+  if (clearance.pairs() > 0)
+    json["nearest"] = {{"distance_m", nearest.distance_m},
+                       {"t_s", excitation::kCheckStep_s * static_cast<double>(nearest.sample)},
+                       {"pair", {nearest.a, nearest.b}}};
+  json["unchecked"] = nlohmann::ordered_json::array();
+  for (const auto& [a, b, reason] : clearance.unchecked())
+    json["unchecked"].push_back({{"pair", {a, b}}, {"why", reason}});
+  json["without_shape"] = clearance.shapeless();
+  return json;
+}
+
+excitation::Optimum Search(const excitation::Target& target, const collision::Clearance* clearance,
+                           const ExciteOptions& o) {
   excitation::OptimiseSettings s;
   s.shape.family = excitation::FamilyNamed(o.curve);
   s.shape.period_s = o.period_s;
@@ -46,6 +92,7 @@ excitation::Optimum Search(const excitation::Target& target, const ExciteOptions
   s.criterion = target.criterion();
   s.search = o.search == "genetic" ? excitation::Search::kGenetic : excitation::Search::kGradient;
   s.margin = o.margin;
+  s.clearance = clearance;
   s.seconds = o.seconds;
   if (o.starts > 0) s.starts = o.starts;
   s.seed = 2 * o.seed + (o.purpose == "test" ? 1 : 0);  // one seed, two different trajectories
@@ -120,7 +167,10 @@ int RunExcite(const ExciteOptions& o) {
   const excitation::Observation observation(model);
   const excitation::Observation without_rotors(model, excitation::Observation::Rotors::kLeftOut);
   const excitation::Target target = MakeTarget(robot, o);
-  const excitation::Optimum best = Search(target, o);
+  std::string unchecked;
+  const auto checked = MakeClearance(robot, o, unchecked);
+  const collision::Clearance* const clearance = checked ? &*checked : nullptr;
+  const excitation::Optimum best = Search(target, clearance, o);
   const double condition = PeriodCondition(observation, best.series);
 
   excitation::ComposeSettings compose;
@@ -128,6 +178,7 @@ int RunExcite(const ExciteOptions& o) {
   compose.periods = o.periods > 0 ? o.periods : test ? kTestPeriods : kTrainPeriods;
   compose.slow_speeds = o.no_slow ? 0 : test ? kTestSpeeds : kTrainSpeeds;
   compose.step_s = o.step_s, compose.margin = o.margin;
+  compose.clearance = clearance;
   const excitation::Composed composed = Compose(observation, best.series, compose);
   const double sample_s = robot.sample_ticks / robot.tick_rate_Hz;
   const double whole =
@@ -156,13 +207,17 @@ int RunExcite(const ExciteOptions& o) {
   fmt::print("sections:");
   for (const auto& s : composed.sections)
     fmt::print(" {} {:.1f}-{:.1f} s{}", s.name, s.begin_s, s.end_s, &s == &composed.sections.back() ? "\n" : ",");
-  fmt::print("collisions are not checked: look at the motion, and run it slowly first\n");
+  if (clearance) PrintClearance(*clearance, composed.nearest);
+  else fmt::print("collisions are not checked: look at the motion, and run it slowly first\n  {}\n", unchecked);
   fmt::print("written: {} ({:.1f} s, {} points, {:g} ms)\n", o.out, composed.trajectory.duration_s(),
              composed.trajectory.q.rows(), 1e3 * composed.trajectory.step_s);
 
   auto sections = nlohmann::ordered_json::array();
   for (const auto& s : composed.sections)
     sections.push_back({{"name", s.name}, {"begin_s", s.begin_s}, {"end_s", s.end_s}});
+  nlohmann::ordered_json collisions;
+  if (clearance) collisions = ClearanceJson(*clearance, composed.nearest);
+  else collisions["why_not"] = unchecked;
   WriteJson(o.json, {{"robot", robot.name},
                      {"file", o.out},
                      {"purpose", o.purpose},
@@ -179,7 +234,8 @@ int RunExcite(const ExciteOptions& o) {
                      {"duration_s", composed.trajectory.duration_s()},
                      {"step_s", composed.trajectory.step_s},
                      {"torque_limits_checked", robot.has_prior},
-                     {"collisions_checked", false},
+                     {"collisions_checked", clearance != nullptr},
+                     {"collisions", collisions},
                      {"sections", sections},
                      {"peaks", PeaksJson(composed.peaks)},
                      {"minimised", excitation::Name(target.criterion().kind)},
@@ -196,10 +252,11 @@ int RunExcite(const ExciteOptions& o) {
 }  // namespace
 
 void AddExcite(CLI::App& app, Action& action) {
-  auto* verb = app.add_subcommand("excite",
-                                  "make a trajectory that shows the parameters (collisions are not checked)\n"
-                                  "example: armcal excite --robot er20_like --out train.csv\n"
-                                  "         armcal excite --robot er20_like --out test.csv --purpose test");
+  auto* verb =
+      app.add_subcommand("excite",
+                         "make a trajectory that shows the parameters, and that keeps the arm off itself and its cell\n"
+                         "example: armcal excite --robot er20_like --out train.csv\n"
+                         "         armcal excite --robot er20_like --out test.csv --purpose test");
   auto o = std::make_shared<ExciteOptions>();
   verb->add_option("--robot", o->robot, "robot file, or a name in codegen/robots")->required();
   verb->add_option("--out", o->out, "trajectory file to write: t,q1..qn")->required();
@@ -243,9 +300,17 @@ void AddExcite(CLI::App& app, Action& action) {
   verb->add_option("--margin", o->margin, "share of every limit that is kept free")
       ->check(Between(0.01, 0.9))
       ->capture_default_str();
+  verb->add_option("--cell", o->cell, "file with boxes and planes around the arm; the robot needs collision shapes");
+  auto* distance = verb->add_option("--clearance", o->clearance_m,
+                                    "smallest distance in m of links that are no neighbours, and to the cell")
+                       ->check(Between(0.0, 1.0))
+                       ->capture_default_str();
   verb->add_flag("--no-slow", o->no_slow, "leave the slow moves out");
   verb->add_option("--json", o->json, "write the figures here");
-  verb->callback([o, &action] { action = [o] { return RunExcite(*o); }; });
+  verb->callback([o, distance, &action] {
+    o->clearance_asked = distance->count() > 0;
+    action = [o] { return RunExcite(*o); };
+  });
 }
 
 }  // namespace armcal::tool

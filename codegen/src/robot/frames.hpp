@@ -38,4 +38,18 @@ inline std::array<double, 9> RowMajor(const Eigen::Matrix3d& R) {
   return {R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2)};
 }
 
+inline Eigen::Isometry3d ToPose(const std::array<double, 3>& xyz_m, const std::array<double, 9>& rotation) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = Eigen::Vector3d(xyz_m.data());
+  T.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation.data());
+  return T;
+}
+
+// The same shape where its pose is seen from another frame. frame: the present frame, seen from that one.
+inline Shape Moved(const Eigen::Isometry3d& frame, Shape shape) {
+  const Eigen::Isometry3d T = frame * ToPose(shape.xyz_m, shape.rotation);
+  shape.xyz_m = Components(T.translation()), shape.rotation = RowMajor(T.linear());
+  return shape;
+}
+
 }  // namespace armcal::codegen

@@ -194,6 +194,65 @@ UrdfChoice ReadUrdfChoice(const io::TomlReader& in) {
   return choice;
 }
 
+// Where packages of the URDF's meshes lie, seen from the robot file.
+void ReadPackages(const io::TomlReader& in, UrdfChoice& choice) {
+  if (!in.Has("packages")) return;
+  const io::TomlReader packages = in.Table("packages");
+  for (const auto& [name, path] : packages.table())
+    choice.packages[std::string(name.str())] =
+        std::filesystem::path(in.file()).parent_path() / packages.Text(name.str());
+}
+
+// A capsule from one point to another, in the frame of the link: in a URDF its own, else that of center_m, or the base.
+Shape ReadCapsule(const io::TomlReader& in, const UrdfChain* chain, int joints) {
+  in.AllowOnly({"link", "from_m", "to_m", "radius_m"});
+  Shape shape;
+  shape.kind = Shape::Kind::kCapsule;
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  if (chain) {
+    shape.link = in.Text("link");
+    std::vector<std::string> known;
+    const auto look = [&](const std::vector<UrdfPart>& parts, std::size_t body) {
+      for (const UrdfPart& part : parts) {
+        known.push_back(part.link);
+        if (part.link == shape.link) shape.body = static_cast<int>(body), frame = part.pose;
+      }
+    };
+    look(chain->base_part, 0);
+    for (std::size_t k = 0; k < chain->part.size(); ++k) look(chain->part[k], k + 1);
+    if (std::find(known.begin(), known.end(), shape.link) == known.end()) {
+      const std::string nearest = io::Nearest(shape.link, known);
+      in.Report("link", "a link of the arm" + (nearest.empty() ? "" : "; the nearest is " + nearest));
+    }
+  } else {
+    shape.body = static_cast<int>(in.Integer("link", 0, joints));
+    shape.link = shape.body == 0 ? "base" : "link " + std::to_string(shape.body);
+  }
+  const Eigen::Vector3d from(in.Numbers("from_m", 3).data()), to(in.Numbers("to_m", 3).data());
+  shape.size_m = {in.Positive("radius_m"), (to - from).norm()};
+  for (const char* key : {"from_m", "to_m", "radius_m"})
+    if (std::max({from.norm(), to.norm(), shape.size_m[0]}) > kLongest) in.Report(key, "metres (millimetres?)");
+  shape.xyz_m = Components((from + to) / 2);
+  shape.rotation = RowMajor(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), to - from).toRotationMatrix());
+  return Moved(frame, shape);
+}
+
+// Capsules stand in the place of the URDF's shapes of their links. base: the URDF's root link, seen from the base
+// frame.
+void ReadShapes(const io::TomlReader& in, Robot& r, const UrdfChain* chain, const Eigen::Isometry3d& base) {
+  std::vector<Shape> capsules;
+  for (const io::TomlReader& capsule : in.Tables("capsule"))
+    capsules.push_back(ReadCapsule(capsule, chain, r.joints()));
+  if (chain)
+    for (const Shape& shape : chain->shape)
+      if (std::none_of(capsules.begin(), capsules.end(), [&](const Shape& c) { return c.link == shape.link; }))
+        r.shape.push_back(shape);
+  r.shape.insert(r.shape.end(), capsules.begin(), capsules.end());
+  if (chain)
+    for (Shape& shape : r.shape)
+      if (shape.body == 0) shape = Moved(base, shape);
+}
+
 // The bodies of a URDF as a prior: there, possible, and more than a placeholder.
 void CheckUrdfBodies(const io::TomlReader& in, const UrdfChain& chain, io::Faults& faults) {
   const std::string file = (std::filesystem::path(in.file()).parent_path() / in.Text("urdf")).string();
@@ -214,15 +273,13 @@ void CheckUrdfBodies(const io::TomlReader& in, const UrdfChain& chain, io::Fault
 }
 
 // Kinematics, bodies and limits from the URDF; one [[joint]] table per movable joint, found by its name, says the rest.
-void ReadUrdfRobot(const io::TomlReader& in, Robot& r, Eigen::Isometry3d& base, Eigen::Isometry3d& flange,
-                   io::Faults& faults) {
+void ReadUrdfRobot(const io::TomlReader& in, Robot& r, UrdfChain& chain, io::Faults& faults) {
   if (in.Has("dh")) in.Report("dh", "either dh or urdf");
   r.urdf = ReadUrdfChoice(in);
-  UrdfChain chain;
+  ReadPackages(in, r.urdf);
   if (!faults.Try([&] { chain = ReadUrdf(r.urdf, r.has_prior ? UrdfBodies::kChecked : UrdfBodies::kIgnored); })) return;
   if (r.has_prior) CheckUrdfBodies(in, chain, faults);
-  base = chain.base, flange = chain.flange;
-  r.joint = std::move(chain.joint);
+  r.joint = chain.joint;
   std::vector<std::string> untold;
   for (const Joint& joint : r.joint) untold.push_back(joint.name);
   for (const io::TomlReader& table : in.Tables("joint")) {
@@ -310,7 +367,7 @@ void ReadHead(const io::TomlReader& in, Robot& r) {
       {"name",           "title",        "source",       "gravity_mps2", "dh",      "sign_law", "sign_width_radps",
        "sign_width_mps", "tick_rate_Hz", "sample_ticks", "prior",        "control", "joint",    "effect",
        "coupling",       "base_frame",   "tool_frame",   "identified",   "urdf",    "tip",      "fixed",
-       "parameters",     "payload",      "ceilings"});
+       "parameters",     "payload",      "ceilings",     "packages",     "capsule"});
   r.name = in.Text("name");
   if (in.Has("name") &&
       (r.name.empty() || r.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos))
@@ -329,7 +386,7 @@ void ReadHead(const io::TomlReader& in, Robot& r) {
   else if (std::isfinite(ticks)) r.sample_ticks = static_cast<int>(ticks);
   ReadPrior(in, r);
   if (!in.Has("urdf"))
-    for (const char* key : {"tip", "fixed"})
+    for (const char* key : {"tip", "fixed", "packages"})
       if (in.Has(key)) in.Report(key, "urdf beside it: it chooses a chain of a URDF");
 }
 
@@ -365,10 +422,12 @@ Robot ReadRobot(const std::filesystem::path& path) {
   Robot r;
   r.path = path.string();
   ReadHead(in, r);
-  Eigen::Isometry3d base = Eigen::Isometry3d::Identity(), flange = base;
+  Eigen::Isometry3d base = Eigen::Isometry3d::Identity(), flange = base, root = base;
+  UrdfChain chain;
   bool chain_known = true;
   if (in.Has("urdf")) {
-    ReadUrdfRobot(in, r, base, flange, faults);
+    ReadUrdfRobot(in, r, chain, faults);
+    base = chain.base, flange = chain.flange;
     chain_known = !r.joint.empty();
   } else {
     const std::string dh = in.Text("dh");
@@ -379,10 +438,12 @@ Robot ReadRobot(const std::filesystem::path& path) {
   const int n = r.joints();
   if (chain_known && (n < 1 || n > 7)) in.Report("joint", "1 to 7 [[joint]] tables");
   if (chain_known && in.Has("coupling")) r.coupling = in.Table("coupling").Numbers("matrix", n * n);
-  if (in.Has("base_frame")) base = ReadFrame(in.Table("base_frame")) * base;
+  if (in.Has("base_frame")) root = ReadFrame(in.Table("base_frame"));
+  base = root * base;
   if (in.Has("tool_frame")) flange = flange * ReadFrame(in.Table("tool_frame"));
   r.base_xyz_m = Components(base.translation()), r.base_rotation = RowMajor(base.linear());
   r.tool_xyz_m = Components(flange.translation()), r.tool_rotation = RowMajor(flange.linear());
+  if (chain_known) ReadShapes(in, r, in.Has("urdf") ? &chain : nullptr, root);
   if (in.Has("payload")) ReadPayloadOf(in, r, flange, faults);
   if (chain_known && in.Has("parameters")) {
     const io::TomlReader set = in.Table("parameters");

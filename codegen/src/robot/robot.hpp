@@ -77,8 +77,24 @@ struct ParameterSet {
 // A URDF, and which chain of it is the arm.
 struct UrdfChoice {
   std::filesystem::path path;
-  std::string tip;                      // the chain ends at this link; empty: the only chain there is
-  std::map<std::string, double> fixed;  // joints that are held at a position, rad or m
+  std::string tip;                                             // the chain ends at this link; empty: the only chain
+  std::map<std::string, double> fixed;                         // joints that are held at a position, rad or m
+  std::map<std::string, std::filesystem::path> packages = {};  // where the packages of package://NAME/.. lie
+};
+
+// A solid that a link fills, for the collision check. Its own axes: a cylinder and a capsule lie along z.
+struct Shape {
+  enum class Kind { kBox, kSphere, kCylinder, kCapsule, kMesh };
+  std::string link;
+  int body = 0;  // 0: the base; k: what joint k moves
+  Kind kind = Kind::kBox;
+  // Box: its edges. Sphere: radius. Cylinder: radius, length. Capsule: radius, length without its round ends. Mesh: the
+  // scale along each axis.
+  std::array<double, 3> size_m{};
+  std::string mesh;                  // as the URDF names it
+  std::filesystem::path file;        // the mesh; empty: it was not found
+  std::array<double, 3> xyz_m{};     // seen from the base frame, or from the body's link frame
+  std::array<double, 9> rotation{};  // rows of R
 };
 
 // What [ceilings] says about the hardest values that a table of this robot may hold. What is empty or absent follows
@@ -103,6 +119,7 @@ struct Robot {
   bool has_prior = true;  // false: prior = "none"
   double link_relative_sd = 0.2, center_floor_m = 0.005, inertia_floor_ratio = 0.02, friction_relative_sd = 0.5;
   std::vector<Joint> joint;
+  std::vector<Shape> shape;
   std::vector<double> coupling;  // row-major C of q_motor = C q; empty: unit
   std::vector<EffectUse> effect;
   ParameterSet parameters;

@@ -13,6 +13,7 @@
 
 #include "codegen/src/io/require_file.hpp"
 #include "codegen/src/robot/frames.hpp"
+#include "codegen/src/robot/mesh_path.hpp"
 
 namespace armcal::codegen {
 namespace {
@@ -70,6 +71,38 @@ Body BodyOf(const urdf::Link& link) {
   if (!in) return {};
   return Moved(Pose(in->origin),
                {in->mass, Vector3d::Zero(), Symmetric(in->ixx, in->ixy, in->ixz, in->iyy, in->iyz, in->izz)});
+}
+
+// The collision shapes of a link, seen from its frame.
+std::vector<Shape> ShapesOf(const urdf::Link& link, const UrdfChoice& choice) {
+  std::vector<Shape> shapes;
+  for (const auto& collision : link.collision_array) {
+    if (!collision || !collision->geometry) continue;
+    Shape shape;
+    shape.link = link.name;
+    const urdf::Geometry& geometry = *collision->geometry;
+    if (const auto* box = dynamic_cast<const urdf::Box*>(&geometry)) {
+      shape.kind = Shape::Kind::kBox;
+      shape.size_m = {box->dim.x, box->dim.y, box->dim.z};
+    } else if (const auto* sphere = dynamic_cast<const urdf::Sphere*>(&geometry)) {
+      shape.kind = Shape::Kind::kSphere;
+      shape.size_m = {sphere->radius};
+    } else if (const auto* cylinder = dynamic_cast<const urdf::Cylinder*>(&geometry)) {
+      shape.kind = Shape::Kind::kCylinder;
+      shape.size_m = {cylinder->radius, cylinder->length};
+    } else if (const auto* mesh = dynamic_cast<const urdf::Mesh*>(&geometry)) {
+      shape.kind = Shape::Kind::kMesh;
+      shape.size_m = {mesh->scale.x, mesh->scale.y, mesh->scale.z};
+      shape.mesh = mesh->filename;
+      shape.file = MeshFile(mesh->filename, choice.path, choice.packages);
+    } else {
+      continue;
+    }
+    const Isometry3d pose = Pose(collision->origin);
+    shape.xyz_m = Components(pose.translation()), shape.rotation = RowMajor(pose.linear());
+    shapes.push_back(shape);
+  }
+  return shapes;
 }
 
 // Which joints of a URDF move the arm, and at what positions all others are held.
@@ -154,10 +187,9 @@ class Choice {
 
 class Walk {
  public:
-  Walk(const std::string& file, const urdf::ModelInterface& model, const Choice& choice, io::Faults& faults)
-      : file_(file), model_(model), choice_(choice), faults_(faults) {
-    std::vector<UrdfPart> base;
-    Collect(*model.getRoot(), Isometry3d::Identity(), base);
+  Walk(const UrdfChoice& asked, const urdf::ModelInterface& model, const Choice& choice, io::Faults& faults)
+      : asked_(asked), file_(asked.path.string()), model_(model), choice_(choice), faults_(faults) {
+    Collect(*model.getRoot(), Isometry3d::Identity(), base_parts);
     while (next_) {
       const auto joint = std::exchange(next_, nullptr);
       Vector3d direction(joint->axis.x, joint->axis.y, joint->axis.z);
@@ -174,7 +206,9 @@ class Walk {
   }
 
   std::vector<Axis> axes;
+  std::vector<UrdfPart> base_parts;
   std::vector<std::vector<UrdfPart>> parts;  // of each axis; poses are seen from the root link
+  std::vector<Shape> shapes;                 // of all links; poses are seen from the root link
 
  private:
   void Say(const char* what, const std::string& name, const std::string& expected) const {
@@ -195,6 +229,10 @@ class Walk {
   // A link and all that is fixed to it; the movable joint that follows goes to next_, its pose to at_.
   void Collect(const urdf::Link& link, const Isometry3d& pose, std::vector<UrdfPart>& parts_of) {
     parts_of.push_back({link.name, pose, BodyOf(link)});
+    for (const Shape& shape : ShapesOf(link, asked_)) {
+      shapes.push_back(codegen::Moved(pose, shape));
+      shapes.back().body = static_cast<int>(axes.size());
+    }
     for (const auto& joint : link.child_joints) {
       if (!choice_.Moves(*joint)) {
         Collect(*model_.getLink(joint->child_link_name), pose * AtPosition(*joint), parts_of);
@@ -208,6 +246,7 @@ class Walk {
     }
   }
 
+  const UrdfChoice& asked_;
   std::string file_;
   const urdf::ModelInterface& model_;
   const Choice& choice_;
@@ -422,12 +461,13 @@ UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
   choice.Check();
   CheckLengths(file, *model, faults);
   if (bodies == UrdfBodies::kChecked) CheckBodies(file, *model, faults);
-  const Walk walk(file, *model, choice, faults);
+  const Walk walk(asked, *model, choice, faults);
   faults.ThrowIfAny();
   std::vector<JointKinematics> kinematics;
   const std::vector<Frame> frames = LayFrames(walk.axes, kinematics);
   UrdfChain chain;
   chain.part = walk.parts;
+  chain.base_part = walk.base_parts;
   chain.held = choice.held();
   chain.same_inertia = SameInertia(walk.parts);
   for (std::size_t i = 0; i < walk.axes.size(); ++i) {
@@ -446,6 +486,10 @@ UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
     for (UrdfPart& part : chain.part[i]) part.pose = frame.inverse() * part.pose;
     chain.joint.push_back(joint);
   }
+  for (const Shape& shape : walk.shapes)
+    chain.shape.push_back(
+        shape.body == 0 ? shape
+                        : codegen::Moved(frames[static_cast<std::size_t>(shape.body) - 1].Pose().inverse(), shape));
   chain.base = frames.front().Pose();
   chain.flange = chain.part.back().front().pose;
   for (const UrdfPart& part : chain.part.back())

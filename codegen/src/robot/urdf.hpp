@@ -26,8 +26,11 @@ struct UrdfChain {
   std::vector<std::string> unlimited;
   // Of each joint: the link that it moves, then all that is fixed to it.
   std::vector<std::vector<UrdfPart>> part;
+  std::vector<UrdfPart> base_part;  // what does not move; poses are seen from the root link
+  // Collision shapes; those of body 0 are seen from the URDF's root link, the others from the body's DH frame.
+  std::vector<Shape> shape;
   // Frame 0 seen from the URDF's root link, and the URDF's last link frame seen from the last DH frame.
-  Eigen::Isometry3d base, flange;
+  Eigen::Isometry3d base = Eigen::Isometry3d::Identity(), flange = base;
   std::vector<std::string> same_inertia;  // moving links that share mass, centre and inertia: nobody computed these
   std::map<std::string, double> held;     // movable joints that are held, mimic joints among them; rad or m
 };

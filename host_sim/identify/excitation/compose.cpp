@@ -14,12 +14,15 @@ namespace armcal::excitation {
 namespace {
 
 constexpr double kShortest_s = 0.5, kLongest_s = 20, kGrowth = 1.15;
+constexpr int kMostEntries = 10;  // places of the series that are tried as its beginning
 constexpr int kCheckPoints =
     200;  // the peaks of a polynomial of degree 5 between these points differ by less than 1e-3
 
-bool Keeps(const Observation& observation, const Blend& blend, double share) {
-  const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(kCheckPoints, 0, blend.duration_s());
-  return Keeps(FindPeaks(observation, blend.At(t)), share);
+bool Keeps(const Observation& observation, const Blend& blend, const Limits& limits) {
+  const auto points = [&](Eigen::Index count) { return Eigen::VectorXd::LinSpaced(count, 0, blend.duration_s()); };
+  if (!Keeps(FindPeaks(observation, blend.At(points(kCheckPoints))), limits.share)) return false;
+  return !limits.clearance ||
+         limits.clearance->Keeps(blend.At(points(std::lround(blend.duration_s() / kCheckStep_s) + 1)).q);
 }
 
 // Where a joint rests before (direction -1) or after (+1) a blend of this duration from or to the state. It moves at
@@ -35,9 +38,9 @@ State RestNear(const codegen::Robot& robot, const State& moving, double directio
 }
 
 template <class Make>
-std::optional<Blend> Shortest(const Observation& observation, double share, Make make) {
+std::optional<Blend> Shortest(const Observation& observation, const Limits& limits, Make make) {
   for (double duration = kShortest_s; duration < kLongest_s; duration *= kGrowth)
-    if (Blend blend = make(duration); Keeps(observation, blend, share)) return blend;
+    if (Blend blend = make(duration); Keeps(observation, blend, limits)) return blend;
   return std::nullopt;
 }
 
@@ -76,20 +79,23 @@ codegen::Signals Blend::At(const Eigen::VectorXd& t) const {
   return s;
 }
 
-std::optional<Blend> ShortestBlend(const Observation& observation, const State& from, const State& to, double share) {
-  return Shortest(observation, share, [&](double duration) { return Blend(from, to, duration); });
+std::optional<Blend> ShortestBlend(const Observation& observation, const State& from, const State& to,
+                                   const Limits& limits) {
+  return Shortest(observation, limits, [&](double duration) { return Blend(from, to, duration); });
 }
 
-std::optional<Blend> ShortestStart(const Observation& observation, const State& to, double share) {
+std::optional<Blend> ShortestStart(const Observation& observation, const State& to, const Limits& limits) {
   const codegen::Robot& robot = observation.model().robot();
-  return Shortest(observation, share,
-                  [&](double duration) { return Blend(RestNear(robot, to, -1, duration, share), to, duration); });
+  return Shortest(observation, limits, [&](double duration) {
+    return Blend(RestNear(robot, to, -1, duration, limits.share), to, duration);
+  });
 }
 
-std::optional<Blend> ShortestStop(const Observation& observation, const State& from, double share) {
+std::optional<Blend> ShortestStop(const Observation& observation, const State& from, const Limits& limits) {
   const codegen::Robot& robot = observation.model().robot();
-  return Shortest(observation, share,
-                  [&](double duration) { return Blend(from, RestNear(robot, from, +1, duration, share), duration); });
+  return Shortest(observation, limits, [&](double duration) {
+    return Blend(from, RestNear(robot, from, +1, duration, limits.share), duration);
+  });
 }
 
 namespace {
@@ -211,38 +217,71 @@ std::vector<double> QuietInstants(const codegen::Robot& robot, const Series& ser
   throw io::InputError(observation.model().robot().path + ": " + what);
 }
 
-// The blend in, the periods, and the blend out, which ends at rest.
-std::vector<Part> SeriesParts(const Observation& observation, const Series& series, int periods, double share) {
-  for (const double begin : QuietInstants(observation.model().robot(), series)) {
-    const State state = StateAt(series, begin);
-    const auto in = ShortestStart(observation, state, share), out = ShortestStop(observation, state, share);
-    if (!in || !out) continue;
-    const auto position = [series, begin](double t) -> Eigen::VectorXd { return StateAt(series, begin + t).q; };
-    return {
-        AsPart("blend in", *in), {Name(series.family), periods * series.period_s, position}, AsPart("blend out", *out)};
-  }
-  Fail(observation, "no blend from rest into the series within the limits; expected wider limits");
+std::string Expected(const Limits& limits) {
+  return limits.clearance ? "; expected wider limits, or more room in the cell" : "; expected wider limits";
 }
 
-std::optional<Part> SlowPart(const Observation& observation, const Eigen::VectorXd& home, int speeds, double share) {
+using Parts = std::vector<Part>;
+
+std::optional<Part> SlowPart(const Observation& observation, const Eigen::VectorXd& home, int speeds,
+                             const Limits& limits) {
   for (const double reach : {1.0, 0.5, 0.25, 0.125}) {
-    const SlowMoves moves(observation.model().robot(), home, speeds, share, reach);
+    const SlowMoves moves(observation.model().robot(), home, speeds, limits.share, reach);
     trajectory::Trajectory path;
     path.q.resize(static_cast<Eigen::Index>(moves.duration_s() / path.step_s) + 1, home.size());
     for (Eigen::Index k = 0; k < path.q.rows(); ++k)
       path.q.row(k) = moves.Position(path.step_s * static_cast<double>(k));
-    if (!Keeps(FindPeaks(observation, Sampled(trajectory::TrajectorySpline(path), path.step_s)), share)) continue;
+    if (!Keeps(observation, Sampled(trajectory::TrajectorySpline(path), path.step_s), limits)) continue;
     return Part{"slow moves", moves.duration_s(), [moves](double t) { return moves.Position(t); }};
   }
   return std::nullopt;
 }
 
-Part Transfer(const Observation& observation, const std::string& name, const Eigen::VectorXd& from,
-              const Eigen::VectorXd& to, double share) {
-  const auto blend = ShortestBlend(observation, AtRest(from), AtRest(to), share);
-  if (!blend)
-    Fail(observation, "no " + name + " within the limits; expected limits that allow a move between its poses");
-  return AsPart(name, *blend);
+// Slow moves around home, between `from` and `to`; without speeds, just the way from one to the other. Empty: `lacks`
+// says what was not found.
+std::optional<Parts> SlowParts(const Observation& observation, const Eigen::VectorXd& from, const Eigen::VectorXd& home,
+                               const Eigen::VectorXd& to, int speeds, const Limits& limits, std::string& lacks) {
+  const auto move = [&](const Eigen::VectorXd& begin, const Eigen::VectorXd& end) {
+    return ShortestBlend(observation, AtRest(begin), AtRest(end), limits);
+  };
+  Parts parts;
+  if (speeds > 0) {
+    const auto slow = SlowPart(observation, home, speeds, limits);
+    if (!slow) return lacks = "slow moves", std::nullopt;
+    const auto transfer = move(from, home);
+    if (!transfer) return lacks = "transfer", std::nullopt;
+    parts = {AsPart("transfer", *transfer), *slow};
+  }
+  const auto back = move(speeds > 0 ? home : from, to);
+  if (!back) return lacks = "return", std::nullopt;
+  parts.push_back(AsPart("return", *back));
+  return parts;
+}
+
+// The blend in, the periods, the blend out, which ends at rest, and what follows.
+Parts AllParts(const Observation& observation, const Series& series, const ComposeSettings& settings,
+               const Limits& limits) {
+  std::string lacks = "blend from rest into the series";
+  int tried = 0;
+  for (const double begin : QuietInstants(observation.model().robot(), series)) {
+    const State state = StateAt(series, begin);
+    const auto in = ShortestStart(observation, state, limits), out = ShortestStop(observation, state, limits);
+    if (!in || !out) continue;
+    const auto position = [series, begin](double t) -> Eigen::VectorXd { return StateAt(series, begin + t).q; };
+    Parts parts{AsPart("blend in", *in),
+                {Name(series.family), settings.periods * series.period_s, position},
+                AsPart("blend out", *out)};
+    const Eigen::VectorXd first = in->Position(0), last = out->Position(out->duration_s());
+    for (const Eigen::VectorXd& home : {Eigen::VectorXd(series.offset()), last}) {
+      const auto more = SlowParts(observation, last, home, first, settings.slow_speeds, limits, lacks);
+      if (!more) continue;
+      parts.insert(parts.end(), more->begin(), more->end());
+      return parts;
+    }
+    if (++tried == kMostEntries) break;
+  }
+  Fail(observation, "no " + lacks + " within the limits" +
+                        (lacks == "slow moves" ? "; expected --no-slow or limits that allow them" : Expected(limits)));
 }
 
 // One point each step_s of the parts in a row. Where the end falls between two points, its pose is added once more.
@@ -265,24 +304,15 @@ Composed OnGrid(const std::vector<Part>& parts, double step_s) {
 }  // namespace
 
 Composed Compose(const Observation& observation, const Series& series, const ComposeSettings& settings) {
-  const double share = 1 - settings.margin;
-  std::vector<Part> parts = SeriesParts(observation, series, settings.periods, share);
-  const Eigen::VectorXd first = parts.front().position(0);
-  Eigen::VectorXd pose = parts.back().position(parts.back().duration_s);
-  if (settings.slow_speeds > 0) {
-    const Eigen::VectorXd home = series.offset();
-    const auto slow = SlowPart(observation, home, settings.slow_speeds, share);
-    if (!slow) Fail(observation, "no slow moves within the limits; expected --no-slow or limits that allow them");
-    parts.push_back(Transfer(observation, "transfer", pose, home, share));
-    parts.push_back(*slow);
-    pose = home;
-  }
-  parts.push_back(Transfer(observation, "return", pose, first, share));
-
-  Composed composed = OnGrid(parts, settings.step_s);
-  composed.peaks = FindPeaks(observation, Sampled(trajectory::TrajectorySpline(composed.trajectory)));
+  const Limits limits(1 - settings.margin, settings.clearance);
+  Composed composed = OnGrid(AllParts(observation, series, settings, limits), settings.step_s);
+  const codegen::Signals motion = Sampled(trajectory::TrajectorySpline(composed.trajectory));
+  composed.peaks = FindPeaks(observation, motion);
+  if (limits.clearance) composed.nearest = limits.clearance->Smallest(motion.q);
   if (!Keeps(composed.peaks, 1))
     Fail(observation, "the trajectory's grid is too coarse to keep the limits; expected a smaller step");
+  if (limits.clearance && composed.nearest.distance_m < limits.clearance->margin_m())
+    Fail(observation, "the trajectory's grid is too coarse to keep the distances; expected a smaller step");
   return composed;
 }
 

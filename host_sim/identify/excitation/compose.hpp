@@ -34,13 +34,14 @@ class Blend {
   Eigen::MatrixXd power_;  // [joints x 6], in t / duration
 };
 
-// The shortest blend of those tried (0.5 s to 20 s) whose shares of all limits are at most `share`. Empty: none found.
-std::optional<Blend> ShortestBlend(const Observation& observation, const State& from, const State& to, double share);
+// The shortest blend of those tried (0.5 s to 20 s) that keeps the limits. Empty: none found.
+std::optional<Blend> ShortestBlend(const Observation& observation, const State& from, const State& to,
+                                   const Limits& limits);
 
 // The same with one end at rest. The place of rest is where the moving end's speed, falling to zero, leads; it is kept
 // inside the position limits.
-std::optional<Blend> ShortestStart(const Observation& observation, const State& to, double share);
-std::optional<Blend> ShortestStop(const Observation& observation, const State& from, double share);
+std::optional<Blend> ShortestStart(const Observation& observation, const State& to, const Limits& limits);
+std::optional<Blend> ShortestStop(const Observation& observation, const State& from, const Limits& limits);
 
 // Slow strokes of one joint. They show friction near standstill (Stribeck, presliding, backlash), which a Fourier
 // series hardly does. The joint starts at rest at home, moves at constant speed +v, -v, .., and ends at rest at home.
@@ -79,7 +80,8 @@ struct ComposeSettings {
   int periods = 4;
   int slow_speeds = 6;  // cells of constant speed in the slow part; 0: no slow part
   double step_s = 0.004;
-  double margin = 0.05;  // of every limit, kept free
+  double margin = 0.05;                             // of every limit, kept free
+  const collision::Clearance* clearance = nullptr;  // none: collisions are not checked
 };
 
 struct Section {
@@ -91,10 +93,11 @@ struct Composed {
   trajectory::Trajectory trajectory;
   std::vector<Section> sections;
   std::vector<JointPeaks> peaks;  // of the spline through the trajectory, on the check grid
+  collision::Nearest nearest;     // the same, with a clearance
 };
 
 // The trajectory starts and ends at rest in the same pose, so it may be repeated. The series is entered where it is
-// slowest.
+// slowest. Slow moves are made around the series' middle pose, or else around the place where the series is left.
 // InputError: no blend or slow part within the limits.
 Composed Compose(const Observation& observation, const Series& series, const ComposeSettings& settings);
 

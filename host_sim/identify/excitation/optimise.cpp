@@ -17,7 +17,8 @@ namespace {
 
 constexpr double kPenalty =
     100;  // per sample and unit of squared excess: 1 % too far costs as much as 1 % of cond gains
-constexpr double kRelativeShift = 1e-7;  // of a joint's limit, for the derivative of the regressor by its state
+constexpr double kClearanceStep_s = 0.025;  // a fast arm moves some centimetres between two looks at its distances
+constexpr double kRelativeShift = 1e-7;     // of a joint's limit, for the derivative of the regressor by its state
 
 // kPenalty * excess^2 of |x - middle| / half over `share`; adds the derivative by x.
 double Excess(double x, double middle, double half, double share, double& derivative) {
@@ -29,11 +30,17 @@ double Excess(double x, double middle, double half, double share, double& deriva
 
 }  // namespace
 
-Objective::Objective(const Observation& observation, const Criterion& criterion, const SeriesShape& shape, double share)
-    : observation_(observation), criterion_(criterion), shape_(shape), share_(share) {
+Objective::Objective(const Observation& observation, const Criterion& criterion, const SeriesShape& shape,
+                     const Limits& limits)
+    : observation_(observation), criterion_(criterion), shape_(shape), limits_(limits) {
   const codegen::Robot& robot = observation.model().robot();
   t_ = Eigen::VectorXd::LinSpaced(shape.samples, 0, shape.period_s * (shape.samples - 1) / shape.samples);
   for (int order = 0; order < 3; ++order) basis_[order] = Basis(shape.family, t_, shape.period_s, shape.terms, order);
+  if (limits.clearance) {
+    const auto looks = static_cast<Eigen::Index>(std::ceil(shape.period_s / kClearanceStep_s));
+    const double last = shape.period_s * static_cast<double>(looks - 1) / static_cast<double>(looks);
+    fine_ = Basis(shape.family, Eigen::VectorXd::LinSpaced(looks, 0, last), shape.period_s, shape.terms, 0);
+  }
   zero_ = Eigen::MatrixXd::Zero(shape.terms + 1, robot.joints());
   unit_ = zero_;
   Eigen::RowVectorXd peak[3];  // of each term
@@ -79,9 +86,9 @@ double Objective::Penalties(const codegen::Signals& s, Adjoint& adjoint) const {
     const codegen::Joint& joint = observation_.model().robot().joint[j];
     const auto [low, high] = joint.position_limit_rad;
     for (Eigen::Index k = 0; k < s.q.rows(); ++k) {
-      sum += Excess(s.q(k, j), (low + high) / 2, (high - low) / 2, share_, adjoint.q(k, j));
-      sum += Excess(s.qd(k, j), 0, joint.speed_limit_radps, share_, adjoint.qd(k, j));
-      sum += Excess(s.qdd(k, j), 0, joint.acceleration_limit_radps2, share_, adjoint.qdd(k, j));
+      sum += Excess(s.q(k, j), (low + high) / 2, (high - low) / 2, limits_.share, adjoint.q(k, j));
+      sum += Excess(s.qd(k, j), 0, joint.speed_limit_radps, limits_.share, adjoint.qd(k, j));
+      sum += Excess(s.qdd(k, j), 0, joint.acceleration_limit_radps2, limits_.share, adjoint.qdd(k, j));
     }
   }
   return sum;
@@ -93,8 +100,19 @@ double Objective::TorquePenalty(Eigen::MatrixXd& d_torque) const {
   for (int i = 0; i < unit_.cols(); ++i) {
     const Eigen::VectorXd torque = row_[i].topRows(shape_.samples) * observation_.mean();
     for (Eigen::Index k = 0; k < torque.size(); ++k)
-      sum += Excess(torque[k], 0, observation_.model().robot().joint[i].torque_limit_Nm, share_, d_torque(k, i));
+      sum += Excess(torque[k], 0, observation_.model().robot().joint[i].torque_limit_Nm, limits_.share, d_torque(k, i));
   }
+  return sum;
+}
+
+// Adds to d_coefficient. The penalty of all looks weighs as much as that of the samples, if all are alike.
+double Objective::ClearancePenalty(const Eigen::MatrixXd& coefficient, Eigen::MatrixXd& d_coefficient) const {
+  if (!limits_.clearance) return 0;
+  const double weight = kPenalty * shape_.samples / static_cast<double>(fine_.rows());
+  const Eigen::MatrixXd q = fine_ * coefficient;
+  Eigen::MatrixXd d_q = Eigen::MatrixXd::Zero(q.rows(), q.cols());
+  const double sum = weight * limits_.clearance->Penalty(q, weight, d_q);
+  d_coefficient += fine_.transpose() * d_q;
   return sum;
 }
 
@@ -131,7 +149,9 @@ double Objective::operator()(const Eigen::VectorXd& u, Eigen::VectorXd& gradient
   Adjoint adjoint{d_torque, d_torque, d_torque};
   const double figure = SmoothFigure(d_gram);
   if (!std::isfinite(figure)) return figure;
-  const double value = figure + Penalties(s, adjoint) + TorquePenalty(d_torque);
+  Eigen::MatrixXd d_coefficient = Eigen::MatrixXd::Zero(unit_.rows(), unit_.cols());
+  const double value =
+      figure + Penalties(s, adjoint) + TorquePenalty(d_torque) + ClearancePenalty(Series(u).coefficient, d_coefficient);
 
   // A state variable changes the rows of its own sample only. So the derivative is that of the value by the rows, times
   // the difference quotient of the rows.
@@ -148,7 +168,7 @@ double Objective::operator()(const Eigen::VectorXd& u, Eigen::VectorXd& gradient
       part.col(v % n) += change / Shift(v);
     }
   }
-  const Eigen::MatrixXd d_coefficient =
+  d_coefficient +=
       basis_[0].transpose() * adjoint.q + basis_[1].transpose() * adjoint.qd + basis_[2].transpose() * adjoint.qdd;
   const Eigen::MatrixXd d_u = unit_.cwiseProduct(d_coefficient);
   gradient = Eigen::Map<const Eigen::VectorXd>(d_u.data(), d_u.size());
@@ -161,7 +181,10 @@ double Objective::operator()(const Eigen::VectorXd& u) {
   Eigen::MatrixXd d_gram, d_torque = Eigen::MatrixXd::Zero(shape_.samples, unit_.cols());
   Adjoint adjoint{d_torque, d_torque, d_torque};
   const double figure = SmoothFigure(d_gram);
-  return std::isfinite(figure) ? figure + Penalties(s, adjoint) + TorquePenalty(d_torque) : figure;
+  if (!std::isfinite(figure)) return figure;
+  Eigen::MatrixXd d_coefficient = Eigen::MatrixXd::Zero(unit_.rows(), unit_.cols());
+  return figure + Penalties(s, adjoint) + TorquePenalty(d_torque) +
+         ClearancePenalty(Series(u).coefficient, d_coefficient);
 }
 
 namespace {
@@ -243,9 +266,10 @@ double PeriodCondition(const Observation& observation, const Series& series) {
 
 bool RandomSeries(const Observation& observation, const OptimiseSettings& settings, std::uint64_t seed,
                   Series& series) {
-  Objective objective(observation, settings.criterion, settings.shape, 1 - settings.margin);
+  const Limits limits(1 - settings.margin, settings.clearance);
+  Objective objective(observation, settings.criterion, settings.shape, limits);
   series = objective.Series(RandomStart(objective.size(), seed));
-  return ScaleToLimits(observation, 1 - settings.margin, series);
+  return ScaleToLimits(observation, limits, series);
 }
 
 Optimum Optimise(const Observation& observation, const OptimiseSettings& settings) {
@@ -256,18 +280,20 @@ Optimum Optimise(const Observation& observation, const OptimiseSettings& setting
   std::atomic<int> next{0};
 
   search::InParallel(settings.threads, settings.threads, [&](int) {
-    Objective objective(observation, settings.criterion, settings.shape, 1 - settings.margin);
+    const Limits limits(1 - settings.margin, settings.clearance);
+    Objective objective(observation, settings.criterion, settings.shape, limits);
     // When time is up, starts are still scaled to the limits until one keeps them, so there is always an answer.
     for (int start; (start = next++) < settings.starts && (!stop() || (start < kTries && best.empty()));) {
       Series series = objective.Series(SearchFrom(objective, settings.search, StartSeed(settings.seed, start), stop));
-      if (ScaleToLimits(observation, 1 - settings.margin, series))
+      if (ScaleToLimits(observation, limits, series))
         best.Offer(series, Figure(settings.criterion, PeriodGram(observation, series)), start, settings);
     }
   });
   if (best.empty())
     throw io::InputError(
         observation.model().robot().path +
-        ": no motion within the joints' limits that shows every parameter was found; expected limits that allow one");
+        ": no motion within the joints' limits that shows every parameter was found; expected limits that allow one" +
+        (settings.clearance ? ", room in the cell, or more --seconds" : ""));
   return best.found();
 }
 

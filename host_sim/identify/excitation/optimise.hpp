@@ -9,6 +9,7 @@
 
 #include "host_sim/identify/excitation/criterion.hpp"
 #include "host_sim/identify/excitation/observation.hpp"
+#include "host_sim/identify/excitation/peaks.hpp"
 #include "host_sim/identify/excitation/series.hpp"
 
 namespace armcal::excitation {
@@ -25,13 +26,14 @@ struct SeriesShape {
 // working memory: one a thread.
 class Objective {
  public:
-  // share: how much of each limit may be used (1 - margin). The observation must outlive the objective.
-  Objective(const Observation& observation, const Criterion& criterion, const SeriesShape& shape, double share);
+  // The observation and the clearance must outlive the objective.
+  Objective(const Observation& observation, const Criterion& criterion, const SeriesShape& shape, const Limits& limits);
 
   int size() const { return static_cast<int>(unit_.size()); }
   excitation::Series Series(const Eigen::VectorXd& u) const;
 
-  // Logarithm of the criterion's figure, smoothed, plus quadratic penalties on position, speed, acceleration, torque.
+  // Logarithm of the criterion's figure, smoothed, plus quadratic penalties on position, speed, acceleration, torque,
+  // and distance where the limits have a clearance.
   // Infinite if K is singular.
   double operator()(const Eigen::VectorXd& u, Eigen::VectorXd& gradient);
   double operator()(const Eigen::VectorXd& u);  // 3 n times cheaper
@@ -44,15 +46,17 @@ class Objective {
   double SmoothFigure(Eigen::MatrixXd& d_gram) const;
   double Penalties(const codegen::Signals& s, Adjoint& adjoint) const;
   double TorquePenalty(Eigen::MatrixXd& d_torque) const;
+  double ClearancePenalty(const Eigen::MatrixXd& coefficient, Eigen::MatrixXd& d_coefficient) const;
   void Perturb(const codegen::Signals& s);
   double Shift(int variable) const;
 
   const Observation& observation_;
   Criterion criterion_;
   SeriesShape shape_;
-  double share_;
+  Limits limits_;
   Eigen::VectorXd t_;
   Eigen::MatrixXd basis_[3];     // derivative 0, 1, 2
+  Eigen::MatrixXd fine_;         // derivative 0 where distances are measured
   Eigen::MatrixXd unit_, zero_;  // coefficient = zero + unit * u, [terms + 1 x joints]
   codegen::Signals perturbed_;
   std::vector<Eigen::MatrixXd> row_;  // of the perturbed motion; the first `samples` rows belong to the motion itself
@@ -67,8 +71,9 @@ struct OptimiseSettings {
   SeriesShape shape;
   Criterion criterion;
   Search search = Search::kGradient;
-  double margin = 0.05;  // of every limit, kept free
-  double seconds = 20;   // of wall clock
+  double margin = 0.05;                             // of every limit, kept free
+  const collision::Clearance* clearance = nullptr;  // none: collisions are not checked
+  double seconds = 20;                              // of wall clock
   int starts =
       std::numeric_limits<int>::max();  // random starts at most; given enough time, the seed decides the result
   int threads = 2;

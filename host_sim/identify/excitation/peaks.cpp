@@ -39,6 +39,10 @@ double LargestShare(const std::vector<JointPeaks>& peaks) {
 // The tolerance is needed because some poses lie exactly at the edge of what `share` allows.
 bool Keeps(const std::vector<JointPeaks>& peaks, double share) { return LargestShare(peaks) <= share * (1 + 1e-9); }
 
+bool Keeps(const Observation& observation, const codegen::Signals& s, const Limits& limits) {
+  return Keeps(FindPeaks(observation, s), limits.share) && (!limits.clearance || limits.clearance->Keeps(s.q));
+}
+
 codegen::Signals Sampled(const trajectory::TrajectorySpline& spline, double step_s) {
   const auto points = static_cast<Eigen::Index>(std::floor(spline.duration_s() / step_s + 1e-6)) + 1;
   codegen::Signals s;
@@ -52,11 +56,12 @@ codegen::Signals Sampled(const trajectory::TrajectorySpline& spline, double step
   return s;
 }
 
-bool ScaleToLimits(const Observation& observation, double share, Series& series) {
+bool ScaleToLimits(const Observation& observation, const Limits& limits, Series& series) {
   const codegen::Robot& robot = observation.model().robot();
+  const double share = limits.share;
   const auto points = static_cast<Eigen::Index>(std::ceil(series.period_s / kCheckStep_s));
   const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(points, 0, kCheckStep_s * static_cast<double>(points - 1));
-  const auto keeps = [&](double factor) { return Keeps(FindPeaks(observation, series.Scaled(factor).At(t)), share); };
+  const auto keeps = [&](double factor) { return Keeps(observation, series.Scaled(factor).At(t), limits); };
 
   // Position, speed and acceleration are linear in the amplitude, so their factor follows from one evaluation.
   double factor = 1;
@@ -71,7 +76,8 @@ bool ScaleToLimits(const Observation& observation, double share, Series& series)
                        room_down / std::max(q0 - p.lowest_rad, room_down), share / std::max(p.speed_share, share),
                        share / std::max(p.acceleration_share, share)});
   }
-  // Torque is not linear, because of gravity. So the bracket is halved: 12 steps leave 1/4000 of the amplitude.
+  // Torque is not linear, because of gravity, and distances are not linear either. So the bracket is halved: 12 steps
+  // leave 1/4000 of the amplitude.
   if (!keeps(factor)) {
     if (!keeps(0)) return false;
     double good = 0, bad = factor;

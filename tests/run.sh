@@ -79,6 +79,7 @@ if [[ $scope == peers ]]; then
   step "other people's programs" peers_programs || finish
   step "build armcal" configure_and_build host --target armcal armcal-generate || finish
   step "exports in MuJoCo and Pinocchio" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
+  step "excitations in MuJoCo" build/peers/venv/bin/python tests/peers/collisions_test.py build/host/armcal build/peers/collisions
   step "logs by other people's libraries" build/peers/venv/bin/python tests/peers/logs_test.py build/host/armcal build/peers/logs
   step "the Python package" build/peers/venv/bin/pip install -q --disable-pip-version-check ./host_sim/python || finish
   step "its regressor and Pinocchio" build/peers/venv/bin/python tests/peers/python_test.py build/host/armcal build/peers/python

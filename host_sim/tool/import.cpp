@@ -10,7 +10,7 @@ namespace {
 
 struct ImportOptions {
   std::string urdf, tip, name, out, json;
-  std::vector<std::string> fixed;
+  std::vector<std::string> fixed, packages;
   bool overwrite = false;
 };
 
@@ -36,6 +36,19 @@ std::map<std::string, double> Held(const std::vector<std::string>& words) {
   return held;
 }
 
+std::map<std::string, std::filesystem::path> Packages(const std::vector<std::string>& words) {
+  std::map<std::string, std::filesystem::path> packages;
+  for (const std::string& word : words) {
+    const auto equals = word.find('=');
+    if (equals == word.npos || equals == 0) throw io::InputError("--package " + word + ": expected NAME=FOLDER");
+    const std::string folder = word.substr(equals + 1);
+    if (!std::filesystem::is_directory(folder))
+      throw io::InputError("--package " + word + ": " + folder + " is no folder; expected NAME=FOLDER");
+    packages[word.substr(0, equals)] = folder;
+  }
+  return packages;
+}
+
 std::string StemOf(const std::filesystem::path& path) {  // arm of arm.urdf.xacro
   return path.extension() == ".xacro" ? path.stem().stem().string() : path.stem().string();
 }
@@ -54,7 +67,8 @@ int Run(const ImportOptions& o) {
   const std::filesystem::path out = o.out.empty() ? StemOf(o.urdf) + ".toml" : o.out;
   if (std::filesystem::exists(out) && !o.overwrite)
     throw io::InputError(out.string() + ": is there already; --overwrite replaces it");
-  const codegen::ImportedRobot robot = codegen::ImportUrdf({o.urdf, o.tip, Held(o.fixed)}, name, out);
+  const codegen::ImportedRobot robot =
+      codegen::ImportUrdf({o.urdf, o.tip, Held(o.fixed), Packages(o.packages)}, name, out);
   files::WriteWholeFile(out, robot.text);
   const codegen::Robot read = codegen::ReadRobot(out);
   PrintGuesses(robot);
@@ -79,6 +93,8 @@ void AddImport(CLI::App& app, Action& action) {
   verb->add_option("urdf", o->urdf, "the URDF, or a .xacro file if the program xacro is installed")->required();
   verb->add_option("--tip", o->tip, "link at which the arm ends; joints that do not lead there are held");
   verb->add_option("--fixed", o->fixed, "JOINT or JOINT=POSITION (rad, m): held there; may be repeated");
+  verb->add_option("--package", o->packages,
+                   "NAME=FOLDER: where package://NAME/.. of the URDF lies; ROS_PACKAGE_PATH serves, too");
   verb->add_option("--name", o->name, "the robot's name (default: that of the file)");
   verb->add_option("-o,--out", o->out, "robot file to write (default: the URDF's name with .toml)");
   verb->add_flag("--overwrite", o->overwrite, "write it although it is there");

@@ -5,7 +5,9 @@
 #include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <numbers>
+#include <string_view>
 
 #include "codegen/src/robot/urdf.hpp"
 
@@ -143,6 +145,27 @@ UrdfChain ReadWhatCanBeUsed(const UrdfChoice& choice, bool& bodies, std::vector<
   return chain;
 }
 
+// A line for each package, or path, whose meshes are not there.
+std::vector<std::string> MissingMeshes(const UrdfChain& chain) {
+  std::vector<std::string> lines;
+  std::map<std::string, std::vector<std::string>> missing;  // package, or the whole name -> links
+  constexpr std::string_view kPackage = "package://";
+  for (const Shape& shape : chain.shape) {
+    if (shape.kind != Shape::Kind::kMesh || !shape.file.empty()) continue;
+    const bool package = shape.mesh.starts_with(kPackage);
+    missing[package ? shape.mesh.substr(0, shape.mesh.find('/', kPackage.size())) : shape.mesh].push_back(shape.link);
+  }
+  for (const auto& [name, links] : missing) {
+    std::string list;
+    for (const std::string& link : links) list += (list.empty() ? "" : ", ") + link;
+    const bool package = name.starts_with(kPackage);
+    lines.push_back(name + " was not found, with the collision mesh of " + list + ": collisions cannot be checked; " +
+                    (package ? "say where it is: --package " + name.substr(kPackage.size()) + "=FOLDER"
+                             : "expected the file beside the URDF"));
+  }
+  return lines;
+}
+
 }  // namespace
 
 ImportedRobot ImportUrdf(const UrdfChoice& asked, const std::string& name, const std::filesystem::path& file) {
@@ -154,18 +177,27 @@ ImportedRobot ImportUrdf(const UrdfChoice& asked, const std::string& name, const
     throw io::InputError(asked.path.string() + ": " + std::to_string(chain.joint.size()) +
                          " movable joints, expected at most 7; name an end nearer to the base with --tip, or hold a "
                          "joint with --fixed");
+  for (const std::string& line : MissingMeshes(chain)) out.said.push_back(line);
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
-  const std::string urdf = std::filesystem::absolute(asked.path).lexically_proximate(folder).string();
+  const auto from_file = [&folder](const std::filesystem::path& path) {
+    return std::filesystem::absolute(path).lexically_proximate(folder).string();
+  };
   out.text = "# Made by armcal import. What is marked as guessed is not in the URDF: state it where you know it.\n";
   out.text += "name = \"" + Allowed(name) + "\"\nsource = " +
               Escaped("kinematics, bodies, limits: " + asked.path.filename().string() + "; guessed: marked below") +
-              "\nurdf = " + Escaped(urdf) + "\n";
+              "\nurdf = " + Escaped(from_file(asked.path)) + "\n";
   if (!out.choice.tip.empty()) out.text += "tip = " + Escaped(out.choice.tip) + "  # the arm ends at this link\n";
   if (!out.choice.fixed.empty()) {
     std::string list;
     for (const auto& [joint, position] : out.choice.fixed)
       list += (list.empty() ? "" : ", ") + Escaped(joint) + " = " + Short(position);
     out.text += "fixed = { " + list + " }  # joints that are held, rad or m: parts of the body that carries them\n";
+  }
+  if (!asked.packages.empty()) {
+    std::string list;
+    for (const auto& [package, path] : asked.packages)
+      list += (list.empty() ? "" : ", ") + Escaped(package) + " = " + Escaped(from_file(path));
+    out.text += "packages = { " + list + " }  # where the URDF's packages lie\n";
   }
   out.text +=
       "gravity_mps2 = [0.0, 0.0, -9.81]  # guessed: the URDF's z axis points up\n"

@@ -97,9 +97,7 @@ void AddChannels(CLI::App& app, Action& action) {
   auto o = std::make_shared<ChannelsOptions>();
   verb->add_option("log", o->log, "CSV, MCAP, rosbag2 (.db3 or folder) or MATLAB (.mat)")->required();
   verb->add_option("-o,--out", o->out, "channel map to write (default: it is printed)");
-  verb->add_option("--msg", o->definitions,
-                   "definition (.msg) of a message that the log does not define; may be repeated")
-      ->allow_extra_args(false);
+  AddMessages(*verb, o->definitions);
   verb->add_option("--json", o->json, "write topics, columns and the map here");
   verb->add_flag("--overwrite", o->overwrite, "write it although it is there");
   verb->callback([o, &action] { action = [o] { return Run(*o); }; });

@@ -14,7 +14,8 @@ namespace {
 using nlohmann::ordered_json;
 
 struct ChooseOptions {
-  std::string robot, channels, json;
+  std::string robot, json;
+  LogFormat format;
   std::vector<std::string> train, test;
   double cutoff_Hz = 0;
 };
@@ -118,7 +119,7 @@ int RunChoose(const ChooseOptions& o) {
   const codegen::Robot robot = codegen::ReadRobot(RobotPath(o.robot));
   const codegen::Catalogue records = LoadCatalogue();
   const codegen::Model model(robot, records);
-  const LogReader read(model, o.channels, o.cutoff_Hz);
+  const LogReader read(model, o.format, o.cutoff_Hz);
   const std::vector<calibration::Dataset> train = read.All(o.train);
   choice::ChooseSettings settings;
   report::Progress progress("laws");
@@ -146,7 +147,7 @@ void AddChoose(CLI::App& app, Action& action) {
   verb->add_option("--robot", o->robot, "robot file or name")->required();
   verb->add_option("--train", o->train, "log(s) on which the laws are compared")->required();
   verb->add_option("--test", o->test, "held-out log(s): read after the choice, to judge it");
-  verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  AddLogFormat(*verb, o->format);
   AddCutoff(*verb, o->cutoff_Hz);
   verb->add_option("--json", o->json, "write everything here");
   verb->callback([o, &action] { action = [o] { return RunChoose(*o); }; });

@@ -1,22 +1,19 @@
 // tool - armcal convert: writes a log of any format as armcal's own CSV.
 #include <fmt/core.h>
 
-#include "host_sim/data/logs/channels.hpp"
 #include "host_sim/tool/logs.hpp"
 
 namespace armcal::tool {
 namespace {
 
 struct ConvertOptions {
-  std::string log, channels, out, json;
-  std::vector<std::string> definitions;
+  std::string log, out, json;
+  LogFormat format;
 };
 
 int Run(const ConvertOptions& o) {
-  logs::ChannelMap map = logs::ReadChannelMap(o.channels);
-  map.definitions.insert(map.definitions.end(), o.definitions.begin(), o.definitions.end());
   constexpr int kFewest = 2;
-  logs::Log log = logs::ReadLog(o.log, map, kFewest);
+  logs::Log log = logs::ReadLog(o.log, MapOf(o.format), kFewest);
   for (const std::string& note : log.notes) SayAside(o.log + ": " + note);
   log.t.array() -= log.t[0];
   logs::WriteLog(o.out, log, logs::Digits::kAll);
@@ -39,11 +36,9 @@ void AddConvert(CLI::App& app, Action& action) {
                                   "example: armcal convert run.mcap --channels map.toml -o run.csv.gz");
   auto o = std::make_shared<ConvertOptions>();
   verb->add_option("log", o->log, "CSV, MCAP, rosbag2 (.db3 or folder) or MATLAB (.mat)")->required();
-  verb->add_option("--channels", o->channels, "channel map (TOML) of the log")->required();
+  verb->add_option("--channels", o->format.channels, "channel map (TOML) of the log")->required();
   verb->add_option("-o,--out", o->out, "log to write, .csv or .csv.gz")->required();
-  verb->add_option("--msg", o->definitions,
-                   "definition (.msg) of a message that the log does not define; may be repeated")
-      ->allow_extra_args(false);
+  AddMessages(*verb, o->format.messages);
   verb->add_option("--json", o->json, "write counts, sample time and notes here");
   verb->callback([o, &action] { action = [o] { return Run(*o); }; });
 }

@@ -151,13 +151,10 @@ class Demo {
     Flash("table_before.toml", robot_, "flash_before.json");
     Record("test.csv", "test_before", robot_);
     Stage("diagnose: what does the model lack?");
-    const auto run = RunDiagnosis({robot_,
-                                   "",
-                                   File("test_before.csv.gz"),
-                                   File("verdict.json"),
-                                   "",
-                                   File("new_model.toml"),
-                                   {File("train_log.csv.gz")}});
+    DiagnoseOptions diagnosis;
+    diagnosis.robot = robot_, diagnosis.train = {File("train_log.csv.gz")}, diagnosis.test = File("test_before.csv.gz");
+    diagnosis.json = File("verdict.json"), diagnosis.model_out = File("new_model.toml");
+    const auto run = RunDiagnosis(diagnosis);
     ordered_json result = run->json;
     std::string path = "nothing was found, so the identified table stays";
     std::string final_robot = robot_, final_flash = "flash_before.json";
@@ -206,7 +203,7 @@ class Demo {
                        after = ReadJson(File("test_after.json"));
     result["plant_floor"] =
         verdict::ToList(PlantFloor(File("truth_1.bin"), run->test, before["first_tick"], before["decimation"]));
-    const LogReader read(*run->model, "");
+    const LogReader read(*run->model, {});
     result["plant_floor_after_run"] = verdict::ToList(
         PlantFloor(File(after_truth), read.One(File("test_after.csv.gz")), after["first_tick"], after["decimation"]));
     result["drive_cad"] = cad["drive_residual_rms_Nm"], result["drive_before"] = before["drive_residual_rms_Nm"],

@@ -51,7 +51,7 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
   for (const std::string& p : o.train)
     if (std::error_code none; std::filesystem::equivalent(p, o.test, none))
       throw io::InputError("--test " + o.test + ": expected another log than those of --train");
-  const LogReader read(model, o.channels);
+  const LogReader read(model, o.format);
   auto run = std::make_unique<analysis::Diagnosed>(std::move(declared), std::move(catalogue), read.Raw(o.train), o.how,
                                                    SayAside);
   read.PrintUntold(run->train);
@@ -121,7 +121,7 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--robot", o->robot, "robot file or name");
   verb->add_option("--train", o->train, "log(s) on which everything is decided");
   verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
-  verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  AddLogFormat(*verb, o->format);
   AddCutoff(*verb, o->how.cutoff_Hz);
   auto* never = verb->add_flag_callback(
       "--no-turns", [o] { o->how.at_turns = diagnosis::AtTurns::kNever; }, "leave out rows near turns and at rest");

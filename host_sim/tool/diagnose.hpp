@@ -6,12 +6,14 @@
 #include <vector>
 
 #include "host_sim/diagnose/analysis/diagnosed.hpp"
+#include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
 
 struct DiagnoseOptions {
-  std::string robot, channels, test, json, report, model_out;
+  std::string robot, test, json, report, model_out;
+  LogFormat format;
   std::vector<std::string> train;
   analysis::DiagnoseOptions how = {};
 };

@@ -55,7 +55,8 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& o
     };
     add("--train", c.train), add("--test", c.test);
     add("--json", {file(".json")}), add("--report", {file(".html")}), add("--model-out", {file(".toml")});
-    if (!one.channels.empty()) add("--channels", {one.channels});
+    if (!one.format.channels.empty()) add("--channels", {one.format.channels});
+    for (const std::string& message : one.format.messages) add("--msg", {message});
     if (one.how.at_turns == diagnosis::AtTurns::kAlways) add("--turns", {});
     if (one.how.at_turns == diagnosis::AtTurns::kNever) add("--no-turns", {});
     if (one.how.cutoff_Hz > 0) add("--cutoff", {fmt::format("{}", one.how.cutoff_Hz)});
@@ -208,7 +209,7 @@ verdict::Comparison CompareSplits(const DiagnoseOptions& one, const std::vector<
     return out;
   const codegen::Catalogue catalogue = LoadCatalogue();
   const codegen::Model model(codegen::ReadRobot(RobotPath(one.robot)), catalogue);
-  const LogReader read(model, one.channels, one.how.cutoff_Hz);
+  const LogReader read(model, one.format, one.how.cutoff_Hz);
   std::vector<calibration::Dataset> runs;
   std::map<std::vector<std::string>, int> group;  // by training runs
   for (const DiagnosisCase& c : cases) {

@@ -13,14 +13,15 @@ namespace {
 struct EvaluateOptions {
   GivenOptions given;
   std::vector<std::string> logs;
-  std::string channels, json;
+  std::string json;
+  LogFormat format;
   double band_Hz = 0, cutoff_Hz = 0;
 };
 
 int RunEvaluate(const EvaluateOptions& o) {
   const codegen::Model model = GivenModel(o.given);
   const calibration::Given given = ReadGiven(o.given, model);
-  const LogReader read(model, o.channels, o.cutoff_Hz);
+  const LogReader read(model, o.format, o.cutoff_Hz);
   const std::vector<calibration::Dataset> logs = read.All(o.logs);
   const analysis::Evaluated result = analysis::Evaluate(model, given, logs, o.band_Hz);
   for (std::size_t k = 0; k < logs.size(); ++k) verdict::PrintHeldOut(result.each[k], logs[k].source);
@@ -41,7 +42,7 @@ void AddEvaluate(CLI::App& app, Action& action) {
   auto o = std::make_shared<EvaluateOptions>();
   AddGivenOptions(*verb, o->given);
   verb->add_option("logs", o->logs, "log(s) to predict")->required();
-  verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  AddLogFormat(*verb, o->format);
   verb->add_option("--band", o->band_Hz,
                    "also compare in the band below this frequency (Hz): torque and prediction through the same "
                    "zero-phase filter");

@@ -26,7 +26,8 @@ namespace {
 
 // --method: any method of the survey, or one that beats it.
 struct MethodOptions {
-  std::string robot, method, channels, test, json;
+  std::string robot, method, test, json;
+  LogFormat format;
   std::vector<std::string> train;
   double band_Hz = 0, cutoff_Hz = 0;
   nlohmann::ordered_json exogeneity;  // the test that chose the method, for the JSON; null: it was asked for
@@ -94,7 +95,7 @@ void AddMotion(const calibration::HeldOutMotion& motion, nlohmann::ordered_json&
 int RunMethod(const MethodOptions& o) {
   const calibration::Method& method = calibration::FindMethod(o.method);
   const codegen::Model model = LoadModel(o.robot);
-  const LogReader read(model, o.channels, o.cutoff_Hz);
+  const LogReader read(model, o.format, o.cutoff_Hz);
   const std::vector<calibration::Dataset> train = read.All(o.train);
   calibration::Problem problem = calibration::MakeProblem(model, calibration::Pointers(train));
   if (method.needs_loop) problem.closed_loop = Loop(model, train);
@@ -139,10 +140,13 @@ int RunMethod(const MethodOptions& o) {
 
 // --with, --without: a known payload gives the drives' gains, an unknown one is identified.
 struct PayloadOptions {
-  std::string robot, channels, payload, payload_out, table, json;
+  std::string robot, payload, payload_out, ros_out, table, json;
+  LogFormat format;
   std::vector<std::string> with, without;
   double cutoff_Hz = 0;
-  bool asked() const { return !with.empty() || !without.empty() || !payload.empty() || !payload_out.empty(); }
+  bool asked() const {
+    return !with.empty() || !without.empty() || !payload.empty() || !payload_out.empty() || !ros_out.empty();
+  }
 };
 
 const char* const kName[] = {"m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"};
@@ -151,8 +155,9 @@ const char* const kUnit[] = {"kg", "m", "m", "m", "kg*m^2", "kg*m^2", "kg*m^2", 
 void Check(const PayloadOptions& o) {
   if (o.with.empty()) throw io::InputError("--with: expected log(s) of runs with the payload");
   if (o.without.empty()) throw io::InputError("--without: expected log(s) of runs without the payload");
-  if (!o.payload.empty() && !o.payload_out.empty())
-    throw io::InputError("--payload-out: expected no --payload; what is known is not identified");
+  for (const auto& [option, given] : {std::pair{"--payload-out", &o.payload_out}, std::pair{"--ros-out", &o.ros_out}})
+    if (!o.payload.empty() && !given->empty())
+      throw io::InputError(std::string(option) + ": expected no --payload; what is known is not identified");
   if (o.payload.empty() && !o.table.empty())
     throw io::InputError("--table-out: expected --payload FILE; a load at the flange has no place in a table");
 }
@@ -242,28 +247,44 @@ std::string Snippet(const calibration::Load& load) {
       load.body[0], load.sd[0], list(load.body.segment(1, 3)), list(load.body.segment(4, 6)));
 }
 
+// The fields of geometry_msgs/msg/Inertia, which payload services take.
+nlohmann::ordered_json RosInertia(const calibration::Load& load) {
+  const auto& b = load.body;
+  return {{"m", b[0]},   {"com", {{"x", b[1]}, {"y", b[2]}, {"z", b[3]}}},
+          {"ixx", b[4]}, {"ixy", b[5]},
+          {"ixz", b[6]}, {"iyy", b[7]},
+          {"iyz", b[8]}, {"izz", b[9]}};
+}
+
 int RunLoad(const PayloadOptions& o, const codegen::Model& model, const LogReader& read) {
   const std::vector<calibration::Dataset> with = read.All(o.with), without = read.All(o.without);
   const calibration::Load load =
       calibration::FindLoad(model, {calibration::Pointers(without), calibration::Pointers(with)});
   nlohmann::ordered_json json{{"robot", model.robot().name}, {"with", o.with}, {"without", o.without}};
-  report::Table t{{"load", "unit", "value", "sd", ""}, {}, "flange axes, inertia about the centre"};
+  report::Table t{{"load", "unit", "value", "sd", "95 % interval", ""}, {}, "flange axes, inertia about the centre"};
   for (int i = 0; i < load.body.size(); ++i) {
     const bool determined = load.determined[static_cast<std::size_t>(i)];
+    const double low = load.body[i] - load.HalfWidth95(i), high = load.body[i] + load.HalfWidth95(i);
     t.rows.push_back({kName[i], kUnit[i], fmt::format("{:.5g}", load.body[i]), fmt::format("{:.2g}", load.sd[i]),
-                      determined ? "" : "not determined by these logs"});
+                      fmt::format("{:.4g} .. {:.4g}", low, high), determined ? "" : "not determined by these logs"});
     json["load"].push_back({{"name", kName[i]},
                             {"unit", kUnit[i]},
                             {"value", load.body[i]},
                             {"sd", load.sd[i]},
+                            {"interval_95", {low, high}},
                             {"determined", determined}});
   }
+  json["geometry_msgs/msg/Inertia"] = RosInertia(load);
   json["least_squares_physical"] = load.was_physical;
   fmt::print("{}", report::Text(t));
   if (!load.was_physical) fmt::print("least squares alone gave no body that can exist; this one can\n");
   if (!o.payload_out.empty()) {
     files::WriteWholeFile(o.payload_out, Snippet(load));
     fmt::print("written: {}\n", o.payload_out);
+  }
+  if (!o.ros_out.empty()) {
+    files::WriteWholeFile(o.ros_out, RosInertia(load).dump() + "\n");
+    fmt::print("written: {}\n", o.ros_out);
   }
   WriteJson(o.json, json);
   return kOk;
@@ -276,6 +297,7 @@ void AddPayloadOptions(CLI::App& verb, PayloadOptions& o) {
                   "file with a [payload] table (mass_kg; center_m, inertia_kgm2 if known): find the drives' gains; "
                   "without this option the payload itself is found");
   verb.add_option("--payload-out", o.payload_out, "the [payload] table found, to append to a robot file");
+  verb.add_option("--ros-out", o.ros_out, "the payload found as geometry_msgs/msg/Inertia, for a ROS payload service");
 }
 
 // kOk, or kPartial where the logs do not determine every gain. Throws io::InputError: an option is missing or in vain,
@@ -283,13 +305,14 @@ void AddPayloadOptions(CLI::App& verb, PayloadOptions& o) {
 int RunPayload(const PayloadOptions& o) {
   Check(o);
   const codegen::Model model = LoadModel(o.robot);
-  const LogReader read(model, o.channels, o.cutoff_Hz);
+  const LogReader read(model, o.format, o.cutoff_Hz);
   return o.payload.empty() ? RunLoad(o, model, read) : RunGains(o, model, read);
 }
 
 // Else: the weighted fit with the prior.
 struct IdentifyOptions {
-  std::string robot, channels, table, json, report, test, method;
+  std::string robot, table, json, report, test, method;
+  LogFormat format;
   std::vector<std::string> train;
   bool force = false;
   double band_Hz = 0, cutoff_Hz = 0;
@@ -317,7 +340,7 @@ int RunIdentify(const IdentifyOptions& o) {
     if (!o.report.empty())
       throw io::InputError("--report: expected no --with or --without; a page shows a fit of --train");
     PayloadOptions payload = o.payload;
-    payload.robot = o.robot, payload.channels = o.channels, payload.table = o.table, payload.json = o.json;
+    payload.robot = o.robot, payload.format = o.format, payload.table = o.table, payload.json = o.json;
     payload.cutoff_Hz = o.cutoff_Hz;
     return RunPayload(payload);
   }
@@ -326,10 +349,10 @@ int RunIdentify(const IdentifyOptions& o) {
     throw io::InputError("--report: expected no --method; a page shows the weighted fit");
   if (!o.method.empty() && !o.table.empty())
     throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
-  MethodOptions method{o.robot, o.method, o.channels, o.test, o.json, o.train, o.band_Hz, o.cutoff_Hz, {}};
+  MethodOptions method{o.robot, o.method, o.test, o.json, o.format, o.train, o.band_Hz, o.cutoff_Hz, {}};
   if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
-  const LogReader read(model, o.channels, o.cutoff_Hz);
+  const LogReader read(model, o.format, o.cutoff_Hz);
   const std::vector<calibration::Dataset> train = read.All(o.train);
   read.PrintUntold(train);
   analysis::Identified found(model, train);
@@ -385,7 +408,7 @@ void AddIdentify(CLI::App& app, Action& action) {
   verb->add_option("--robot", o->robot, "robot file or name")->required();
   verb->add_option("--train", o->train, "log(s) to fit");
   verb->add_option("--test", o->test, "held-out log: its error is printed, nothing is fitted to it");
-  verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  AddLogFormat(*verb, o->format);
   verb->add_option(
       "--method", o->method,
       "another method than the weighted fit with prior: a name of the survey's, see docs; auto: instrumental "

@@ -7,12 +7,11 @@
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/data/logs/channels.hpp"
 
 namespace armcal::tool {
 
 logs::Log LogReader::Raw(const std::string& path) const {
-  return channels_.empty() ? logs::ReadLog(path) : logs::ReadLog(path, logs::ReadChannelMap(channels_));
+  return format_.channels.empty() ? logs::ReadLog(path) : logs::ReadLog(path, MapOf(format_));
 }
 
 std::vector<logs::Log> LogReader::Raw(const std::vector<std::string>& paths) const {
@@ -30,6 +29,23 @@ void LogReader::PrintUntold(const std::vector<calibration::Dataset>& data) const
 }
 
 void SayAside(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+logs::ChannelMap MapOf(const LogFormat& format) {
+  logs::ChannelMap map = logs::ReadChannelMap(format.channels);
+  map.definitions.insert(map.definitions.end(), format.messages.begin(), format.messages.end());
+  return map;
+}
+
+CLI::Option* AddMessages(CLI::App& verb, std::vector<std::string>& messages) {
+  return verb
+      .add_option("--msg", messages, "definition (.msg) of a message that the log does not define; may be repeated")
+      ->allow_extra_args(false);
+}
+
+void AddLogFormat(CLI::App& verb, LogFormat& format) {
+  auto* channels = verb.add_option("--channels", format.channels, "channel map (TOML) of foreign logs");
+  AddMessages(verb, format.messages)->needs(channels);
+}
 
 void AddCutoff(CLI::App& verb, double& cutoff_Hz) {
   const auto read = [&cutoff_Hz](const std::string& text) {

@@ -4,17 +4,23 @@
 #include <string>
 #include <vector>
 
+#include "host_sim/data/logs/channels.hpp"
 #include "host_sim/diagnose/analysis/checked_logs.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
 
+// How logs are written that are not ours.
+struct LogFormat {
+  std::string channels;               // path of a channel map; empty: our own column names
+  std::vector<std::string> messages;  // files *.msg, for types that a recording does not define
+};
+
 class LogReader {
  public:
-  // channels: path of a channel map, empty for our own column names. cutoff_Hz: of the derived speeds; 0: chosen for
-  // each log.
-  LogReader(const codegen::Model& model, std::string channels, double cutoff_Hz = 0)
-      : model_(model), channels_(std::move(channels)), cutoff_Hz_(cutoff_Hz) {}
+  // cutoff_Hz: of the derived speeds; 0: chosen for each log.
+  LogReader(const codegen::Model& model, LogFormat format, double cutoff_Hz = 0)
+      : model_(model), format_(std::move(format)), cutoff_Hz_(cutoff_Hz) {}
   logs::Log Raw(const std::string& path) const;
   std::vector<logs::Log> Raw(const std::vector<std::string>& paths) const;
   // Throws io::InputError where a log cannot be one of this arm; what is worth a line goes to stderr.
@@ -26,12 +32,20 @@ class LogReader {
 
  private:
   const codegen::Model& model_;
-  std::string channels_;
+  LogFormat format_;
   double cutoff_Hz_;
 };
 
 // A line on stderr.
 void SayAside(const std::string& line);
+
+// The channel map and the definitions given beside it.
+logs::ChannelMap MapOf(const LogFormat& format);
+
+// Adds --channels and --msg.
+void AddLogFormat(CLI::App& verb, LogFormat& format);
+// Adds --msg.
+CLI::Option* AddMessages(CLI::App& verb, std::vector<std::string>& messages);
 
 // Adds --cutoff. Anything but a frequency is refused in one line.
 void AddCutoff(CLI::App& verb, double& cutoff_Hz);

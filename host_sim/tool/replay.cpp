@@ -21,7 +21,8 @@ namespace {
 
 struct ReplayOptions {
   GivenOptions given;
-  std::string channels, json;
+  std::string json;
+  LogFormat format;
   std::vector<std::string> logs, refine;
   int start_samples = 20, refits = 0;
   double step_s = 1e-3, cutoff_Hz = 0;
@@ -146,7 +147,7 @@ void Refits(const ReplayOptions& o, const codegen::Model& model, const std::vect
 
 int RunReplay(const ReplayOptions& o) {
   const codegen::Model model = GivenModel(o.given);
-  const LogReader read(model, o.channels, o.cutoff_Hz);
+  const LogReader read(model, o.format, o.cutoff_Hz);
   std::vector<replay::Record> logs;
   for (const std::string& path : o.logs) logs.push_back(ReadRecord(read, model, path));
   nlohmann::ordered_json json = ToJson(o.given, model);
@@ -200,7 +201,7 @@ void AddReplay(CLI::App& app, Action& action) {
   auto o = std::make_shared<ReplayOptions>();
   AddGivenOptions(*verb, o->given);
   verb->add_option("logs", o->logs, "log(s) whose torque is the input")->required();
-  verb->add_option("--channels", o->channels, "channel map (TOML) of foreign logs");
+  AddLogFormat(*verb, o->format);
   verb->add_option("--start-samples", o->start_samples,
                    "the state at the start is a parabola through this many samples")
       ->check(Between(3, 1000000));

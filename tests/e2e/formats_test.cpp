@@ -37,6 +37,37 @@ TEST(Formats, ChosenTime_IsPrinted) {
   ExpectOneLine(Tool({"channels", log, "-o", map}), 2, "--overwrite");
 }
 
+TEST(Formats, DefinitionOfAMessage_IsTakenByEveryVerbThatReadsLogs) {
+  const fs::path folder = FreshFolder("formats_msg");
+  const std::string log = (kLogs / "types.db3.zst").string(), map = (folder / "map.toml").string(),
+                    other = (folder / "other.db3.zst").string(), type = (folder / "Status.msg").string();
+  fs::copy_file(log, other);
+  std::ofstream(map) << "joints = 3\n[q]\ncolumn = \"/array/data[{0}]\"\nunit = \"rad\"\n[tau]\n"
+                        "column = [\"/array/data[3]\", \"/array/data[4]\", \"/array/data[5]\"]\nunit = \"N*m\"\n"
+                        "[flag]\ncolumn = [\"/status/mode\", \"/status/raw[0]\", \"/status/raw[1]\"]\n";
+  std::ofstream(type)
+      << "float32 bus_voltage\nuint16[3] raw\nint8 mode\nbool ready\nfloat64[<=4] spare\nstring<=20 text\n";
+  const std::vector<std::vector<std::string>> verbs = {
+      {"identify", "--robot", "er20_like", "--train", log},
+      {"identify", "--robot", "er20_like", "--with", log, "--without", log},
+      {"diagnose", "--robot", "er20_like", "--train", log, "--test", other},
+      {"choose", "--robot", "er20_like", "--train", log, "--test", other},
+      {"evaluate", "--robot", "er20_like", log},
+      {"replay", "--robot", "er20_like", log},
+      {"convert", log, "-o", (folder / "out.csv").string()}};
+  for (std::vector<std::string> words : verbs) {
+    words.insert(words.end(), {"--channels", map});
+    const Outcome without = Tool(words);
+    EXPECT_NE(without.code, 0) << words[0];
+    EXPECT_NE(without.err.find("no definition of my_robot/msg/Status"), std::string::npos) << words[0] << without.err;
+    words.insert(words.end(), {"--msg", type});
+    const Outcome with = Tool(words);  // the log has three joints, the robot six
+    EXPECT_EQ(with.code == 0, words[0] == "convert") << with.err;
+    EXPECT_EQ(with.err.find("no definition"), std::string::npos) << words[0] << with.err;
+    EXPECT_EQ(with.err.find("--msg"), std::string::npos) << words[0] << with.err;
+  }
+}
+
 TEST(Formats, BadLog_IsOneLine_AndLeavesNothing) {
   const fs::path folder = FreshFolder("formats_bad");
   const std::string map = (folder / "map.toml").string(), out = (folder / "out.csv").string();

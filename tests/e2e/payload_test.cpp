@@ -65,15 +65,29 @@ TEST_F(Payload, GivesTheDrivesGainsIfKnown_AndItselfIfNot) {
   EXPECT_EQ(Tool({"identify", "--robot", "er20_like", "--train", without, "--json", json.string()}).code, 0);
   EXPECT_NE(ReadText(table).find("torque_scale"), std::string::npos);
 
-  const Outcome load = Tool({"identify", "--robot", "er20_like", "--with", with, "--without", without, "--json",
-                             json.string(), "--payload-out", found.string()});
+  const Outcome load =
+      Tool({"identify", "--robot", "er20_like", "--with", with, "--without", without, "--json", json.string(),
+            "--payload-out", found.string(), "--ros-out", (folder_ / "ros.json").string()});
   ASSERT_EQ(load.code, 0) << load.err;
   const double expected[] = {8, 0.03, -0.02, 0.10, 0.05, 0, 0, 0.04, 0, 0.03};
   const nlohmann::json identified = ReadJson(json);
   for (std::size_t k = 0; k < 10; ++k) {
     const auto& row = identified.at("load")[k];
     EXPECT_NEAR(row.at("value").get<double>(), expected[k], 4 * row.at("sd").get<double>()) << row.at("name");
+    EXPECT_LT(row.at("interval_95")[0].get<double>(), row.at("value").get<double>()) << row.at("name");
+    EXPECT_GT(row.at("interval_95")[1].get<double>(), row.at("value").get<double>()) << row.at("name");
   }
+  // The message's fields, as ROS has them.
+  const nlohmann::json ros = ReadJson(folder_ / "ros.json");
+  EXPECT_EQ(ros.size(), 8U);
+  EXPECT_NEAR(ros.at("m").get<double>(), 8, 0.3);
+  EXPECT_NEAR(ros.at("com").at("x").get<double>(), 0.03, 0.005);
+  EXPECT_NEAR(ros.at("com").at("y").get<double>(), -0.02, 0.005);
+  EXPECT_NEAR(ros.at("com").at("z").get<double>(), 0.10, 0.005);
+  EXPECT_NEAR(ros.at("ixx").get<double>(), 0.05, 0.01);
+  EXPECT_NEAR(ros.at("iyy").get<double>(), 0.04, 0.01);
+  EXPECT_NEAR(ros.at("izz").get<double>(), 0.03, 0.01);
+  for (const char* product : {"ixy", "ixz", "iyz"}) EXPECT_NEAR(ros.at(product).get<double>(), 0, 0.01) << product;
   // What was found is a part of a robot file, and of a call that takes it as known.
   const std::string laden =
       Write("er20_laden.toml", ReadText("codegen/robots/er20_like.toml") + "\n" + ReadText(found));
@@ -87,6 +101,7 @@ TEST_F(Payload, GivesTheDrivesGainsIfKnown_AndItselfIfNot) {
   Refuse({"--with", without, "--without", with}, "exchanged");
   Refuse({"--with", with, "--without", without, "--payload", Write("none.toml", "[payload]\n")}, "payload.mass_kg");
   Refuse({"--with", with, "--without", without, "--payload", (folder_ / "absent.toml").string()}, "absent.toml");
+  Refuse({"--with", with, "--without", without, "--payload", known, "--ros-out", "x.json"}, "--ros-out");
   Refuse({"--with", with}, "--without");
   Refuse({"--without", without, "--payload", known}, "--with");
   Refuse({"--with", with, "--without", without, "--table-out", table.string()}, "--payload");

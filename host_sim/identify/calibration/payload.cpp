@@ -206,6 +206,9 @@ LoadFit Unknown(const codegen::Model& model, const LoadLogs& logs) {
 
 }  // namespace
 
+// Bonferroni: what a Gaussian passes to either side with 5 % / 4 and with 5 % / 6.
+double Load::HalfWidth95(int i) const { return (i < 4 ? 2.4977 : 2.6383) * sd[i]; }
+
 double LoadVariance(int i, double mass_kg) { return std::pow(mass_kg * (i < 4 ? kReach_m : kReach_m * kReach_m), 2); }
 
 std::vector<DriveGain> FindDriveGains(const codegen::Model& model, const LoadLogs& logs,

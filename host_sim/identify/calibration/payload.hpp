@@ -44,6 +44,10 @@ struct Load {
   Eigen::VectorXd sd;            // [10]
   std::vector<bool> determined;  // [10] false: rests on the prior of any load (payload.cpp)
   bool was_physical = true;      // least squares alone gave a body that can exist
+
+  // Half of the 95 % interval of parameter i. Mass and centre lie in their four intervals at once, and so does the
+  // inertia in its six.
+  double HalfWidth95(int i) const;
 };
 
 // An unknown load. The torque constants' tolerance is the prior of the gains; the robot file's bodies, if it has any,

@@ -29,9 +29,9 @@ inline const char* const kTool = "\n[tool_frame]\nxyz_m = [0.05, -0.02, 0.11]\nr
 class LadenArm {
  public:
   // gain_spread: half width of the torque constants' error; noise_scale: of the robot file's torque noise.
-  LadenArm(std::uint64_t seed, double gain_spread, double noise_scale = 1)
+  LadenArm(std::uint64_t seed, double gain_spread, double noise_scale = 1, std::string path = RobotWith(kTool))
       : noise_scale_(noise_scale),
-        path_(RobotWith(kTool)),
+        path_(std::move(path)),
         file_(plant::ReadRobotFile(path_)),
         truth_(plant::DrawTruth(file_, {0.2, 0.5, gain_spread}, seed)),
         motion_(codegen::ReadRobot(path_), seed),
@@ -42,10 +42,10 @@ class LadenArm {
   // True torque over what the drive calls torque.
   double gain(int j) const { return truth_.torque_constant_NmpA[at(j)] / file_.joint[at(j)].torque_constant_NmpA; }
 
-  // A run with a trajectory of its own.
+  // A run with a trajectory of its own, up to `speed` of the joints' limits.
   calibration::Dataset Run(double seconds, std::uint64_t seed, const std::optional<plant::Body>& load,
-                           const std::vector<int>& still = {}) {
-    calibration::Dataset d = motion_.Run(seconds, seed, {}, 0.5, still);
+                           const std::vector<int>& still = {}, double speed = 0.5) {
+    calibration::Dataset d = motion_.Run(seconds, seed, {}, speed, still);
     d.source = load ? "with.csv" : "without.csv";
     std::optional<plant::AttachedBody> attached;
     if (load) attached = plant::AttachedBody{*load, file_.tool_frame};

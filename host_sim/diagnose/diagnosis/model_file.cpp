@@ -15,16 +15,24 @@ namespace armcal::diagnosis {
 
 namespace {
 
+// The line with each quoted value as a path that holds from anywhere.
+std::string WithAbsolutePaths(const std::string& line, const std::filesystem::path& folder) {
+  static const std::regex value("=\\s*[\"']([^\"']+)[\"']");
+  std::string out, rest = line;
+  for (std::smatch found; std::regex_search(rest, found, value); rest = found.suffix().str())
+    out += found.prefix().str() + "= \"" + std::filesystem::absolute(folder / found[1].str()).string() + "\"";
+  return out + rest;
+}
+
 // The declared file. What it names beside itself is named from anywhere, for the new file may lie elsewhere.
 std::string Declared(const std::filesystem::path& path) {
   std::ifstream in(path);
   std::string text;
-  const std::regex urdf("^\\s*urdf\\s*=\\s*[\"']([^\"']+)[\"'](.*)");
-  std::smatch found;
+  const std::regex paths("^\\s*(urdf|packages)\\s*=.*"), table("^\\s*\\[.*"), packages("^\\s*\\[\\s*packages\\s*\\].*");
+  bool in_packages = false;
   for (std::string line; std::getline(in, line);) {
-    if (std::regex_match(line, found, urdf))
-      line = fmt::format("urdf = \"{}\"{}", std::filesystem::absolute(path.parent_path() / found[1].str()).string(),
-                         found[2].str());
+    if (std::regex_match(line, table)) in_packages = std::regex_match(line, packages);
+    if (in_packages || std::regex_match(line, paths)) line = WithAbsolutePaths(line, path.parent_path());
     text += line + "\n";
   }
   return text;

@@ -229,16 +229,24 @@ TEST_F(NewModelFile, OfFrictionThatWouldPushBeyondTheLogs_StartsFromZero) {
   }
 }
 
-TEST_F(NewModelFile, OfARobotFromUrdf_FindsItsUrdfFromElsewhere) {
+TEST_F(NewModelFile, OfARobotFromUrdf_FindsItsUrdfAndItsMeshesFromElsewhere) {
   std::ofstream(folder_ / "arm.urdf") << R"(<robot name="arm"><link name="base"/><link name="l1"><inertial>
     <origin xyz="0.2 0 0"/><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><mesh filename="package://desc/l1.stl"/></geometry></collision>
+    <collision><geometry><mesh filename="package://more/l1.stl"/></geometry></collision>
     </link><joint name="r1" type="revolute"><parent link="base"/><child link="l1"/><axis xyz="0 1 0"/>
     <limit lower="-2" upper="2" effort="50" velocity="3"/></joint></robot>)";
-  std::ofstream(folder_ / "arm.toml") << R"(name = "arm"
+  for (const char* package : {"a", "b"}) {
+    fs::create_directories(folder_ / package);
+    std::ofstream(folder_ / package / "l1.stl") << "solid";
+  }
+  for (const char* packages :
+       {"packages = { desc = \"a\", more = \"b\" }\n", "[packages]\ndesc = \"a\"\n\"more\" = 'b' # c\n"}) {
+    std::ofstream(folder_ / "arm.toml") << R"(name = "arm"
 source = "test"
 gravity_mps2 = [0.0, 0.0, -9.81]
 urdf = "arm.urdf"  # beside this file
-[[joint]]
+)" << packages << R"([[joint]]
 name = "r1"
 acceleration_limit_radps2 = 1.0
 torque_noise_Nm = 1.0
@@ -246,8 +254,12 @@ v_min_radps = 0.01
 coulomb_Nm = 2.0
 viscous_Nmsprad = 1.0
 )";
-  const codegen::Model declared(codegen::ReadRobot(folder_ / "arm.toml"), Records());
-  EXPECT_EQ(Generated(declared, Of({Found("stribeck", declared)}, declared)).joints(), 1);
+    const codegen::Model declared(codegen::ReadRobot(folder_ / "arm.toml"), Records());
+    const codegen::Model next = Generated(declared, Of({Found("stribeck", declared)}, declared));
+    ASSERT_EQ(next.robot().shape.size(), 2U);
+    EXPECT_EQ(next.robot().shape[0].file, folder_ / "a/l1.stl") << packages;
+    EXPECT_EQ(next.robot().shape[1].file, folder_ / "b/l1.stl") << packages;
+  }
 }
 
 }  // namespace

@@ -6,14 +6,16 @@
 #include <vector>
 
 #include "host_sim/diagnose/analysis/diagnosed.hpp"
+#include "host_sim/tool/fleet.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
 
 struct DiagnoseOptions {
-  std::string robot, test, json, report, model_out;
+  std::string robot, test, json, report, model_out, arm;
   LogFormat format;
+  FleetOptions fleet;
   std::vector<std::string> train;
   analysis::DiagnoseOptions how = {};
 };

@@ -81,6 +81,7 @@ verdict::Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const Dia
     const nlohmann::ordered_json verdict = Diagnose(c, one, out);
     const std::lock_guard lock(mutex);
     verdicts[c.name] = verdict;
+    if (!c.test.empty()) KeepVerdicts(one.fleet, {{c.name, verdict}}, {{c.name, c.test[0]}});
     progress.Set(static_cast<double>(verdicts.size()) / static_cast<double>(cases.size()));
   });
   return verdicts;
@@ -164,6 +165,9 @@ verdict::Verdicts Collect(const BatchOptions& batch, const DiagnoseOptions& one)
 void Check(const DiagnoseOptions& one, const BatchOptions& batch) {
   if (!one.train.empty() || !one.test.empty() || !one.model_out.empty())
     throw io::InputError("--batch, --summary, --splits: expected no --train, --test or --model-out beside them");
+  if (!one.arm.empty()) throw io::InputError("--arm: expected --train and --test; in a batch the logs name the arms");
+  if (!batch.splits.empty() && !one.fleet.database.empty())
+    throw io::InputError("--splits: expected no --db beside it; each run is a part of one result");
   if (!batch.splits.empty() && !(batch.folder.empty() && batch.summary.empty() && batch.part.empty()))
     throw io::InputError("--splits: expected no --batch, --summary or --part beside it");
   if (!batch.summary.empty()) return;
@@ -268,6 +272,7 @@ int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch) {
       batch.summary.empty()
           ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part), one, batch.out, batch.jobs)
           : Collect(batch, one);
+  if (!batch.summary.empty()) KeepVerdicts(one.fleet, verdict::ReadVerdicts(batch.summary));  // without missing ones
   const nlohmann::ordered_json summary = verdict::SummaryJson(verdicts);
   fmt::print("{}", verdict::SummaryText(summary));
   WriteJson(one.json, summary);

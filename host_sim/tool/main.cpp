@@ -26,6 +26,7 @@ int Main(int argc, char** argv) {
   AddReplay(app, action);
   AddChoose(app, action);
   AddDiagnose(app, action);
+  AddHistory(app, action);
   AddReport(app, action);
   AddImport(app, action);
   AddChannels(app, action);

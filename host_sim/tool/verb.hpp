@@ -32,6 +32,7 @@ void AddEvaluate(CLI::App& app, Action& action);
 void AddReplay(CLI::App& app, Action& action);
 void AddChoose(CLI::App& app, Action& action);
 void AddDiagnose(CLI::App& app, Action& action);
+void AddHistory(CLI::App& app, Action& action);
 void AddReport(CLI::App& app, Action& action);
 void AddExport(CLI::App& app, Action& action);
 void AddFlash(CLI::App& app, Action& action);

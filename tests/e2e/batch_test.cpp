@@ -52,8 +52,13 @@ class Batch : public testing::Test {
 
 TEST_F(Batch, GivesEveryLogALine_AndABadOneStopsNoOther) {
   const Outcome o = Run({"--batch", logs().string(), "--robot", "two_link", "--out", Path("verdicts"), "--json",
-                         Path("all.json"), "--report", Path("all.html")});
+                         Path("all.json"), "--report", Path("all.html"), "--db", Path("fleet.sqlite")});
   EXPECT_EQ(o.code, kPartial) << o.err << o.out;
+  const Outcome history = Tool({"history", "offset", "--db", Path("fleet.sqlite"), "--json", Path("history.json")});
+  EXPECT_EQ(history.code, 0) << history.err;
+  EXPECT_EQ(ReadJson(Path("history.json")).at("logs").size(), 1U);
+  EXPECT_EQ(ReadJson(Path("history.json")).at("logs")[0].at("found"), "torque_offset 2");
+  ExpectOneLine(Tool({"history", "alone", "--db", Path("fleet.sqlite")}), kBadInput, "no verdict of the arm alone");
   const nlohmann::json s = ReadJson(Path("all.json"));
   EXPECT_EQ(s.at("failed"), 2);
   EXPECT_EQ(s.at("effect").get<int>() + s.at("none").get<int>(), 3);

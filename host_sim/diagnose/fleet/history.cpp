@@ -1,0 +1,173 @@
+// fleet - reads the verdicts' numbers into courses and looks for steps in them.
+#include "host_sim/diagnose/fleet/history.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/report/page.hpp"
+
+namespace armcal::fleet {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kDeviations = 4, kShare = 0.1, kErrorShare = 0.25;
+const char* const kErrorName = "error of joint ";
+
+bool IsError(const std::string& name) { return name.rfind(kErrorName, 0) == 0; }
+
+class Courses {
+ public:
+  void Add(const std::string& name, const std::string& unit, Point point) {
+    const auto [at, is_new] = number_.try_emplace(name, course_.size());
+    if (is_new) course_.push_back({name, unit, {}});
+    if (std::isfinite(point.value)) course_[at->second].point.push_back(point);
+  }
+  std::vector<Course> course_;
+
+ private:
+  std::map<std::string, std::size_t> number_;
+};
+
+double NumberOf(const ordered_json& j) { return j.is_number() ? j.get<double>() : NAN; }
+
+std::string TermsOf(const ordered_json& verdict) {
+  std::vector<std::string> names;
+  for (const ordered_json& term : verdict.at("terms"))
+    if (term.at("confirmed").get<bool>())
+      names.push_back(fmt::format("{} {}", term.at("record").get<std::string>(),
+                                  fmt::join(term.at("joints").get<std::vector<int>>(), "-")));
+  std::sort(names.begin(), names.end());
+  return fmt::format("{}", fmt::join(names, "; "));
+}
+
+void AddNumbers(const ordered_json& verdict, std::size_t log, Courses& courses) {
+  for (const ordered_json& p : verdict.at("declared_parameters"))
+    courses.Add(p.at("name"), p.at("unit"), {log, NumberOf(p.at("value")), NumberOf(p.at("sd"))});
+  const ordered_json& load = verdict.at("payload");
+  courses.Add("payload", "kg",
+              {log, load.is_object() ? NumberOf(load.at("mass_kg")) : 0,
+               load.is_object() ? NumberOf(load.at("mass_sd_kg")) : 0});
+  const ordered_json& errors = verdict.at("after_moving");
+  for (std::size_t j = 0; j < errors.size(); ++j)
+    courses.Add(kErrorName + std::to_string(j + 1), "N m", {log, NumberOf(errors[j]), 0});
+}
+
+void FindChanges(const Course& course, std::vector<Change>& changes) {
+  std::vector<Point> steady;  // since the last change
+  for (const Point& p : course.point) {
+    double mean = 0, variance = 0, scatter = 0;
+    const auto count = static_cast<double>(steady.size());
+    for (const Point& s : steady) mean += s.value / count, variance += s.sd * s.sd / count;
+    for (const Point& s : steady) scatter += (s.value - mean) * (s.value - mean) / std::max(1.0, count - 1);
+    const double share = IsError(course.name) ? kErrorShare : kShare;
+    const double allowed = std::max(kDeviations * std::sqrt(p.sd * p.sd + variance + scatter), share * std::abs(mean));
+    if (!steady.empty() && std::abs(p.value - mean) > allowed) {
+      changes.push_back({p.log, course.name, course.unit, mean, p.value});
+      steady.clear();
+    }
+    steady.push_back(p);
+  }
+}
+
+std::string Words(const History& history, const Change& c) {
+  const std::string when = history.entry[c.log].date + ": ";
+  if (std::isnan(c.before)) return when + c.name;
+  return when + fmt::format("{} from {:.4g} to {:.4g} {}", c.name, c.before, c.after, c.unit);
+}
+
+}  // namespace
+
+History HistoryOf(const std::vector<Entry>& entries) {
+  History history;
+  Courses courses;
+  for (const Entry& e : entries) {
+    try {
+      const ordered_json verdict = ordered_json::parse(e.json);
+      if (verdict.at("verdict") == "failed") continue;
+      const std::size_t log = history.entry.size();
+      history.terms.push_back(TermsOf(verdict));
+      history.entry.push_back(e);
+      AddNumbers(verdict, log, courses);
+      if (log > 0 && history.terms[log] != history.terms[log - 1])
+        history.change.push_back(
+            {log,
+             "found: " + (history.terms[log].empty() ? "nothing" : history.terms[log]) +
+                 "; before: " + (history.terms[log - 1].empty() ? "nothing" : history.terms[log - 1]),
+             "", NAN, NAN});
+    } catch (const nlohmann::json::exception&) {
+      throw io::InputError(e.arm + ", " + e.date + ": expected a verdict of this version: diagnose anew");
+    }
+  }
+  history.course = std::move(courses.course_);
+  for (const Course& course : history.course) FindChanges(course, history.change);
+  std::stable_sort(history.change.begin(), history.change.end(),
+                   [](const Change& a, const Change& b) { return a.log < b.log; });
+  return history;
+}
+
+std::string HistoryText(const History& history) {
+  report::Table t{{"date", "payload kg", "found"}, {}};
+  for (std::size_t log = 0; log < history.entry.size(); ++log) {
+    double payload = 0;
+    for (const Course& c : history.course)
+      for (const Point& p : c.point)
+        if (c.name == "payload" && p.log == log) payload = p.value;
+    t.rows.push_back({history.entry[log].date, payload == 0 ? "-" : fmt::format("{:.3g}", payload),
+                      history.terms[log].empty() ? "nothing" : history.terms[log]});
+  }
+  std::string text = report::Text(t);
+  text += history.change.empty() ? "nothing changed\n" : "changed:\n";
+  for (const Change& c : history.change) text += "  " + Words(history, c) + "\n";
+  return text;
+}
+
+ordered_json HistoryJson(const History& history) {
+  ordered_json json{
+      {"logs", ordered_json::array()}, {"courses", ordered_json::array()}, {"changes", ordered_json::array()}};
+  for (std::size_t log = 0; log < history.entry.size(); ++log)
+    json["logs"].push_back(
+        {{"date", history.entry[log].date}, {"log", history.entry[log].log}, {"found", history.terms[log]}});
+  for (const Course& c : history.course) {
+    ordered_json& course = json["courses"].emplace_back(ordered_json{{"name", c.name}, {"unit", c.unit}});
+    for (const Point& p : c.point) course["points"].push_back({{"log", p.log}, {"value", p.value}, {"sd", p.sd}});
+  }
+  for (const Change& c : history.change) {
+    ordered_json& change = json["changes"].emplace_back(
+        ordered_json{{"log", c.log}, {"date", history.entry[c.log].date}, {"what", c.name}});
+    if (!std::isnan(c.before)) change["unit"] = c.unit, change["before"] = c.before, change["after"] = c.after;
+  }
+  return json;
+}
+
+void WriteHistoryPage(const std::filesystem::path& path, const std::string& arm, const History& history) {
+  report::Page page("History of " + arm, fmt::format("{} logs, {} to {}.", history.entry.size(),
+                                                     history.entry.front().date, history.entry.back().date));
+  std::vector<std::string> lines;
+  for (const Change& c : history.change) lines.push_back(Words(history, c));
+  if (lines.empty()) page.Box(report::Tone::kGood, "Nothing changed");
+  else page.Box(report::Tone::kWarning, "What changed", lines);
+  page.Section("Course of each quantity");
+  std::vector<report::Plot> plots;
+  for (const Course& c : history.course) {
+    report::Series series;
+    for (const Point& p : c.point) series.x.push_back(static_cast<double>(p.log) + 1), series.y.push_back(p.value);
+    report::Plot plot{{c.name, "log", c.unit.empty() ? c.name : c.unit, 320}, {}};
+    plot.series = {series};
+    plots.push_back(plot);
+  }
+  page.AddGrid(plots, "Each point is one log, in the order of their dates.");
+  report::Table t{{"log", "date", "found"}, {}};
+  for (std::size_t log = 0; log < history.entry.size(); ++log)
+    t.rows.push_back({std::to_string(log + 1), history.entry[log].date,
+                      history.terms[log].empty() ? "nothing" : history.terms[log]});
+  page.Section("Logs");
+  page.Add(t);
+  page.Write(path);
+}
+
+}  // namespace armcal::fleet

@@ -1,0 +1,121 @@
+// fleet - one transaction for each call; SQLite's rollback journal undoes what a killed process left. No write-ahead
+// log: it does not work over a network's file system, where a cluster's jobs meet.
+#include "host_sim/diagnose/fleet/store.hpp"
+
+#include <sqlite3.h>
+
+#include <memory>
+
+#include "codegen/src/io/require_file.hpp"
+
+namespace armcal::fleet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPatience_ms = 60000;       // for other writers
+constexpr int kApplication = 0x61726D63;  // "armc": says whose database it is
+constexpr int kLayout = 1;
+
+struct CloseStore {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+};
+struct EndQuery {
+  void operator()(sqlite3_stmt* query) const { sqlite3_finalize(query); }
+};
+
+class Store {
+ public:
+  Store(const fs::path& path, int access) : path_(path) {
+    sqlite3* made = nullptr;
+    const int code = sqlite3_open_v2(path.c_str(), &made, access, nullptr);
+    database_.reset(made);
+    if (code != SQLITE_OK) Fail();
+    sqlite3_busy_timeout(made, kPatience_ms);
+  }
+
+  // Calls row(query) for each row of the answer.
+  template <class Row>
+  void Ask(const std::string& question, const std::vector<std::string>& values, Row row) {
+    sqlite3_stmt* made = nullptr;
+    if (sqlite3_prepare_v2(database_.get(), question.c_str(), -1, &made, nullptr) != SQLITE_OK) Fail();
+    const std::unique_ptr<sqlite3_stmt, EndQuery> query(made);
+    for (std::size_t k = 0; k < values.size(); ++k)
+      sqlite3_bind_text(made, static_cast<int>(k) + 1, values[k].c_str(), static_cast<int>(values[k].size()),
+                        SQLITE_TRANSIENT);
+    int code = SQLITE_ROW;
+    while ((code = sqlite3_step(made)) == SQLITE_ROW) row(made);
+    if (code != SQLITE_DONE) Fail();
+  }
+  void Do(const std::string& command, const std::vector<std::string>& values = {}) {
+    Ask(command, values, [](sqlite3_stmt*) {});
+  }
+  int Number(const std::string& question) {
+    int number = 0;
+    Ask(question, {}, [&](sqlite3_stmt* row) { number = sqlite3_column_int(row, 0); });
+    return number;
+  }
+  // Ours, or still empty.
+  void Check() {
+    const bool empty = Number("SELECT count(*) FROM sqlite_master") == 0;
+    if (!empty && (Number("PRAGMA application_id") != kApplication || Number("PRAGMA user_version") != kLayout))
+      throw io::InputError(path_.string() + ": is no database of armcal, expected one that armcal diagnose --db made");
+  }
+
+ private:
+  [[noreturn]] void Fail() const {
+    throw io::InputError(path_.string() + ": " + sqlite3_errmsg(database_.get()) +
+                         "; expected a database that armcal diagnose --db made");
+  }
+
+  fs::path path_;
+  std::unique_ptr<sqlite3, CloseStore> database_;
+};
+
+Store Opened(const fs::path& path) {
+  io::RequireFile(path);
+  Store store(path, SQLITE_OPEN_READWRITE);  // reading may have to undo what a killed writer left
+  store.Check();
+  return store;
+}
+
+std::string TextOf(sqlite3_stmt* row, int column) {
+  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
+  return text ? std::string(text, static_cast<std::size_t>(sqlite3_column_bytes(row, column))) : std::string();
+}
+
+}  // namespace
+
+void Keep(const fs::path& database, const std::vector<Entry>& entries) {
+  Store store(database, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+  store.Do("BEGIN IMMEDIATE");
+  store.Check();
+  store.Do("PRAGMA application_id = " + std::to_string(kApplication));
+  store.Do("PRAGMA user_version = " + std::to_string(kLayout));
+  store.Do(
+      "CREATE TABLE IF NOT EXISTS verdict (arm TEXT NOT NULL, date TEXT NOT NULL, log TEXT NOT NULL, json TEXT NOT "
+      "NULL, "
+      "PRIMARY KEY (arm, log))");
+  for (const Entry& e : entries)
+    store.Do("INSERT OR REPLACE INTO verdict (arm, date, log, json) VALUES (?, ?, ?, ?)",
+             {e.arm, e.date, e.log, e.json});
+  store.Do("COMMIT");
+}
+
+std::vector<Entry> EntriesOf(const fs::path& database, const std::string& arm) {
+  std::vector<Entry> entries;
+  Opened(database).Ask("SELECT arm, date, log, json FROM verdict WHERE arm = ? ORDER BY date, log", {arm},
+                       [&](sqlite3_stmt* row) {
+                         entries.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), TextOf(row, 3)});
+                       });
+  return entries;
+}
+
+std::vector<std::string> ArmsOf(const fs::path& database) {
+  std::vector<std::string> arms;
+  Opened(database).Ask("SELECT DISTINCT arm FROM verdict ORDER BY arm", {},
+                       [&](sqlite3_stmt* row) { arms.push_back(TextOf(row, 0)); });
+  return arms;
+}
+
+}  // namespace armcal::fleet

@@ -175,9 +175,10 @@ std::vector<Form> FlangeForms() {
            });
          };
        }},
-      {"hose_to_flange", false, false,  // a spring that pulls the flange to a point of the cell
+      {"hose_to_flange", true, false,  // a spring that pulls the flange to a point of the cell
        [](const Arm& a, Random& r, Effect& e) {
-         AtFlange(e, {}, {"q1", "q2", "q3", "q4", "q5", "q6"});
+         AtFlange(e, {"flange_hose"}, {"q1", "q2", "q3", "q4", "q5", "q6"});
+         e.held_by_a_record = true;
          double reach = 0;
          for (const plant::JointData& d : a.robot.joint) reach += std::abs(d.a_m) + std::abs(d.d_m);
          const KDL::Vector point = Direction(r) * (0.5 * reach) + KDL::Vector(0, 0, 0.8 * reach);

@@ -29,6 +29,16 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
       const Expr gravity = part_[static_cast<std::size_t>(joints_ + i)].value;
       keep({Quantity::kGravityStiffness, i, j}, Derivative(gravity, graph_.Input({Quantity::kPosition, j})));
     }
+  const Flange flange = FlangeOf(graph_, robot);
+  const auto with_slopes = [&](const std::array<Expr, 3>& v, Quantity itself, Quantity slope) {
+    for (int axis = 0; axis < 3; ++axis) {
+      keep({itself, 0, 0, axis}, v[axis]);
+      for (int i = 0; i < joints_; ++i)
+        keep({slope, i, 0, axis}, Derivative(v[axis], graph_.Input({Quantity::kPosition, i})));
+    }
+  };
+  with_slopes(flange.position, Quantity::kFlangePosition, Quantity::kFlangeJacobian);
+  with_slopes(flange.approach, Quantity::kApproach, Quantity::kApproachSlope);
 }
 
 std::set<InputId> ArmTorque::parts() const {
@@ -51,6 +61,8 @@ void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const s
   out.rigid.resize(samples, n), out.gravity.resize(samples, n);
   out.mass.resize(n, std::vector<Eigen::VectorXd>(n)), out.tilt.resize(n, std::vector<Eigen::VectorXd>(3));
   out.stiffness.resize(n, std::vector<Eigen::VectorXd>(n));
+  out.flange.resize(3), out.jacobian.resize(n, std::vector<Eigen::VectorXd>(3));
+  out.approach.resize(3), out.approach_slope.resize(n, std::vector<Eigen::VectorXd>(3));
   std::vector<double*> place;
   for (int i = 0; i < n; ++i) place.push_back(out.rigid.col(i).data());
   for (int i = 0; i < n; ++i) place.push_back(out.gravity.col(i).data());
@@ -64,6 +76,12 @@ void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const s
     for (int i = 0; i < n; ++i) entry(out.tilt[i][axis]);
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) entry(out.stiffness[i][j]);
+  for (const auto& [itself, slope] :
+       {std::pair{&out.flange, &out.jacobian}, std::pair{&out.approach, &out.approach_slope}})
+    for (int axis = 0; axis < 3; ++axis) {
+      entry((*itself)[axis]);
+      for (int i = 0; i < n; ++i) entry((*slope)[i][axis]);
+    }
   std::vector<Expr> roots;
   std::vector<double*> target;
   for (std::size_t k = 0; k < part_.size(); ++k)

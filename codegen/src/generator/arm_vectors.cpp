@@ -72,6 +72,13 @@ Vec ArmVectors::Inward(int half, const Vec& v) const {
   return {v[0], m.ca * v[1] - m.sa * v[2], m.ca * v[2] + m.sa * v[1]};
 }
 
+Vec ArmVectors::PointOnFlange(double along_m) const {
+  const Expr none = graph_.Constant(0);
+  Vec at{none, none, graph_.Constant(along_m)};
+  for (int j = robot_.joints() - 1; j >= 0; --j) at = p_[j] + Inward(2 * j, Inward(2 * j + 1, at));
+  return at;
+}
+
 ArmVectors::Vector* ArmVectors::Make(const std::string& name, int half, const Vec& components) {
   Vector* v = Make(name);
   v->in[half] = components;

@@ -30,6 +30,9 @@ class ArmVectors {
   // 2i..2j+1.
   Expr Torque(int i, int j, int parameter, const std::array<int, FrameChoice::kParts>& axes);
 
+  // A point on the last link's z axis, this far from its origin, seen from the base.
+  Vec PointOnFlange(double along_m) const;
+
  private:
   struct Vector {
     std::string name;       // for the temporaries: name + axes + "xyz"

@@ -1,6 +1,7 @@
 // generator - makes M, V and G from the body rows at chosen speeds and accelerations.
 #include "codegen/src/generator/dynamics.hpp"
 
+#include "codegen/src/generator/arm_vectors.hpp"
 #include "codegen/src/generator/derivative.hpp"
 
 namespace armcal::codegen {
@@ -43,6 +44,19 @@ Expr LoadTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_col
 
 BodyRows AccelerationRows(Graph& g, const Robot& robot, int joint) {
   return At(g, At(g, BodyRegressor(g, Weightless(robot)), Quantity::kSpeed, -1), Quantity::kAcceleration, joint);
+}
+
+Flange FlangeOf(Graph& g, const Robot& robot) {
+  const ArmVectors arm(g, robot, false, LocalFrames(robot));
+  const auto at_base = [&](const Vec& v, int axis) {  // the robot file's base, not the first joint's
+    const double* const row = robot.base_rotation.data() + 3 * axis;
+    return row[0] * v[0] + row[1] * v[1] + row[2] * v[2] + g.Constant(robot.base_xyz_m[axis]);
+  };
+  const Vec here = arm.PointOnFlange(0), there = arm.PointOnFlange(1);
+  Flange out;
+  for (int axis = 0; axis < 3; ++axis)
+    out.position[axis] = at_base(here, axis), out.approach[axis] = at_base(there, axis) - out.position[axis];
+  return out;
 }
 
 Dynamics MakeDynamics(Graph& g, const Robot& robot, const std::vector<int>& base_columns) {

@@ -25,4 +25,10 @@ Expr LoadTorque(Graph& graph, const BodyRows& rows, const std::vector<int>& base
 // M.
 BodyRows AccelerationRows(Graph& graph, const Robot& robot, int joint);
 
+// The last link's frame seen from the base.
+struct Flange {
+  std::array<Expr, 3> position, approach;  // m; direction of its z axis
+};
+Flange FlangeOf(Graph& graph, const Robot& robot);
+
 }  // namespace armcal::codegen

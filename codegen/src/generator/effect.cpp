@@ -172,9 +172,10 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
   r.needs = in.Texts("needs");
   if (in.Has("search")) {
     const io::TomlReader s = in.Table("search");
-    s.AllowOnly({"how", "signal", "grid", "minimum_s", "after", "at_turns"});
+    s.AllowOnly({"how", "signal", "second", "grid", "minimum_s", "after", "at_turns"});
     r.search.how = static_cast<SearchWay>(ReadChoice(s, "how", s.Text("how"), kSearchWords));
     r.search.signal = s.Text("signal", "");
+    r.search.second = s.Text("second", "");
     r.search.grid = static_cast<int>(s.Number("grid", 10));
     r.search.minimum_s = s.Number("minimum_s", 0);
     r.search.after = s.Text("after", "");

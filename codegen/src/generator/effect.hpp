@@ -52,6 +52,7 @@ struct Apply {
 struct Search {
   SearchWay how = SearchWay::kLinear;
   std::string signal;     // spectral, spline: over which signal
+  std::string second;     // spline: over this one, too
   int grid = 10;          // profile: points per nonlinear parameter
   double minimum_s = 0;   // onset: shortest stretch
   std::string after;      // a simpler record: tried only where that one finds something on the same joints

@@ -13,8 +13,20 @@
 namespace armcal::codegen {
 namespace {
 
-// Constants of one joint that records may use.
-bool RobotConstant(const Joint& j, const std::string& name, double& value) {
+// How far from its base the arm gets at most, m.
+double ReachOf(const Robot& robot) {
+  double sum = 0;
+  for (const Joint& j : robot.joint) {
+    sum += std::abs(j.kinematics.a_m) + std::abs(j.kinematics.d_m);
+    if (j.kinematics.type == JointType::kPrismatic)
+      sum += std::max(std::abs(j.position_limit_rad[0]), std::abs(j.position_limit_rad[1]));
+  }
+  return sum;
+}
+
+// Constants of the arm or of one joint that records may use.
+bool RobotConstant(const Robot& robot, int joint, const std::string& name, double& value) {
+  const Joint& j = robot.joint[static_cast<std::size_t>(joint)];
   const double range[] = {j.position_limit_rad[0], j.position_limit_rad[1]};
   if (name == "torque_limit") value = j.torque_limit_Nm;
   else if (name == "torque_noise") value = j.torque_noise_Nm;
@@ -23,6 +35,7 @@ bool RobotConstant(const Joint& j, const std::string& name, double& value) {
   else if (name == "position_lower") value = range[0];
   else if (name == "position_upper") value = range[1];
   else if (name == "v_min") value = j.v_min_radps;
+  else if (name == "reach") value = ReachOf(robot);
   else if (name == "pi") value = 3.14159265358979323846;
   else return false;
   return true;
@@ -84,8 +97,15 @@ class Names {
     int joint = 0;
     if (!JointOf(indices, joint)) return false;
     double constant = 0;
-    if (RobotConstant(robot_.joint[joint], name, constant)) return value = g_.Constant(constant), true;
+    if (RobotConstant(robot_, joint, name, constant)) return value = g_.Constant(constant), true;
     return false;
+  }
+  // Text of an index: "i" is that of an array parameter.
+  const std::string& OrIndex(const std::string& text) const { return text == "i" ? index : text; }
+  static bool AxisOf(const std::string& text, int& axis) {
+    const auto at = std::string("xyz").find(text);
+    if (text.size() != 1 || at == std::string::npos) return false;
+    return axis = static_cast<int>(at), true;
   }
   bool ReadQuantity(const QuantityInfo& info, const std::vector<std::string>& indices, Expr& value) {
     if (info.sensor_only && record_.effect_class != EffectClass::kSensor) return false;
@@ -99,7 +119,7 @@ class Names {
         break;
       case Indexing::kBody: {  // Y[flange, mx], Y[3, m], or Y[flange, i] with a parameter's name as the array index
         if (indices.size() != 2) return false;
-        const std::string& name = indices[1] == "i" ? index : indices[1];
+        const std::string& name = OrIndex(indices[1]);
         const auto at = std::find(std::begin(kBodyParameterName), std::end(kBodyParameterName), name);
         id.row = row;
         id.body = indices[0] == "flange" ? robot_.joints() - 1 : std::atoi(indices[0].c_str()) - 1;
@@ -110,13 +130,13 @@ class Names {
       case Indexing::kRowJoint:
         if (indices.size() != 2 || !JointOf({indices[0]}, id.row) || !JointOf({indices[1]}, id.body)) return false;
         break;
-      case Indexing::kRowAxis: {
-        if (indices.size() != 2 || indices[1].size() != 1 || !JointOf({indices[0]}, id.row)) return false;
-        const auto axis = std::string("xyz").find(indices[1]);
-        if (axis == std::string::npos) return false;
-        id.parameter = static_cast<int>(axis);
+      case Indexing::kRowAxis:
+        if (indices.size() != 2 || !JointOf({indices[0]}, id.row) || !AxisOf(OrIndex(indices[1]), id.parameter))
+          return false;
         break;
-      }
+      case Indexing::kAxis:
+        if (indices.size() != 1 || !AxisOf(OrIndex(indices[0]), id.parameter)) return false;
+        break;
     }
     value = quantities_(id);
     return true;
@@ -134,7 +154,7 @@ double ConstantValue(Graph& g, const std::string& text, const Robot& robot, cons
   const int joint = joints.empty() ? robot.joints() - 1 : joints[0];
   const Scope scope{[&](const std::string& name, const std::vector<std::string>& indices, Expr& value) {
                       double constant = 0;
-                      if (!indices.empty() || !RobotConstant(robot.joint[joint], name, constant)) return false;
+                      if (!indices.empty() || !RobotConstant(robot, joint, name, constant)) return false;
                       return value = g.Constant(constant), true;
                     },
                     [&](Expr x) { return g.Unary(Op::kSign, x); }};

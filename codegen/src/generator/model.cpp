@@ -87,6 +87,14 @@ Expr Model::QuantityOf(const InputId& id) {
       return CommittedTorque(TiltedRows(id.parameter), id.row);
     case Quantity::kGravityStiffness:
       return Derivative(CommittedTorque(gravity_rows_, id.row), graph_->Input({Quantity::kPosition, id.body}));
+    case Quantity::kFlangePosition:
+      return FlangeOf(*graph_, robot_).position[id.parameter];
+    case Quantity::kFlangeJacobian:
+      return Derivative(FlangeOf(*graph_, robot_).position[id.parameter], graph_->Input({Quantity::kPosition, id.row}));
+    case Quantity::kApproach:
+      return FlangeOf(*graph_, robot_).approach[id.parameter];
+    case Quantity::kApproachSlope:
+      return Derivative(FlangeOf(*graph_, robot_).approach[id.parameter], graph_->Input({Quantity::kPosition, id.row}));
     case Quantity::kModelTorque:
     case Quantity::kDelayedTorque:
       throw io::InputError(robot_.path + ": effect: a sensor record acts on the measurement, not on the torque");

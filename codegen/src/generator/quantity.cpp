@@ -26,6 +26,14 @@ constexpr QuantityInfo kTable[] = {
      "torque of the row per unit of gravity along x, y or z of the base"},
     {Quantity::kGravityStiffness, "dgravity_dq", "dgravity_dq", Indexing::kRowJoint, true, false, "N*m/rad",
      "gravity's torque of the row per unit of a joint's position"},
+    {Quantity::kFlangePosition, "flange", "flange", Indexing::kAxis, false, false, "m",
+     "where the last link's frame stands, along x, y or z of the base"},
+    {Quantity::kFlangeJacobian, "J", "J", Indexing::kRowAxis, false, false, "m/rad",
+     "its slope over the position of the row's joint"},
+    {Quantity::kApproach, "approach", "approach", Indexing::kAxis, false, false, "1",
+     "direction of the last link's z axis, along x, y or z of the base"},
+    {Quantity::kApproachSlope, "dapproach_dq", "dapproach_dq", Indexing::kRowAxis, false, false, "1/rad",
+     "its slope over the position of the row's joint"},
     {Quantity::kModelTorque, "tau_model", "tau_model", Indexing::kJoint, true, true, "N*m or N",
      "torque of the whole model"},
     {Quantity::kDelayedTorque, "tau_delayed", "tau_delayed", Indexing::kJoint, true, true, "N*m or N",
@@ -70,6 +78,8 @@ std::string NameOf(const InputId& input) {
       return std::string(info->word) + "[" + number(input.row) + ", " + number(input.body) + "]";
     case Indexing::kRowAxis:
       return std::string(info->word) + "[" + number(input.row) + ", " + "xyz"[input.parameter] + "]";
+    case Indexing::kAxis:
+      return std::string(info->word) + "[" + "xyz"[input.parameter] + "]";
   }
   return info->word;
 }

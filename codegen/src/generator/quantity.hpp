@@ -26,6 +26,11 @@ enum class Quantity : std::uint8_t {
   kMassMatrix,
   kGravitySlope,
   kGravityStiffness,
+  // of the kinematics
+  kFlangePosition,
+  kFlangeJacobian,
+  kApproach,
+  kApproachSlope,
   // what a sensor record acts on
   kModelTorque,
   kDelayedTorque,
@@ -40,7 +45,7 @@ struct InputId {
   Quantity quantity;
   int row = 0;        // the joint, or the row of a matrix
   int body = 0;       // kBodyColumn: the body; kMassMatrix, kGravityStiffness: the column
-  int parameter = 0;  // kBodyColumn: of the body's ten; kGravitySlope: axis 0 to 2
+  int parameter = 0;  // kBodyColumn: of the body's ten; kGravitySlope and the flange's: axis 0 to 2
   std::string symbol = {};
 
   friend auto operator<=>(const InputId&, const InputId&) = default;
@@ -55,6 +60,7 @@ enum class Indexing : std::uint8_t {
   kBody,      // Y[flange, mx], Y[3, m], Y[3, i]
   kRowJoint,  // M[r, j]
   kRowAxis,   // dtau_dg[r, x]
+  kAxis,      // flange[x]
 };
 
 struct QuantityInfo {

@@ -93,6 +93,14 @@ const double* ColumnOf(const Quantities& quantities, const Eigen::MatrixXd& dela
       return quantities.parts.tilt[input.row][input.parameter].data();
     case codegen::Quantity::kGravityStiffness:
       return quantities.parts.stiffness[input.row][input.body].data();
+    case codegen::Quantity::kFlangePosition:
+      return quantities.parts.flange[input.parameter].data();
+    case codegen::Quantity::kFlangeJacobian:
+      return quantities.parts.jacobian[input.row][input.parameter].data();
+    case codegen::Quantity::kApproach:
+      return quantities.parts.approach[input.parameter].data();
+    case codegen::Quantity::kApproachSlope:
+      return quantities.parts.approach_slope[input.row][input.parameter].data();
     case codegen::Quantity::kModelTorque:
       return joint(quantities.tau_model);
     case codegen::Quantity::kDelayedTorque:

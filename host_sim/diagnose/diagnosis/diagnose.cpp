@@ -317,7 +317,7 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
     if (gained >= kShows) continue;
     const Share trained = ShareOf(w, *c, amplitude.at(&*c), w.train),
                 shown = ShareOf(w, *c, amplitude.at(&*c), {&seen});
-    const double promised = GainOf(c->found) * std::min(shown.square / trained.square, shown.rows / trained.rows);
+    const double promised = c->found.rated * std::min(shown.square / trained.square, shown.rows / trained.rows);
     if (gained < kOfThePromise * promised) {
       c->unconfirmed =
           fmt::format("the held-out log gains {:.0f} by it, where {:.0f} was to be expected from the training logs",

@@ -53,12 +53,16 @@ Quantities PickSamples(const Quantities& q, int every, calibration::Dataset& dat
   out.data = &data;
   if (every == 1) out.dt = q.dt, out.restart = q.restart;
   out.parts.rigid = PickRows(q.parts.rigid, every), out.parts.gravity = PickRows(q.parts.gravity, every);
-  for (const auto& [from, to] : {std::pair{&q.parts.mass, &out.parts.mass}, std::pair{&q.parts.tilt, &out.parts.tilt},
-                                 std::pair{&q.parts.stiffness, &out.parts.stiffness}})
+  for (const auto& [from, to] :
+       {std::pair{&q.parts.mass, &out.parts.mass}, std::pair{&q.parts.tilt, &out.parts.tilt},
+        std::pair{&q.parts.stiffness, &out.parts.stiffness}, std::pair{&q.parts.jacobian, &out.parts.jacobian},
+        std::pair{&q.parts.approach_slope, &out.parts.approach_slope}})
     for (const auto& row : *from) {
       to->emplace_back();
       for (const VectorXd& v : row) to->back().push_back(PickRows(v, every));
     }
+  for (const VectorXd& v : q.parts.flange) out.parts.flange.push_back(PickRows(v, every));
+  for (const VectorXd& v : q.parts.approach) out.parts.approach.push_back(PickRows(v, every));
   out.tau_model = PickRows(q.tau_model, every);
   for (const auto& [body, rows] : q.body)
     for (const MatrixXd& m : rows) out.body[body].push_back(PickRows(m, every));

@@ -18,13 +18,14 @@ constexpr double kTried = 10;     // members of a usual grid
 constexpr double kUnseen = 1e-4;  // of a column's own square: so little beside the declared model is rounding
 
 // What a term must gain to be accepted.
-double Needed(Candidate& c, const std::vector<double>& eta) {
+double Needed(Candidate& c, const std::vector<double>& eta, const Evidence& evidence) {
   Found f;
   f.candidate = &c;
   f.tried = c.unknowns().empty() ? 1 : kTried;
   f.gain.rank = c.columns(eta);
   f.searched = static_cast<int>(c.unknowns().size());
-  return std::max(GainOfChance(f, kLogRare), -Score(f, 0));
+  f.penalty = PenaltyOf(f.gain.rank + f.searched, c, evidence);
+  return std::max(GainOfChance(f, kLogRare), GainOfScore(f));
 }
 
 }  // namespace
@@ -66,7 +67,7 @@ std::vector<Limit> DetectionLimits(Diagnosis::Work& w) {
       const auto at = static_cast<std::size_t>(largest);
       const double own = w.rows.index[at].size() * std::pow(size / noise[at].innovation, 2);
       if (!(seen > kUnseen * own)) continue;
-      const double rms = size * std::sqrt(Needed(*c, eta) / seen);
+      const double rms = size * std::sqrt(Needed(*c, eta, w.evidence) / seen);
       if (rms < limit.rms_Nm) limit.rms_Nm = rms, limit.joint = largest;
     }
     out.push_back(limit);

@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 namespace {
 constexpr int kSweeps = 4;                           // of a pattern search at one step size
 constexpr double kWorthAStep = 0.3;                  // of chi^2: less is below what noise moves it by
+constexpr int kOnAGrid = 3;                          // unknowns at most; further ones start at their initial value
 constexpr int kClimbs = 12;                          // along a valley, at most
 constexpr double kLongest = 0.2, kSlopeStep = 1e-3;  // of an unknown's range
 }  // namespace
@@ -54,8 +55,7 @@ Found Searcher::Scored() const {
   f.penalty = PenaltyOf(f.gain.rank + f.searched, c_, e_);
   if (f.gain.gain > 0 && c_.record().search.how == codegen::SearchWay::kSpline)
     f.penalty = f.gain.gain - metric().CurveEvidence(seen_, &f.precision);
-  f.score = Score(f, f.gain.gain);
-  f.log_chance = LogChance(f, f.gain.gain);
+  Rate(f, f.gain.gain);
   return f;
 }
 
@@ -166,6 +166,7 @@ void Searcher::Profile() {
   const int count = static_cast<int>(c_.unknowns().size());
   std::vector<int> points(count, 4);
   points[0] = c_.record().search.grid;
+  for (int k = kOnAGrid; k < count; ++k) points[k] = 1;
   best_.searched = count;
   best_.tried = 1;
   for (const int p : points) best_.tried *= p;
@@ -180,7 +181,7 @@ void Searcher::Profile() {
     if (k == count) return void(tried.emplace_back(Try(eta).gain, eta));
     if (known[k]) return visit(k + 1);
     for (int i = 0; i < points[k]; ++i) {
-      eta[k] = FromUnit(k, points[k] > 1 ? static_cast<double>(i) / (points[k] - 1) : 0.5);
+      eta[k] = points[k] > 1 ? FromUnit(k, static_cast<double>(i) / (points[k] - 1)) : c_.unknowns()[k].initial;
       visit(k + 1);
     }
   };
@@ -191,7 +192,8 @@ void Searcher::Profile() {
   Consider(Refine(tried[0].second, GridStep(), c_.delay() >= 0 ? 7 : 2, gain));
   if (!Promising()) return;
   Consider(Climb(best_.eta));
-  if (tried.size() > 1) Consider(Climb(tried[1].second));
+  const std::size_t starts = count > kOnAGrid ? 6 : 2;
+  for (std::size_t k = 1; k < std::min(starts, tried.size()); ++k) Consider(Climb(tried[k].second));
 }
 
 double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evidence) {
@@ -200,11 +202,34 @@ double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evi
   return parameters * std::log(std::max(2, rows));
 }
 
-double Score(const Found& found, double gain) {
-  return gain - found.penalty - 2 * std::log(found.tried) - found.candidate->record().generic_penalty;
+double PriceOf(const Found& found, double gain) {
+  const int parameters = found.gain.rank + found.searched;
+  if (found.candidate->record().search.how == codegen::SearchWay::kSpline || parameters == 0) return found.penalty;
+  return std::min(found.penalty, parameters * std::max(1.0, std::log(std::max(gain, 1e-300) / parameters)));
 }
 
-double GainOf(const Found& found) { return found.score - Score(found, 0); }
+double Score(const Found& found, double gain) {
+  return gain - PriceOf(found, gain) - 2 * std::log(found.tried) - found.candidate->record().generic_penalty;
+}
+
+namespace {
+// The smallest gain that is enough.
+template <class IsEnough>
+double LeastGain(const IsEnough& enough) {
+  double low = 0, high = 1;
+  while (!enough(high)) low = high, high *= 2;
+  for (int k = 0; k < 40; ++k) (enough(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
+  return high;
+}
+}  // namespace
+
+double GainOfScore(const Found& found) {
+  return LeastGain([&](double gain) { return Score(found, gain) > 0; });
+}
+
+void Rate(Found& found, double gain) {
+  found.rated = gain, found.score = Score(found, gain), found.log_chance = LogChance(found, gain);
+}
 
 double LogUpperTail(int degrees, double x) {
   const double half = 0.5 * x;
@@ -226,13 +251,7 @@ double LogChance(const Found& found, double gain) {
 }
 
 double GainOfChance(const Found& found, double log_chance) {
-  double low = 0, high = 1;
-  while (LogChance(found, high) > log_chance) low = high, high *= 2;
-  for (int k = 0; k < 40; ++k) {
-    const double middle = 0.5 * (low + high);
-    (LogChance(found, middle) > log_chance ? low : high) = middle;
-  }
-  return high;
+  return LeastGain([&](double gain) { return LogChance(found, gain) <= log_chance; });
 }
 
 Found SearchCandidate(Candidate& candidate, const Ground& ground, const Found* simpler) {

@@ -25,20 +25,27 @@ struct Found {
   int searched = 0;           // unknowns that were searched; they count as parameters
   bool rough = false;         // the gain of all rows is estimated from the thinned ones
   Eigen::MatrixXd precision;  // of a curve's coefficients; empty for others
-  double penalty = 0;         // what so many parameters gain by chance, and more
+  double penalty = 0;         // what its parameters cost; at most, if it is no curve
+  double rated = 0;           // the gain that score and chance stand for
   double score = 0;
-  double log_chance = 0;  // of the gain that the score stands for
+  double log_chance = 0;
 };
 
-// gain - penalty - 2 ln(tried) - the record's own penalty.
+// What its parameters cost. Of k parameters each costs ln(gain / k), as under a prior whose width makes the gain the
+// likeliest (local empirical Bayes), at least 1, and at most ln(rows). With ln(rows) alone a true term of three
+// parameters that gains 40 loses to an untrue one of one parameter that gains 23.
+double PriceOf(const Found& found, double gain);
+// gain - price - 2 ln(tried) - the record's own penalty.
 double Score(const Found& found, double gain);
-// The gain that its score stands for.
-double GainOf(const Found& found);
+// The gain whose score is zero.
+double GainOfScore(const Found& found);
 // Natural logarithm of the chance that noise alone gains so much, at most, wherever a search of this kind looks. Of a
 // curve it is the odds against it: its coefficients are averaged over, not fitted.
 double LogChance(const Found& found, double gain);
 // The gain that has such a chance.
 double GainOfChance(const Found& found, double log_chance);
+// Takes this as its gain.
+void Rate(Found& found, double gain);
 // ln P(chi^2 > x) for so many degrees of freedom.
 double LogUpperTail(int degrees, double x);
 // parameters ln(rows), as the Bayesian information criterion has it.

@@ -9,6 +9,7 @@
 
 namespace armcal::diagnosis {
 
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -17,6 +18,8 @@ namespace {
 constexpr double kWorthATry = 0.6;
 constexpr int kCells = 64, kKnots = 8;  // of a signal's range; of a spline, as its record has them
 constexpr int kNarrowest = kCells / 8;  // one cell a knot
+constexpr int kSurfaceCells = 8;        // of each of two signals
+constexpr double kWorthASurface = 1.5;  // times what chance gains
 
 // The part of a signal's range, in cells [first, last), over which a step function of kKnots values explains most.
 std::pair<int, int> WidestGain(const VectorXd& product, const VectorXd& square) {
@@ -87,9 +90,34 @@ void Searcher::Spectral() {
     }
 }
 
+// Knots over all that was seen of both signals.
+void Searcher::Surface() {
+  const VectorXd first = OwnSignal(c_, e_, c_.record().search.signal),
+                 second = OwnSignal(c_, e_, c_.record().search.second);
+  if (first.size() == 0) return;
+  const double ends[] = {first.minCoeff(), first.maxCoeff(), second.minCoeff(), second.maxCoeff()};
+  if (ends[1] <= ends[0] || ends[3] <= ends[2]) return;
+  // Few pairs of joints show anything, and steps over a coarse grid tell which.
+  const int row = c_.rows()[0];
+  const VectorXd& residual = metric().Residual(row);
+  MatrixXd sum = MatrixXd::Zero(kSurfaceCells, kSurfaceCells), count = sum;
+  const auto cell = [](double at, double lo, double hi) {
+    return std::min(kSurfaceCells - 1, static_cast<int>((at - lo) / (hi - lo) * kSurfaceCells));
+  };
+  for (int i = 0; i < residual.size(); ++i) {
+    const int at = g_.thinned.kept[row][i], a = cell(first[at], ends[0], ends[1]),
+              b = cell(second[at], ends[2], ends[3]);
+    sum(a, b) += residual[i], count(a, b) += 1;
+  }
+  const double gain = (sum.array().square() / count.array().max(1)).sum();
+  if (gain > kWorthASurface * static_cast<double>((count.array() > 0).count()))
+    Consider({ends[0], ends[1], ends[2], ends[3]});
+}
+
 // Knots over the range that was seen, or over that part of it where the torque changes most; clamped outside, so that
 // the term cannot extrapolate.
 void Searcher::Spline() {
+  if (!c_.record().search.second.empty()) return Surface();
   const std::string& name = c_.record().search.signal;
   const VectorXd signal = OwnSignal(c_, e_, name);
   if (signal.size() == 0 || signal.maxCoeff() - signal.minCoeff() <= 0) return;

@@ -1,11 +1,13 @@
 // diagnosis - searches over the time of a run: one long window, or several short ones.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "host_sim/diagnose/diagnosis/searcher.hpp"
 
 namespace armcal::diagnosis {
 
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -15,26 +17,44 @@ constexpr int kDurations = 6;    // tried, from the shortest on, each 1.6 times 
 constexpr double kLonger = 1.6;
 constexpr int kStepsPerWindow = 8;
 constexpr double kOutlier = 4;  // times the noise: a few samples beyond are no event
+constexpr double kFar = 1000;   // lengths of the log
 constexpr double kSeen = 0.7;   // share of a window's samples that are used at least
 
 struct Window {
   double gain = 0, on = 0, off = 0;
 };
 
-// Where one of the shapes fits best; dense, used: [samples] residual and whether it counts. tried: places looked at.
-Window Strongest(const std::vector<VectorXd>& shapes, const VectorXd& dense, const VectorXd& used, const VectorXd& time,
+// One row of an event over all samples of the log, over the row's noise: what the base leaves, whether a sample counts,
+// and what multiplies the shape, [samples x columns].
+struct EventRow {
+  VectorXd left, used;
+  MatrixXd factor;
+};
+
+// Where one of the shapes fits best. tried: places looked at. The factors hardly change within a window.
+Window Strongest(const std::vector<VectorXd>& shapes, const std::vector<EventRow>& rows, const VectorXd& time,
                  double& tried) {
-  const int samples = static_cast<int>(dense.size());
+  const int samples = static_cast<int>(time.size());
+  const Eigen::Index columns = rows[0].factor.cols();
   const double step_s = (time[samples - 1] - time[0]) / (samples - 1);
   Window best;
   tried = 0;
   for (const VectorXd& shape : shapes) {
     const int length = static_cast<int>(shape.size()), stride = std::max(1, length / kStepsPerWindow);
+    const Eigen::ArrayXd square = shape.array().square();
     for (int at = 0; at + length <= samples; at += stride, ++tried) {
-      const auto seen = used.segment(at, length);
-      if (seen.sum() < kSeen * length) continue;
-      const double fit = shape.dot(dense.segment(at, length)), norm = (shape.array().square() * seen.array()).sum();
-      if (fit * fit > best.gain * norm) best = {fit * fit / norm, time[at], time[at] + length * step_s};
+      MatrixXd gram = MatrixXd::Zero(columns, columns);
+      VectorXd right = VectorXd::Zero(columns);
+      for (const EventRow& row : rows) {
+        const auto used = row.used.segment(at, length);
+        if (used.sum() < kSeen * length) continue;
+        const VectorXd factor = row.factor.row(at + length / 2);
+        gram += (square * used.array()).sum() * factor * factor.transpose();
+        right += shape.dot(row.left.segment(at, length)) * factor;
+      }
+      gram.diagonal().array() += 1e-9 * gram.trace() + 1e-300;
+      const double gain = right.dot(gram.ldlt().solve(right));
+      if (gain > best.gain) best = {gain, time[at], time[at] + length * step_s};
     }
   }
   return best;
@@ -77,30 +97,44 @@ void Searcher::Onset() {
 void Searcher::Windows() {
   if (e_.logs.size() != 1) return;
   const auto& time = e_.logs[0].data->s.t;
-  const int row = c_.rows()[0], samples = static_cast<int>(time.size());
-  const RowIndex& index = e_.index[row];
+  const int samples = static_cast<int>(time.size());
   const double begin = time[0], end = time[samples - 1], step_s = (end - begin) / (samples - 1);
   for (auto& u : c_.unknowns()) u.lower = begin - 1, u.upper = end + 1;
+  const auto& joints = c_.rows();
+  // In the middle of a window without end the shape is one.
+  std::vector<std::vector<VectorXd>> value;
+  const double far_s = kFar * (end - begin);
+  c_.Evaluate(e_.logs[0], {begin - far_s, end + far_s}, value);
+  std::vector<EventRow> rows(joints.size());
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    rows[r].factor = MatrixXd::Zero(samples, static_cast<Eigen::Index>(value.size()));
+    for (std::size_t c = 0; c < value.size(); ++c)
+      if (value[c][r].size())
+        rows[r].factor.col(static_cast<Eigen::Index>(c)) = value[c][r] / g_.metric.noise()[joints[r]].innovation;
+  }
   std::vector<VectorXd> shapes;
   for (int d = 0; d < kDurations; ++d) {
-    const double span = c_.record().search.minimum_s * std::pow(kLonger, d), from = 0.5 * (begin + end);
-    const int length = static_cast<int>(span / step_s);
-    std::vector<std::vector<VectorXd>> value;
-    c_.Evaluate(e_.logs[0], {from, from + span}, value);
-    shapes.push_back(value[0][0].segment(static_cast<int>((from - begin) / step_s), std::min(length, samples / 4)));
+    const double span = c_.record().search.minimum_s * std::pow(kLonger, d);
+    const int length = std::min(static_cast<int>(span / step_s), samples / 4);
+    shapes.push_back(Eigen::ArrayXd::LinSpaced(length, 0, std::numbers::pi).sin());
   }
-  VectorXd residual = g_.metric.RawResidual(row);
   std::vector<double> found;
   for (int windows = 1; windows <= kMostWindows; ++windows) {
-    VectorXd dense = VectorXd::Zero(samples), used = dense;
-    const double noise = g_.metric.noise()[row].innovation, most = kOutlier * noise;
-    for (int i = 0; i < index.size(); ++i)
-      dense[index.sample[i]] = std::clamp(residual[i], -most, most), used[index.sample[i]] = 1;
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const int j = joints[r];
+      const RowIndex& index = e_.index[j];
+      const VectorXd residual =
+          (found.empty() ? g_.metric.RawResidual(j) : g_.metric.ResidualWith(GatherColumns(c_, e_, found), j)) /
+          g_.metric.noise()[j].innovation;
+      rows[r].left = rows[r].used = VectorXd::Zero(samples);
+      for (int i = 0; i < index.size(); ++i)
+        rows[r].left[index.sample[i]] = std::clamp(residual[i], -kOutlier, kOutlier), rows[r].used[index.sample[i]] = 1;
+    }
     double tried = 0;
-    const Window best = Strongest(shapes, dense, used, time, tried);
+    const Window best = Strongest(shapes, rows, time, tried);
     Found one = best_;
-    one.penalty = PenaltyOf(3, c_, e_), one.tried = tried;
-    if (best.gain < -Score(one, 0) * noise * noise) break;
+    one.penalty = PenaltyOf(2 + static_cast<int>(value.size()), c_, e_), one.tried = tried;
+    if (best.gain < GainOfScore(one)) break;
     best_.searched = 2 * windows;
     best_.tried = std::pow(tried, windows);
     const auto with = [&](const std::vector<double>& last) {
@@ -112,7 +146,6 @@ void Searcher::Windows() {
     const double width = (best.off - best.on) / (end - begin + 2);
     const std::vector<double> last = Refine({best.on, best.off}, 0.25 * width, 3, with);
     found.insert(found.end(), last.begin(), last.end());
-    residual = g_.metric.ResidualWith(GatherColumns(c_, e_, found), row);
   }
 }
 

@@ -51,6 +51,7 @@ class Searcher {
   void Profile();   // search.cpp
   void Spectral();  // search_signal.cpp
   void Spline();    // search_signal.cpp
+  void Surface();   // search_signal.cpp
   void Onset();     // search_time.cpp
   void Windows();   // search_time.cpp
 

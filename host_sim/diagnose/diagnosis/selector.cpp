@@ -22,7 +22,8 @@ constexpr int kThinnedRows = 2500;  // of a log: a coarse grid needs to see wher
 constexpr double kClearly = 0.9;    // of a joint's noise: below this a found effect was most of what looked like noise
 constexpr int kRescored = 14;       // candidates whose likelihood is computed with their own noise model
 constexpr int kCurvesOfAJoint = 3;  // among these
-constexpr double kKeepsOutOfFold = 0.35;  // of its gain
+constexpr std::size_t kCausesOfAJoint = 3;  // and these of every joint besides
+constexpr double kKeepsOutOfFold = 0.35;    // of its gain
 constexpr int kBlocks = 20, kFolds = 5, kFoldsThatImprove = 4;
 constexpr double kOnce = 0.8;              // of a trace in one fold: the others cannot tell of it
 constexpr double kIndistinguishable = 25;  // chi^2 left at most when one kind imitates another
@@ -36,6 +37,19 @@ constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms diffe
 constexpr int kFewTurns = 100;          // rows
 constexpr double kTurnShare = 0.03;     // of a joint's rows
 constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
+
+// The first ones of all, and the first causes of each joint: a joint whose noise has a colour may take all places.
+std::vector<Found> FirstOf(const std::vector<Found>& ranked, int joints) {
+  std::vector<std::size_t> causes(static_cast<std::size_t>(joints), 0);
+  std::vector<Found> out;
+  for (const Found& f : ranked) {
+    bool is_first = out.size() < kRescored;
+    if (!f.candidate->is_curve())
+      for (const int j : f.candidate->rows()) is_first |= causes[static_cast<std::size_t>(j)]++ < kCausesOfAJoint;
+    if (is_first) out.push_back(f);
+  }
+  return out;
+}
 
 // Neither noise nor one term too many explains the gain.
 bool IsRare(const Found& f) { return f.log_chance < kLogRare && f.score > 0; }
@@ -264,7 +278,7 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
   std::erase_if(ranked, [&](const Found& f) {
     return f.candidate->is_curve() && ++curves[f.candidate->rows()] > kCurvesOfAJoint;
   });
-  if (ranked.size() > kRescored) ranked.resize(kRescored);
+  ranked = FirstOf(ranked, w_.model.joints());
   std::sort(screened.begin(), screened.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   if (screened.size() > kRescored) screened.resize(kRescored);
   for (const auto& [score, f] : screened)
@@ -279,9 +293,7 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
 void Selector::Rescore(const Grounds& grounds, Found& f) const {
   const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
   const double with = grounds.metric().RefittedDeviance(c);
-  const double gain = grounds.DevianceWithout(c.joints) - with;
-  f.score = Score(f, gain);
-  f.log_chance = LogChance(f, gain);
+  Rate(f, grounds.DevianceWithout(c.joints) - with);
 }
 
 // The latest term touches none of its joints, and there was nothing on them before.

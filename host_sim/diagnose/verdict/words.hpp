@@ -9,7 +9,7 @@
 namespace armcal::verdict {
 
 // A curve that names no cause. Its joint is the one whose torque it changes; another joint may be among its signals.
-inline bool IsUnknown(const diagnosis::Term& t) { return t.record->kind != t.record->name; }
+inline bool IsUnknown(const diagnosis::Term& t) { return t.record->kind == "unknown"; }
 
 // At least one term held on the held-out log.
 bool AnyConfirmed(const diagnosis::Finding& finding);

@@ -17,6 +17,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
+constexpr double kSameStep = 1e-9;  // relative: equal but for the rounding of time stamps
 
 constexpr Index kRowsOfAJoint = 2500;  // of a joint: more do not move the result
 constexpr double kLeastPivot = 1e-10;  // of a column's own square: directions that the log does not show
@@ -159,9 +160,10 @@ VectorXd ThroughChannel(const VectorXd& t, const VectorXd& torque, double lag_s,
     }
   }
   if (lag_s <= 0) return out;
-  double z = out[0], before = out[0];
+  double z = out[0], before = out[0], step = 0, rest = 1, ramp = 0;
   for (Index i = 1; i < samples; ++i) {
-    const double dt = t[i] - t[i - 1], rest = std::exp(-dt / lag_s), ramp = lag_s / dt * (1 - rest);
+    const double dt = t[i] - t[i - 1];
+    if (std::abs(dt - step) > kSameStep * dt) step = dt, rest = std::exp(-dt / lag_s), ramp = lag_s / dt * (1 - rest);
     z = rest * z + (ramp - rest) * before + (1 - ramp) * out[i];
     before = out[i];
     out[i] = z;

@@ -207,6 +207,23 @@ TEST(Effects, SensorColumns_AreWhatTheSensorAdds) {
   }
 }
 
+// A force along one axis, held against by J'F.
+TEST(Effects, FlangeContact_IsAHalfSineOfForce) {
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(At("flange_contact", axis, {{"t", 2.5}, {"J3_" + std::to_string(axis), 0.8}},
+                   {{"t_on", 2}, {"t_off", 4}}, {}, 3),
+                -0.8 * std::sin(M_PI / 4), 1e-15);
+}
+
+TEST(Effects, SurfaceOverTwoPositions_IsAProductOfSplines) {
+  for (const double a : kAngles)
+    for (const double b : kAngles)
+      for (int i = 0; i < 36; ++i)
+        EXPECT_NEAR(At("curve_two_positions", i, {{"q5", a}, {"q6", b}},
+                       {{"lo", -1}, {"hi", 1.2}, {"lo_own", -1.3}, {"hi_own", 1.5}}, {4, 5}, 4),
+                    Spline(b, -1, 1.2, i / 6, 6) * Spline(a, -1.3, 1.5, i % 6, 6), 1e-13);
+}
+
 TEST(Effects, BaseTilt_IsTheTorquePerGravityOfEachRow) {
   for (int row = 0; row < 6; ++row) {
     const std::string g = "G" + std::to_string(row) + "_";

@@ -29,8 +29,10 @@ Log Motion(const codegen::Graph& graph, int samples) {
   return log;
 }
 
-// 1e-11 of the largest derivative seen: complex step has no truncation; both are sums of some hundred roundings.
+// 1e-11 of the largest derivative seen: complex step has no truncation; both are sums of some hundred roundings. The
+// columns are of order one, so a smaller slope carries the roundings of larger numbers.
 TEST(Gradients, AlongARun_EqualComplexSteps_ForEveryRecord) {
+  constexpr double kLeast = 1e-3;
   int compared = 0;
   for (const auto& [name, record] : Records()) {
     EffectRun run(name, JointsFor(record));
@@ -45,11 +47,11 @@ TEST(Gradients, AlongARun_EqualComplexSteps_ForEveryRecord) {
       const auto along = run.Run<double>(slopes, log, {});
       const auto stepped = run.Run<Complex>(columns, log, {}, u.key);
       for (std::size_t c = 0; c < columns.size(); ++c) {
-        double largest = 1e-300;
+        double largest = kLeast;
         for (const auto& at : stepped) largest = std::max(largest, std::abs(Slope(at[c])));
         for (std::size_t k = 0; k < along.size(); ++k)
           ASSERT_NEAR(along[k][c], Slope(stepped[k][c]), 1e-11 * largest) << u.name << ", column " << c << ", " << k;
-        compared += largest > 1e-300;
+        compared += largest > kLeast;
       }
     }
   }

@@ -138,6 +138,26 @@ TEST(EffectsInAModel, JointCompliance_MovesTheLinksUnderGravity) {
   }
 }
 
+// The hose is held by the joints: over a small step its torque does the work that its energy loses.
+TEST(EffectsInAModel, FlangeHose_IsTheSlopeOfItsEnergy) {
+  constexpr double kStep_rad = 1e-5, kOut_m = 0.12, kFree_m = 0.7;
+  const KDL::Vector anchor(0.4, -1.1, 2.0);
+  for (const char* name : kArms) {
+    WithEffect arm(Use("flange_hose", {}), name);
+    const KdlArm kdl(arm.robot(), arm.bodies());
+    const auto energy = [&](const VectorXd& q) {
+      const double longer = std::max(0.0, (anchor - kdl.Flange(q) * KDL::Vector(0, 0, kOut_m)).Norm() - kFree_m);
+      return 0.5 * longer * longer;
+    };
+    const MatrixXd column = arm.Column("flange_hose.k", {anchor[0], anchor[1], anchor[2], kOut_m, kFree_m});
+    for (int k = 0; k < WithEffect::kSamples; ++k)
+      for (int i = 0; i < 6; ++i) {
+        const VectorXd q = arm.signals().q.row(k), step = kStep_rad * VectorXd::Unit(6, i);
+        EXPECT_NEAR(column(k, i), (energy(q + step) - energy(q - step)) / (2 * kStep_rad), 1e-8) << name << " " << k;
+      }
+  }
+}
+
 // Torque at rest is linear in gravity; rows 2..6 see all of it through the base parameters of an upright arm.
 TEST(EffectsInAModel, BaseTilt_IsTheSlopeOfGravityTorque) {
   for (const char* name : kArms) {

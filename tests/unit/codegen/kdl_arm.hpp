@@ -2,6 +2,7 @@
 #pragma once
 
 #include <kdl/chain.hpp>
+#include <kdl/chainfksolverpos_recursive.hpp>
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
 #include "codegen/src/generator/rigid_body.hpp"
@@ -16,6 +17,8 @@ class KdlArm {
  public:
   KdlArm(const codegen::Robot& robot, const Eigen::VectorXd& bodies) : n_(robot.joints()) {
     const auto& R = robot.base_rotation;
+    base_ = {KDL::Rotation(R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7], R[8]),
+             KDL::Vector(robot.base_xyz_m[0], robot.base_xyz_m[1], robot.base_xyz_m[2])};
     for (int j = 0; j < n_; ++j) rotor_.push_back(bodies[11 * j + 10]);
     const auto fixed = [&](int j) {
       const auto& k = robot.joint[j].kinematics;
@@ -46,6 +49,15 @@ class KdlArm {
     solver_ = std::make_unique<KDL::ChainIdSolver_RNE>(chain_, KDL::Vector(g[0], g[1], g[2]));
   }
 
+  // The last link's frame seen from the robot file's base.
+  KDL::Frame Flange(const Eigen::VectorXd& q) const {
+    KDL::JntArray x(n_);
+    for (int j = 0; j < n_; ++j) x(j) = q[j];
+    KDL::Frame out;
+    if (KDL::ChainFkSolverPos_recursive(chain_).JntToCart(x, out) < 0) throw std::runtime_error("KDL refused");
+    return base_ * out;
+  }
+
   KdlArm(const KdlArm&) = delete;  // the solver points at the chain
   KdlArm& operator=(const KdlArm&) = delete;
 
@@ -63,6 +75,7 @@ class KdlArm {
   int n_;
   std::vector<double> rotor_;
   KDL::Chain chain_;
+  KDL::Frame base_;
   std::unique_ptr<KDL::ChainIdSolver_RNE> solver_;
 };
 

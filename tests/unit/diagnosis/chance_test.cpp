@@ -51,9 +51,21 @@ TEST(LogChance, CountsWhatWasSearchedAsAnAmplitude_AndEveryTry) {
 
 TEST(Score, PaysForParametersTriesAndForm) {
   OneAmplitude cause(0), curve(20);
-  for (Found* f : {&cause.found, &curve.found}) f->penalty = 7, f->tried = 20;
-  EXPECT_NEAR(Score(cause.found, 40), 33 - 5.991465, 1e-6);  // 2 ln 20
-  EXPECT_NEAR(Score(curve.found, 40), 13 - 5.991465, 1e-6);
+  for (Found* f : {&cause.found, &curve.found}) f->penalty = 2, f->tried = 20;
+  EXPECT_NEAR(Score(cause.found, 40), 38 - 5.991465, 1e-6);  // 2 ln 20
+  EXPECT_NEAR(Score(curve.found, 40), 18 - 5.991465, 1e-6);
+}
+
+// k ln(gain / k), but not less than k and not more than k ln(rows).
+TEST(Score, PriceOfAParameter_FollowsItsGain) {
+  OneAmplitude one(0);
+  one.found.searched = 2, one.found.penalty = 25;
+  EXPECT_NEAR(PriceOf(one.found, 30), 3 * 2.302585, 1e-6);
+  EXPECT_NEAR(PriceOf(one.found, 4), 3, 1e-12);
+  EXPECT_NEAR(PriceOf(one.found, 1e6), 25, 1e-12);
+  const double least = GainOfScore(one.found);
+  EXPECT_LT(Score(one.found, 0.999 * least), 0);
+  EXPECT_GT(Score(one.found, 1.001 * least), 0);
 }
 
 }  // namespace

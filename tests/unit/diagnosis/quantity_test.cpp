@@ -51,6 +51,9 @@ std::vector<Word> WordsOf(const codegen::QuantityInfo& info, int joints) {
       for (int axis = 0; axis < 3; ++axis)
         out.push_back({word + "[r, " + "xyz"[axis] + "]", info.quantity, -1, axis, 0});
       return out;
+    case codegen::Indexing::kAxis:
+      for (int axis = 0; axis < 3; ++axis) out.push_back({word + "[" + "xyz"[axis] + "]", info.quantity, -1, axis, 0});
+      return out;
   }
   return out;
 }
@@ -58,6 +61,7 @@ std::vector<Word> WordsOf(const codegen::QuantityInfo& info, int joints) {
 // With base_tilt in the model, its base parameters are those that gravity in any direction shows.
 codegen::Robot TiltedArm() {
   codegen::Robot robot = tests::Er20();
+  robot.base_xyz_m = {0.1, -0.2, 0.3};
   codegen::EffectUse tilt;
   tilt.effect = "base_tilt";
   tilt.state = "standby";
@@ -90,6 +94,12 @@ class EveryQuantity : public testing::Test {
   }
   VectorXd Rigid(int sample) const {
     return Torque(arm_.bodies(), sample, At(data_.s.qd, sample), At(data_.s.qdd, sample));
+  }
+
+  KDL::Frame FlangeAt(int sample, int joint = 0, double moved_rad = 0) const {
+    VectorXd q = At(data_.s.q, sample);
+    q[joint] += moved_rad;
+    return KdlArm(arm_.model().robot(), arm_.bodies()).Flange(q);
   }
 
   double Oracle(const Word& w, int row, int sample) const {
@@ -128,6 +138,18 @@ class EveryQuantity : public testing::Test {
       case Quantity::kGravityStiffness: {
         constexpr double kStep_rad = 1e-4;
         return (GravityAt(sample, w.index, kStep_rad) - GravityAt(sample, w.index, -kStep_rad))[row] / (2 * kStep_rad);
+      }
+      case Quantity::kFlangePosition:
+        return FlangeAt(sample).p[w.index];
+      case Quantity::kApproach:
+        return FlangeAt(sample).M.UnitZ()[w.index];
+      case Quantity::kFlangeJacobian:
+      case Quantity::kApproachSlope: {
+        constexpr double kStep_rad = 1e-5;
+        const KDL::Frame after = FlangeAt(sample, row, kStep_rad), before = FlangeAt(sample, row, -kStep_rad);
+        const KDL::Vector change =
+            w.quantity == Quantity::kFlangeJacobian ? after.p - before.p : after.M.UnitZ() - before.M.UnitZ();
+        return change[w.index] / (2 * kStep_rad);
       }
       case Quantity::kBodyColumn: {  // the torque is linear in the bodies
         VectorXd more = arm_.bodies();

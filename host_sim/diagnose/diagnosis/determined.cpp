@@ -17,6 +17,7 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr double kSure = 3;     // deviations from zero, for a term that has nothing but an unknown
 constexpr double kEdge = 1e-3;  // of a range: a search that ends at a bound stops this close to it
 
 bool IsSearched(const Term& t) {
@@ -92,6 +93,13 @@ Marks MarkParameters(const Term& t) {
     for (Index& p : place) p += static_cast<Index>(t.eta.size());
     out.usable =
         !seen.empty() && Significance(t.amplitude(seen), t.covariance(place, place)) > static_cast<double>(seen.size());
+  }
+  // A delay has no amplitude. Its gain may be large where the noise has another colour than was taken; then its
+  // deviation, which blocks of time tell, is large as well.
+  if (!any_free && IsSearched(t)) {
+    out.usable = false;
+    for (std::size_t k = 0; k < t.eta.size(); ++k)
+      out.usable |= std::abs(t.eta[k]) > kSure * t.eta_sd[static_cast<Index>(k)] && out.eta[k] == Mark::kNone;
   }
   out.usable = out.usable && (IsForm(t) || marked < parameters);
   return out;

@@ -13,8 +13,10 @@ Term TermOf(const std::string& record, const std::vector<double>& eta, const std
             const std::vector<double>& amplitude, const std::vector<double>& sd) {
   static const codegen::Robot robot = codegen::ReadRobot("codegen/robots/er20_like.toml");
   const codegen::EffectRecord& found = tests::Records().at(record);
-  const Candidate candidate(found, robot,
-                            found.scope == codegen::EffectScope::kPair ? std::vector{4, 5} : std::vector{1});
+  const std::vector<int> joints = found.scope == codegen::EffectScope::kJoint  ? std::vector{1}
+                                  : found.scope == codegen::EffectScope::kPair ? std::vector{4, 5}
+                                                                               : std::vector<int>{};
+  const Candidate candidate(found, robot, joints);
   Term t;
   t.record = &found, t.joints = candidate.joints();
   t.columns = candidate.instance().columns, t.unknowns = candidate.unknowns();
@@ -31,6 +33,12 @@ TEST(Determined, AWellDeterminedTerm_HasNoMark) {
   const Term t = TermOf("torque_ripple", {48}, {0.01}, {0.3, 0.2}, {0.01, 0.01});
   EXPECT_TRUE(MarkParameters(t).usable);
   EXPECT_EQ(MarkText(t), "");
+}
+
+// A delay has no amplitude that could be compared with chance.
+TEST(Determined, ADelayWithinThreeDeviationsOfNothing_IsNotUsable) {
+  EXPECT_FALSE(MarkParameters(TermOf("time_delay", {-2e-5}, {0.85e-5}, {1}, {0})).usable);
+  EXPECT_TRUE(MarkParameters(TermOf("time_delay", {2e-3}, {1e-4}, {1}, {0})).usable);
 }
 
 // One of two amplitudes may be nothing: the ripple's phase is then what it is.

@@ -8,6 +8,7 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr double kStribeckFrom_radps = 0.01;  // the law shows near standstill
 const char* const kGradientRecord = "stribeck_gradient";
 const char* const kGaussian = "exp(-(qd/vs)^2)";  // an even function of vs: a filter may carry it below zero
 
@@ -82,6 +83,7 @@ codegen::Robot Variant(const codegen::Robot& file, Law law, Bodies bodies, const
     robot.joint[j].motor.rotor_inertia_kgm2 = 0;
     robot.joint[j].motor.torque_constant_tolerance = 0;
     robot.parameters.omit.push_back(codegen::kBodyBlock * j + 10);
+    if (law == Law::kStribeck) robot.joint[j].v_min_radps = kStribeckFrom_radps;
     if (law != Law::kCoulombViscous)
       robot.effect.push_back(LawOf(law, j, robot.joint[j].nominal["Fc"], robot.joint[j].nominal["Fv"], stribeck));
   }
@@ -91,8 +93,6 @@ codegen::Robot Variant(const codegen::Robot& file, Law law, Bodies bodies, const
 codegen::Robot StribeckArm(const codegen::Robot& file, const Stribeck& stribeck) {
   codegen::Robot robot = Variant(file, Law::kStribeck, Bodies::kBase, stribeck);
   robot.name = "stribeck_arm";
-  for (codegen::Joint& joint : robot.joint)
-    joint.v_min_radps = 0.01;  // the law shows near standstill, and this arm does not stick
   return robot;
 }
 

@@ -8,6 +8,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
 #include "host_sim/identify/search/parallel.hpp"
+#include "host_sim/machine/plant/joint_effects.hpp"
 #include "host_sim/machine/plant/random.hpp"
 #include "host_sim/study/survey/platform.hpp"
 
@@ -96,6 +97,8 @@ namespace {
 constexpr double kSurveyStart = 1;  // qs in rad/s at which the survey's own filters start; the survey does not print it
 // Standard deviations of DrawStribeck's draws, relative to what is believed before.
 constexpr double kLogSpeed = 0.4, kBreakaway = 0.46;
+constexpr double kSurveyExponent = 2;       // of (4)
+constexpr int kTruths = 20;                 // drawn at most; further draws of CAD values and noise use them again
 constexpr std::uint64_t kStride = 1000003;  // between the seeds of one run and the next
 
 std::uint64_t SeedOf(std::uint64_t seed, int draw, int purpose) {
@@ -184,10 +187,18 @@ bool Settings::Wants(const std::string& table) const {
 }
 
 std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck) {
-  const excitation::Series& train = law == Law::kStribeck ? motions.nonlinear.series : motions.linear.series;
-  return std::make_unique<Truth>(
-      codegen::Model(Variant(settings.robot, law, Bodies::kStandard, stribeck), settings.records), Sampled(train),
-      Sampled(motions.other));
+  const codegen::Robot& file = settings.robot;
+  codegen::Model model(Variant(file, law, Bodies::kStandard, stribeck), settings.records);
+  PlantSettings plant;
+  plant.friction = plant.torque_constant = plant.noise = 0;
+  for (int j = 0; law == Law::kStribeck && j < file.joints(); ++j) {
+    const double excess = (stribeck.fs_over_fc[j] - 1) * file.joint[static_cast<std::size_t>(j)].nominal.at("Fc");
+    const toml::table keys{{"excess_Nm", excess}, {"speed_radps", stribeck.qs_radps[j]}, {"exponent", kSurveyExponent}};
+    plant.effects.push_back({"stribeck", j, plant::ReadJointEffect("stribeck", io::TomlReader(keys, "survey")), 0});
+  }
+  const excitation::Series& series = law == Law::kStribeck ? motions.nonlinear.series : motions.linear.series;
+  calibration::Dataset train = WithoutRotors(file, model, RunPlant(file, series, plant));
+  return std::make_unique<Truth>(std::move(model), std::move(train), RunExactly(file, motions.other, plant));
 }
 
 void ForEachDraw(const Settings& settings, const std::string& what, int count, const std::function<void(int)>& work) {
@@ -205,21 +216,21 @@ std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, 
                               const std::vector<std::string>& methods) {
   const int joints = settings.robot.joints();
   const std::unique_ptr<Truth> set = MakeTruth(settings, motions, draws.law, SetStribeck(joints));
+  std::vector<std::unique_ptr<Truth>> truths(
+      static_cast<std::size_t>(draws.random_truth ? std::min(draws.draws, kTruths) : 0));
+  ForEachDraw(settings, "runs of the plant", static_cast<int>(truths.size()), [&](int d) {
+    truths[static_cast<std::size_t>(d)] =
+        MakeTruth(settings, motions, draws.law, DrawStribeck(joints, SeedOf(draws.seed, d, 3)));
+  });
   std::vector<std::vector<Solved>> solved(static_cast<std::size_t>(draws.draws));
   ForEachDraw(settings, LawName(draws.law) + ", " + PriorName(draws.prior), draws.draws, [&](int d) {
     // CAD's values of the Stribeck part are centred on the set values or, for drawn truths, on their range.
-    Stribeck believed = SetStribeck(joints);
-    std::unique_ptr<Truth> drawn;
-    if (draws.random_truth) {
-      drawn = MakeTruth(settings, motions, draws.law, DrawStribeck(joints, SeedOf(draws.seed, d, 3)));
-      believed = BelievedStribeck(joints);
-    }
-    const Truth& truth = drawn ? *drawn : *set;
+    const Stribeck believed = draws.random_truth ? BelievedStribeck(joints) : SetStribeck(joints);
+    const Truth& truth = draws.random_truth ? *truths[static_cast<std::size_t>(d % kTruths)] : *set;
     const codegen::Robot cad = Variant(settings.robot, draws.law, Bodies::kStandard, believed);
     const codegen::Model prior(DrawPrior(cad, draws.prior, SeedOf(draws.seed, d, 1)), settings.records);
-    const calibration::Dataset clean = Measured(truth.train, truth.tau);
-    const calibration::Dataset noisy =
-        Measured(truth.train, truth.tau + Noise(truth.train.samples(), truth.sigma_Nm, SeedOf(draws.seed, d, 2)));
+    const calibration::Dataset& clean = truth.train;
+    const calibration::Dataset noisy = truth.Noisy(SeedOf(draws.seed, d, 2));
     for (const std::string& name : methods) {
       const calibration::Method& method = calibration::FindMethod(name);
       Solved one;

@@ -79,7 +79,8 @@ struct Outcome {
   std::string why;                           // the first failure, or why the method refused
 };
 
-// The Truth for a friction law with these Stribeck parameters.
+// The plant with a friction law and these Stribeck parameters. Bodies, Coulomb and viscous friction are the file's. The
+// law: kCoulombViscous or kStribeck.
 std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck);
 
 // Calls work(0) .. work(count - 1) on all cores, unless stopped, and shows progress.

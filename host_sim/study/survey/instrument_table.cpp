@@ -36,8 +36,8 @@ void ShowDifferentiation(const Settings& settings, const Motions& motions, Findi
   const int draws = std::min(kMostDraws, settings.draws);
   const codegen::Robot arm =
       Variant(settings.robot, Law::kCoulombViscous, Bodies::kStandard, SetStribeck(settings.robot.joints()));
-  const std::unique_ptr<Truth> truth =
-      MakeTruth(settings, motions, Law::kCoulombViscous, SetStribeck(settings.robot.joints()));
+  const Truth truth =
+      AnalyticTruth(codegen::Model(arm, settings.records), Sampled(motions.linear.series), Sampled(motions.other));
   std::vector<std::vector<Cells>> of_draw(static_cast<std::size_t>(draws));
   ForEachDraw(settings, "table 10, tier 2", draws, [&](int d) {
     std::vector<Cells>& cells = of_draw[static_cast<std::size_t>(d)];
@@ -45,9 +45,9 @@ void ShowDifferentiation(const Settings& settings, const Motions& motions, Findi
     const auto seed = settings.seed * 653 + 4 * static_cast<std::uint64_t>(d);
     const PriorError error;
     const codegen::Model prior(DrawPrior(arm, error, seed), settings.records);
-    const Eigen::MatrixXd tau = truth->tau + Noise(truth->train.samples(), truth->sigma_Nm, seed + 1);
+    const Eigen::MatrixXd tau = truth.train.tau + Noise(truth.train.samples(), truth.sigma_Nm, seed + 1);
     for (std::size_t n = 0; n < std::size(kNoise_rad); ++n) {
-      const codegen::Signals noisy = Differentiated(truth->train, kNoise_rad[n], seed + 2);
+      const codegen::Signals noisy = Differentiated(truth.train.s, kNoise_rad[n], seed + 2);
       const calibration::Dataset plain = Measured(noisy, tau);
       const calibration::Dataset logs[] = {plain, Measured(Filtered(noisy.t, noisy.q), tau),
                                            calibration::FourierFit(prior, plain, motions.linear.series.period_s)};
@@ -57,7 +57,7 @@ void ShowDifferentiation(const Settings& settings, const Motions& motions, Findi
           if (m == 0) p.covariance.resize(0, 0);
           const Attempt attempt = Try(calibration::FindMethod(kMethods[m]), p);
           if (!attempt.solution || !attempt.solution->z.allFinite()) continue;
-          const Score score = Judge(*truth, settings.levels, tau, *attempt.solution, calibration::BodyMean(prior));
+          const Score score = Judge(truth, settings.levels, tau, *attempt.solution, calibration::BodyMean(prior));
           cells[n * std::size(kDerivatives) + s].score[m].push_back(score);
         }
     }
@@ -121,7 +121,7 @@ class Bench {
                        : z;
     calibration::LoopSimulator loop(model, {feedforward_, true});
     run_ = loop.Run(wanted_.t, wanted_.q, z);
-    truth_ = std::make_unique<Truth>(std::move(model), run_.s, Sampled(motions.other));
+    truth_ = std::make_unique<Truth>(AnalyticTruth(std::move(model), run_.s, Sampled(motions.other)));
   }
 
   Draw At(int d) const {

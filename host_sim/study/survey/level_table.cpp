@@ -47,7 +47,8 @@ void ShowLevels(const Settings& settings, const Evidence& evidence, Findings& ou
       {"method", "models", "e_d", "e_d / e_d(prior)", "e_f", "e_T", "J_e without noise", "follows", "solution time",
        "Delta J_e", "Delta J_e*"},
       {},
-      {"A letter in brackets is the survey's. e_d, e_f and e_T are those with noise; a method for both kinds of "
+      {"The evidence is that of Tables 8 and 9 and of Figure 4: the plant is the truth.",
+       "A letter in brackets is the survey's. e_d, e_f and e_T are those with noise; a method for both kinds of "
        "model is marked by the mean of the two, as in the survey.",
        "The printed letters B for e_f of the extended Kalman and the forgetting filter do not follow from the "
        "printed Tables 2, 8 and 9 (e_f 3.1 and 48.5, above 1, is C).",

@@ -103,7 +103,8 @@ void Simulated(const Settings& settings, const Motions& motions, Findings& out) 
               {"model", "fitted by", "train error / sigma", "held-out error / sigma", "mean / N m", "mean printed",
                "std / N m", "std printed", "no worse than (7) in training"},
               {},
-              {"Base parameters, no prior; error: torque RMS in units of Table 7's noise, so 1 is perfect; held out: "
+              {"The plant is the truth, its law (4) with real stiction; noise of Table 7 on each sample.",
+               "Base parameters, no prior; error: torque RMS in units of Table 7's noise, so 1 is perfect; held out: "
                "another motion. Printed: the survey's real ER20-C10, whose friction and errors are larger.",
                "(5) contains (7) (f2 = f4 = 0), so it cannot fit worse: the printed 51.8 N m against 44.7 N m is a "
                "failure of the solver. (6) contains (7) only in the limit f4 to infinity; 1 % is allowed there.",
@@ -122,16 +123,14 @@ void Simulated(const Settings& settings, const Motions& motions, Findings& out) 
     std::string by, why;
     for (int d = 0; d < std::min(kNoiseDraws, settings.draws) && !settings.Stopped(); ++d) {
       const auto seed = settings.seed * 977 + 2 * static_cast<std::uint64_t>(d);
-      const int samples = truth->train.samples();
-      const calibration::Dataset log = Measured(truth->train, truth->tau + Noise(samples, truth->sigma_Nm, seed));
-      const calibration::Dataset other =
-          Measured(truth->other, truth->tau_other + Noise(samples, truth->sigma_Nm, seed + 1));
+      const calibration::Dataset log = truth->Noisy(seed);
+      const MatrixXd other = truth->tau_other + Noise(truth->other.samples(), truth->sigma_Nm, seed + 1);
       const choice::ModelFit fit = choice::FitModel(model, {&log}, settings.stop);
       by = fit.method, why = fit.why;
       if (fit.z.size() == 0) break;
-      const MatrixXd error = log.tau - Torque(model, log.s, fit.z);
+      const MatrixXd error = truth->Judged(log.tau - Torque(model, log.s, fit.z));
       train.push_back(BaseError(error, truth->sigma_Nm));
-      held_out.push_back(BaseError(other.tau - Torque(model, other.s, fit.z), truth->sigma_Nm));
+      held_out.push_back(BaseError(other - Torque(model, truth->other, fit.z), truth->sigma_Nm));
       mean.push_back(SpreadOf(error).mean), spread.push_back(SpreadOf(error).std);
       if (law == Law::kCoulombViscous) reference.push_back(train.back());
       nested = nested && d < static_cast<int>(reference.size()) &&

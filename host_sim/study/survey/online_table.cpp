@@ -1,20 +1,11 @@
 // survey - how accurate the firmware's estimator is after ten seconds, and whether it reports wrong deviations.
 #include <Eigen/Cholesky>
-#include <chrono>
 #include <cmath>
 #include <memory>
-#include <stribeck_arm/model.hpp>
 
-#include "armcal/estimator/physical_read_out.hpp"
-#include "armcal/filter/kalman_filter.hpp"
-#include "codegen/generated/er20_like/model.hpp"
-#include "codegen/src/generator/emit.hpp"
-#include "codegen/src/io/input_error.hpp"
-#include "host_sim/identify/calibration/dataset.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
-#include "host_sim/identify/calibration/table_file.hpp"
-#include "host_sim/identify/methods/method.hpp"
 #include "host_sim/machine/plant/random.hpp"
+#include "host_sim/study/survey/online_run.hpp"
 #include "host_sim/study/survey/platform.hpp"
 #include "host_sim/study/survey/tables.hpp"
 
@@ -24,136 +15,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-
-enum class OnlineFilter { kForgetting, kKalman, kExtended };  // kExtended: of the arm with (4)
-
-std::string Name(OnlineFilter filter) {
-  constexpr const char* kName[] = {"forgetting", "Kalman", "extended Kalman"};
-  return kName[static_cast<int>(filter)];
-}
-
-struct OnlineResult {
-  calibration::Solution solution;     // of the physical read-out; covariance: its diagonal alone
-  Eigen::VectorXd filter, filter_sd;  // [columns] of the filter's own read-out
-  bool inconsistent = false;          // monitor::InnovationTest, or estimator::PriorIsTooNarrow
-};
-
-// Whether a joint's row of a sample counts for the estimator.
-bool Moves(double speed_radps, const codegen::Joint& joint) { return std::abs(speed_radps) > joint.v_min_radps; }
-
-// Wide standard deviations, relative to the mean, for what CAD gives badly. They belong to Fs / Fc uniform in 1.1
-// .. 1.5 about 1.25, and to the logarithm of a speed that is log-uniform in 0.05 .. 0.2 rad/s.
-constexpr double kToldBreakaway = 0.46, kToldSpeed = 0.4;
-
-template <class Arm>
-estimator::Table<Arm> TableOf(const codegen::Model& prior, const VectorXd& sigma_Nm) {
-  calibration::TableFile file = calibration::DefaultTable(prior);
-  for (int j = 0; j < Arm::kJoints; ++j) file.joint[j].sigma_Nm = sigma_Nm[j];
-  for (calibration::TableRow& row : file.row) {
-    if (row.name.starts_with("stribeck.dFs")) row.sd = kToldBreakaway * row.mean;
-    if (row.name.starts_with("stribeck.vs")) row.sd = kToldSpeed * row.mean, row.state = "estimated";
-  }
-  estimator::Table<Arm> table;
-  if (file.schema != Arm::kSchema ||
-      !core::IsOk(model::Decode(calibration::EncodeTable(file).data(), Arm::kSchema, table)))
-    throw io::InputError(prior.robot().path + ": not the arm for which the estimator is compiled");
-  return table;
-}
-
-template <class Arm>
-model::Sample<Arm::kJoints> SampleOf(const calibration::Dataset& log, const codegen::Robot& robot, int k) {
-  model::Sample<Arm::kJoints> s;
-  s.tick = static_cast<std::uint32_t>(k * Arm::kSampleTicks);
-  for (int j = 0; j < Arm::kJoints; ++j) {
-    s.q[j] = static_cast<float>(log.s.q(k, j));
-    s.qd[j] = static_cast<float>(log.s.qd(k, j));
-    s.qdd[j] = static_cast<float>(log.s.qdd(k, j));
-    s.tau[j] = static_cast<float>(log.tau(k, j));
-    s.flags[j] = Moves(log.s.qd(k, j), robot.joint[j]) ? model::kValid | model::kMoving : model::kValid;
-  }
-  return s;
-}
-
-template <class Arm, class Filter>
-OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm) {
-  struct Drive {
-    physical::RigidPrior<Arm, float> rigid;
-    estimator::AdoptedTable<Arm> adopted;
-    estimator::Estimator<Arm, Filter> estimator;
-    estimator::Estimates<Arm> estimates;
-    physical::MapReadOut<Arm, double> read_out;
-  };
-  const auto began = std::chrono::steady_clock::now();
-  const auto drive = std::make_unique<Drive>();
-  const core::Status built =
-      estimator::BuildAdoptedTable(TableOf<Arm>(prior, sigma_Nm), 1, drive->rigid, drive->adopted);
-  if (!core::IsOk(built)) throw io::InputError(prior.robot().path + ": expected bodies that can exist");
-  auto& arm = drive->estimator;
-  arm.SetPublishEvery(1u << 30);
-  arm.Adopt(drive->adopted, 0);
-  const auto work = [&] {
-    while (arm.Step()) {
-    }
-  };
-  for (int k = 0; k < log.samples(); ++k) {
-    (void)arm.PushSample(SampleOf<Arm>(log, prior.robot(), k));
-    work();
-  }
-  arm.RequestReadOut();
-  work();
-  arm.Take(drive->estimates);
-
-  OnlineResult out;
-  out.inconsistent = drive->estimates.inconsistent;
-  out.filter = Eigen::Map<const Eigen::VectorXf>(drive->estimates.value, Arm::kColumns).cast<double>();
-  out.filter_sd = Eigen::Map<const Eigen::VectorXf>(drive->estimates.sd, Arm::kColumns).cast<double>();
-  const core::Status begun = estimator::BeginPhysical(drive->adopted, drive->rigid, arm, false, drive->read_out);
-  while (core::IsOk(begun) && !drive->read_out.Step()) {
-  }
-  out.inconsistent |= estimator::PriorIsTooNarrow(drive->read_out);
-  const auto& found = drive->read_out.result();
-  calibration::Solution& s = out.solution;
-  s.converged = core::IsOk(begun) && found.converged;
-  s.bodies = Eigen::Map<const VectorXd>(found.body, Arm::kBodyParameters);
-  // Nonlinear parameters come from the filter, since the read-out has linear ones only.
-  VectorXd sd(Arm::kColumns + Arm::kNonlinear);
-  s.z.resize(sd.size());
-  s.z.head(Arm::kColumns) = Eigen::Map<const VectorXd>(found.column, Arm::kColumns);
-  sd.head(Arm::kColumns) = Eigen::Map<const VectorXd>(found.column_sd, Arm::kColumns);
-  for (int e = 0; e < Arm::kNonlinear; ++e) {
-    s.z[Arm::kColumns + e] = static_cast<double>(drive->estimates.eta[e]);
-    sd[Arm::kColumns + e] = static_cast<double>(drive->estimates.eta_sd[e]);
-  }
-  s.covariance = sd.cwiseAbs2().asDiagonal();
-  s.iterations = found.steps;
-  s.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-  s.memory_bytes = sizeof(Drive);
-  return out;
-}
-
-// True if the filter is compiled for this model.
-bool CompiledFor(const codegen::Model& model, OnlineFilter filter) {
-  const bool stribeck = filter == OnlineFilter::kExtended;
-  return codegen::Schema(model) == (stribeck ? generated::StribeckArm::kSchema : generated::Er20Like::kSchema);
-}
-
-// The firmware's own estimator, float32, on a log. It starts from the table of `prior`, with sigma_Nm of a sample's
-// row. Rows below a joint's v_min are left out, as on a drive. Breakaway and Stribeck speed get the wide deviations
-// above. io::InputError: another arm, or a prior whose bodies cannot exist.
-OnlineResult RunOnTarget(const codegen::Model& prior, const calibration::Dataset& log, const VectorXd& sigma_Nm,
-                         OnlineFilter filter) {
-  using generated::Er20Like;
-  using generated::StribeckArm;
-  switch (filter) {
-    case OnlineFilter::kForgetting:
-      return Run<Er20Like, filter::ForgettingFilter<Er20Like>>(prior, log, sigma_Nm);
-    case OnlineFilter::kKalman:
-      return Run<Er20Like, filter::KalmanFilter<Er20Like>>(prior, log, sigma_Nm);
-    case OnlineFilter::kExtended:
-      break;
-  }
-  return Run<StribeckArm, filter::ExtendedKalmanFilter<StribeckArm>>(prior, log, sigma_Nm);
-}
 
 // What is drawn, and what the filter is told.
 struct Protocol {
@@ -185,13 +46,13 @@ codegen::Robot DrawTable(const codegen::Robot& truth, const Protocol& protocol, 
 
 std::unique_ptr<Truth> DrawTruth(const Settings& settings, const Motions& motions, std::uint64_t seed) {
   const Stribeck drawn = DrawStribeck(settings.robot.joints(), seed);
-  return std::make_unique<Truth>(codegen::Model(StribeckArm(settings.robot, drawn), settings.records),
-                                 Sampled(motions.nonlinear.series), Sampled(motions.other));
+  return std::make_unique<Truth>(AnalyticTruth(codegen::Model(StribeckArm(settings.robot, drawn), settings.records),
+                                               Sampled(motions.nonlinear.series), Sampled(motions.other)));
 }
 
 // Torque that no model here has: a wave over each joint's position, sin(20 q).
 MatrixXd Ripple(const Truth& truth, const Levels& levels, double share) {
-  MatrixXd torque = (20 * truth.train.q.array()).sin();
+  MatrixXd torque = (20 * truth.train.s.q.array()).sin();
   for (Eigen::Index j = 0; j < torque.cols(); ++j) torque.col(j) *= share * levels.tau_max_Nm[j];
   return torque;
 }
@@ -209,7 +70,7 @@ double CramerRao(const Truth& truth) {
   for (const int c : active) {
     unit.setZero();
     unit[c] = 1;
-    train.push_back(Torque(model, truth.train, unit));
+    train.push_back(Torque(model, truth.train.s, unit));
     other.push_back(Torque(model, truth.other, unit));
   }
   for (int j = 0; j < model.joints(); ++j) {
@@ -217,7 +78,7 @@ double CramerRao(const Truth& truth) {
     MatrixXd rows(truth.train.samples(), size), judged(truth.other.samples(), size);
     for (Eigen::Index c = 0; c < size; ++c) rows.col(c) = train[c].col(j), judged.col(c) = other[c].col(j);
     for (Eigen::Index k = 0; k < rows.rows(); ++k)
-      if (!Moves(truth.train.qd(k, j), joint)) rows.row(k).setZero();
+      if (!Moves(truth.train.s.qd(k, j), joint)) rows.row(k).setZero();
     const double weight = 1 / (truth.sigma_Nm[j] * truth.sigma_Nm[j]);
     seen += weight * rows.transpose() * rows;
     asked += weight * judged.transpose() * judged;
@@ -239,8 +100,8 @@ std::vector<Drawn> RunProtocol(const Settings& settings, const Motions& motions,
     codegen::Robot table = DrawTable(settings.robot, protocol, seed);
     if (own) table = StribeckArm(table, believed);  // in the middle of its range, about the drawn friction
     const codegen::Model prior(table, settings.records);
-    const MatrixXd measured = truth.tau + hidden + Noise(truth.train.samples(), truth.sigma_Nm, seed + 2);
-    const OnlineResult got = RunOnTarget(prior, Measured(truth.train, measured), truth.sigma_Nm, protocol.filter);
+    const MatrixXd measured = truth.train.tau + hidden + Noise(truth.train.samples(), truth.sigma_Nm, seed + 2);
+    const OnlineResult got = RunOnTarget(prior, Measured(truth.train.s, measured), truth.sigma_Nm, protocol.filter);
     Drawn& drawn = out[static_cast<std::size_t>(d)];
     drawn.score = Judge(truth, settings.levels, measured, got.solution, calibration::BodyMean(prior));
     drawn.inconsistent = got.inconsistent;
@@ -252,8 +113,8 @@ std::vector<Drawn> RunProtocol(const Settings& settings, const Motions& motions,
 }  // namespace
 
 void ShowOnline(const Settings& settings, const Motions& motions, Findings& out) {
-  const Truth truth(codegen::Model(settings.robot, settings.records), Sampled(motions.linear.series),
-                    Sampled(motions.other));
+  const Truth truth = AnalyticTruth(codegen::Model(settings.robot, settings.records), Sampled(motions.linear.series),
+                                    Sampled(motions.other));
   const double bound = CramerRao(truth);
   const PriorError worst{PriorError::kWorst, 0.2}, uniform{PriorError::kUniform, 0.2}, wide{PriorError::kUniform, 0.5};
   const std::vector<Protocol> protocols{

@@ -8,11 +8,10 @@
 
 namespace armcal::survey {
 
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-
-constexpr double kRamp_s = 2;  // until the series runs at its own pace
 
 // Where on the series the reference stands: phase, pace and change of pace. The pace rises along 3 s^2 - 2 s^3.
 struct Pace {
@@ -102,35 +101,89 @@ class Loop {
   VectorXd before_;
 };
 
+// The arm, and its loop after the ramp.
+struct Running {
+  Running(const codegen::Robot& robot, const excitation::Series& series, const PlantSettings& settings)
+      : arm(ScenarioOf(settings), robot.path), loop(robot, series, arm) {
+    for (long long k = std::llround(kRamp_s / arm.tick_s()); k > 0; --k) loop.Tick();
+  }
+
+  plant::Arm arm;
+  Loop loop;
+
+ private:
+  static plant::Scenario ScenarioOf(const PlantSettings& settings) {
+    plant::Scenario scenario;
+    scenario.truth_seed = settings.truth_seed, scenario.noise_seed = settings.noise_seed;
+    scenario.spread = {0, settings.friction, settings.torque_constant, 0};
+    scenario.joint_effects = settings.effects;
+    scenario.torque_noise_scale = settings.noise;
+    // A current that steps is not the same throughout a tick, and the reading at its end is not its mean. That moves
+    // the torque by 0.08 ms against the position, and a fit takes most of this for viscous friction.
+    scenario.command_ramps = true;
+    return scenario;
+  }
+};
+
+// On the joints' side.
+VectorXd RotorInertias(const codegen::Robot& robot) {
+  VectorXd rotors(robot.joints());
+  for (int j = 0; j < robot.joints(); ++j) {
+    const auto& motor = robot.joint[static_cast<std::size_t>(j)].motor;
+    rotors[j] = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2;
+  }
+  return rotors;
+}
+
 }  // namespace
 
 logs::Log RunPlant(const codegen::Robot& robot, const excitation::Series& series, const PlantSettings& settings) {
   if (robot.control.structure.empty()) throw io::InputError(robot.path + ": expected a [control] table");
-  plant::Scenario scenario;
-  scenario.truth_seed = settings.truth_seed, scenario.noise_seed = settings.noise_seed;
-  scenario.spread = {0, settings.friction, settings.torque_constant, 0};
-  scenario.joint_effects = settings.effects;
-  scenario.torque_noise_scale = settings.noise;
-  // A current that steps is not the same throughout a tick, and the reading at its end is not its mean. That moves the
-  // torque by 0.08 ms against the position, and a fit takes most of this for viscous friction.
-  scenario.command_ramps = true;
-  plant::Arm arm(scenario, robot.path);
-  Loop loop(robot, series, arm);
-  const double step = arm.tick_s() * robot.sample_ticks;
-  for (long long k = std::llround(kRamp_s / arm.tick_s()); k > 0; --k) loop.Tick();
+  Running plant(robot, series, settings);
+  const double step = plant.arm.tick_s() * robot.sample_ticks;
   const auto samples = static_cast<Eigen::Index>(settings.seconds / step);
   logs::Log log;
-  log.joints = arm.joints();
+  log.joints = plant.arm.joints();
   log.source = "plant";
   log.t = VectorXd::LinSpaced(samples, 0, step * static_cast<double>(samples - 1));
-  log.q.setZero(samples, arm.joints()), log.tau = log.q;
+  log.q.setZero(samples, log.joints), log.tau = log.q;
   for (Eigen::Index k = 0; k < samples; ++k)
     for (int tick = 0; tick < robot.sample_ticks; ++tick) {
-      loop.Tick();
-      log.q.row(k) += loop.Position().transpose() / robot.sample_ticks;
-      log.tau.row(k) += loop.Torque().transpose() / robot.sample_ticks;
+      plant.loop.Tick();
+      log.q.row(k) += plant.loop.Position().transpose() / robot.sample_ticks;
+      log.tau.row(k) += plant.loop.Torque().transpose() / robot.sample_ticks;
     }
   return log;
+}
+
+calibration::Dataset WithoutRotors(const codegen::Robot& robot, const codegen::Model& model, const logs::Log& log) {
+  calibration::Dataset data = calibration::Prepare(model, log, {kPlantCutoff_Hz});
+  data.tau -= data.s.qdd * RotorInertias(robot).asDiagonal();
+  return data;
+}
+
+Instants RunExactly(const codegen::Robot& robot, const excitation::Series& series, const PlantSettings& settings) {
+  Running plant(robot, series, settings);
+  const double step = plant.arm.tick_s() * robot.sample_ticks;
+  const auto samples = static_cast<Eigen::Index>(settings.seconds / step);
+  const int n = plant.arm.joints();
+  Instants all;
+  all.s.t.resize(samples);
+  all.s.q.resize(samples, n), all.s.qd = all.s.qdd = all.tau = all.s.q;
+  Eigen::Index kept = 0;
+  for (Eigen::Index k = 0; k < samples; ++k) {
+    for (int tick = 0; tick < robot.sample_ticks; ++tick) plant.loop.Tick();
+    const VectorXd& qd = plant.arm.qd();
+    bool moves = true;
+    for (int j = 0; j < n; ++j) moves &= std::abs(qd[j]) > robot.joint[static_cast<std::size_t>(j)].v_min_radps;
+    if (!moves) continue;
+    all.s.t[kept] = step * static_cast<double>(k);
+    all.s.q.row(kept) = plant.arm.q(), all.s.qd.row(kept) = qd, all.s.qdd.row(kept) = plant.arm.qdd();
+    all.tau.row(kept++) = plant.arm.torque_Nm() - RotorInertias(robot).cwiseProduct(plant.arm.qdd());
+  }
+  all.s.t.conservativeResize(kept);
+  for (MatrixXd* block : {&all.s.q, &all.s.qd, &all.s.qdd, &all.tau}) block->conservativeResize(kept, n);
+  return all;
 }
 
 }  // namespace armcal::survey

@@ -6,10 +6,17 @@
 
 #include "codegen/src/robot/robot.hpp"
 #include "host_sim/data/logs/log.hpp"
+#include "host_sim/identify/calibration/dataset.hpp"
 #include "host_sim/identify/excitation/series.hpp"
 #include "host_sim/machine/plant/scenario.hpp"
 
 namespace armcal::survey {
+
+// Until the series runs at its own pace. The plant's clock shows it when a recording begins.
+inline constexpr double kRamp_s = 2;
+
+// Cut-off for positions of the plant, whose counts are fine.
+inline constexpr double kPlantCutoff_Hz = 50;
 
 struct PlantSettings {
   std::uint64_t truth_seed = 1, noise_seed = 1;
@@ -26,5 +33,17 @@ struct PlantSettings {
 // encoder and current. io::InputError: the plant cannot read the robot file;
 // the file has no [control] table.
 logs::Log RunPlant(const codegen::Robot& robot, const excitation::Series& series, const PlantSettings& settings);
+
+// What an arm without rotors would have measured: the survey's arm has none. RunPlant's log at the model's rows, less
+// the torque of the robot file's rotors.
+calibration::Dataset WithoutRotors(const codegen::Robot& robot, const codegen::Model& model, const logs::Log& log);
+
+// The same run without sensors: state and motor torque of single instants at which every joint moves faster than its
+// v_min, less the torque of the rotors.
+struct Instants {
+  codegen::Signals s;
+  Eigen::MatrixXd tau;
+};
+Instants RunExactly(const codegen::Robot& robot, const excitation::Series& series, const PlantSettings& settings);
 
 }  // namespace armcal::survey

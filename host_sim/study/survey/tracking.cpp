@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host_sim/machine/plant/joint_effects.hpp"
+#include "host_sim/study/survey/plant_run.hpp"
 #include "host_sim/study/survey/platform.hpp"
 #include "host_sim/study/survey/tables.hpp"
 
@@ -13,7 +15,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kPeriods = 3, kShownJoint = 2, kTracks = 3;
+constexpr int kShownJoint = 2, kTracks = 3;
+constexpr double kRun_s = 30;
 constexpr double kStepAt = 1.0 / 3;  // of the run
 
 struct Profile {
@@ -33,43 +36,64 @@ const Filter kFilters[] = {{"kalman", 0},         {"forgetting", 0.99},  {"forge
                            {"forgetting", 0.997}, {"forgetting", 0.998}, {"forgetting", 0.999}, {"multiple_model", 0}};
 
 struct Tracked {
+  VectorXd t;
   MatrixXd beta, found;  // [samples x joints]
 };
 
-VectorXd Shape(const Profile& profile, int samples) {
-  return VectorXd::NullaryExpr(samples,
-                               [&](Eigen::Index k) { return profile.growth(static_cast<double>(k) / samples); });
+// All betas change alike, in steps: the plant's effects begin at a time each.
+constexpr double kStep_s = 0.5;
+
+double GrowthAt(const Profile& profile, double t_s) {
+  return profile.growth(std::floor(t_s / kStep_s + 1e-9) * kStep_s / kRun_s);
 }
 
-// 30 s of the linear trajectory with all betas changing alike.
-Tracked Track(const Settings& settings, const Motions& motions, const calibration::Method& method, double mu,
-              const Profile& profile, int draw) {
-  const codegen::Robot arm =
-      Variant(settings.robot, Law::kCoulombViscous, Bodies::kStandard, SetStribeck(settings.robot.joints()));
-  const codegen::Model truth(arm, settings.records);
+// The plant along the linear trajectory; torque without noise.
+calibration::Dataset Run(const Settings& settings, const Motions& motions, const codegen::Model& model,
+                         const Profile& profile) {
+  PlantSettings plant;
+  plant.friction = plant.torque_constant = plant.noise = 0;
+  plant.seconds = kRun_s;
+  double before = 1;
+  for (double t_s = 0; t_s < kRun_s; t_s += kStep_s) {
+    const double rise = GrowthAt(profile, t_s) - before;
+    before += rise;
+    if (rise == 0) continue;
+    for (int j = 0; j < settings.robot.joints(); ++j) {
+      const double beta = settings.robot.joint[static_cast<std::size_t>(j)].nominal.at("Fv");
+      const toml::table keys{{"drag_at_1radps_Nm", rise * beta}, {"exponent", 1.0}};
+      plant.effects.push_back({"viscous_cubic", j,
+                               plant::ReadJointEffect("viscous_cubic", io::TomlReader(keys, "figure 4")),
+                               kRamp_s + t_s});
+    }
+  }
+  return WithoutRotors(settings.robot, model, RunPlant(settings.robot, motions.linear.series, plant));
+}
+
+Tracked Track(const Settings& settings, const codegen::Model& truth, const calibration::Dataset& clean,
+              const calibration::Method& method, double mu, const Profile& profile, int draw) {
+  const codegen::Robot& arm = truth.robot();
   const auto seed = settings.seed * 101 + static_cast<std::uint64_t>(draw);
   const PriorError error;
   const codegen::Model prior(DrawPrior(arm, error, seed), settings.records);
-  const codegen::Signals s = Sampled(motions.linear.series, kPeriods * kSamples);
-  const VectorXd z = SetParameters(truth), growth = Shape(profile, s.samples());
-  const int joints = truth.joints();
+  const int joints = truth.joints(), samples = clean.samples();
+  const VectorXd z = SetParameters(truth);
   Tracked run;
-  run.beta.resize(s.samples(), joints), run.found.resize(s.samples(), joints);
-  MatrixXd tau = Torque(truth, s, z);
+  run.t = clean.s.t;
+  run.beta.resize(samples, joints), run.found.resize(samples, joints);
   VectorXd sigma(joints);
   for (int j = 0; j < joints; ++j) {
     const double beta = z[PlaceOf(truth, "Fv" + std::to_string(j + 1))];
-    run.beta.col(j) = beta * growth;
-    tau.col(j) += beta * (growth.array() - 1).matrix().cwiseProduct(s.qd.col(j));
-    sigma[j] = arm.joint[j].torque_noise_Nm;
+    for (int k = 0; k < samples; ++k) run.beta(k, j) = beta * GrowthAt(profile, run.t[k]);
+    sigma[j] = arm.joint[static_cast<std::size_t>(j)].torque_noise_Nm;
   }
-  const calibration::Dataset log = Measured(s, tau + Noise(s.samples(), sigma, seed + 50));
+  calibration::Dataset log = clean;
+  log.tau += Noise(samples, sigma, seed + 50);
   calibration::Problem problem = WithPrior(prior, {&log}, RelativeDeviation(error));
   problem.stop = settings.stop;
   if (mu > 0) problem.forgetting = mu;
   const Attempt attempt = Try(method, problem);
   run.found.setConstant(std::nan(""));
-  if (attempt.solution && attempt.solution->path.rows() == s.samples())
+  if (attempt.solution && attempt.solution->path.rows() == samples)
     for (int j = 0; j < joints; ++j)
       run.found.col(j) = attempt.solution->path.col(PlaceOf(truth, "Fv" + std::to_string(j + 1)));
   return run;
@@ -81,8 +105,7 @@ report::Plot PlotOf(const std::string& title, const std::vector<std::pair<std::s
   report::Plot plot;
   plot.text = {title, "time / s", "viscous friction of joint 3 / N m s/rad", 760, 300};
   const MatrixXd& beta = runs.front().second->beta;
-  const std::vector<double> t =
-      List(VectorXd::LinSpaced(beta.rows(), 0, static_cast<double>(beta.rows() - 1) / kRate_Hz));
+  const std::vector<double> t = List(runs.front().second->t);
   plot.series.push_back({"set", t, List(beta.col(kShownJoint))});
   for (const auto& [name, run] : runs) plot.series.push_back({name, t, List(run->found.col(kShownJoint))});
   // Filters without a prior start far away. The picture leaves that out, to show how they follow.
@@ -101,6 +124,7 @@ void ShowTracking(const Settings& settings, const Motions& motions, Evidence& ev
               {},
               {"\"Follows\" means at most 5 %: level A if it follows the slope, B if it follows the step alone, C if "
                "neither. The survey names these levels and gives no number.",
+               "The plant is the truth; its betas rise in steps of half a second.",
                "All mu are shown: the best is known only afterwards. Forgetting on standard parameters divides P by mu "
                "in directions that no torque sees, for ever: small mu diverge while the arm moves, larger ones at "
                "rest."}};
@@ -110,10 +134,17 @@ void ShowTracking(const Settings& settings, const Motions& motions, Evidence& ev
   const auto place = [](int filter, int profile, int draw) {
     return static_cast<std::size_t>((filter * kProfileCount + profile) * kTracks + draw);
   };
+  const codegen::Model truth(
+      Variant(settings.robot, Law::kCoulombViscous, Bodies::kStandard, SetStribeck(settings.robot.joints())),
+      settings.records);
+  std::vector<calibration::Dataset> clean(kProfileCount);
+  ForEachDraw(settings, "figure 4, runs of the plant", kProfileCount,
+              [&](int p) { clean[static_cast<std::size_t>(p)] = Run(settings, motions, truth, kProfiles[p]); });
   ForEachDraw(settings, "figure 4", static_cast<int>(runs.size()), [&](int k) {
     const int f = k / (kProfileCount * kTracks), p = k / kTracks % kProfileCount;
-    runs[static_cast<std::size_t>(k)] = Track(settings, motions, calibration::FindMethod(kFilters[f].method),
-                                              kFilters[f].mu, kProfiles[p], k % kTracks);
+    runs[static_cast<std::size_t>(k)] =
+        Track(settings, truth, clean[static_cast<std::size_t>(p)], calibration::FindMethod(kFilters[f].method),
+              kFilters[f].mu, kProfiles[p], k % kTracks);
   });
   std::map<std::pair<std::string, std::string>, Tracked> shown;  // (profile, filter) -> the first draw
   for (int k = 0; k < kFilterCount; ++k) {
@@ -125,7 +156,7 @@ void ShowTracking(const Settings& settings, const Motions& motions, Evidence& ev
       for (int d = 0; d < kTracks; ++d) {
         const Tracked& run = runs[place(k, p, d)];
         if (run.beta.size() > 0)
-          errors.push_back(FollowError(run.beta, run.found, 1 / kRate_Hz, settings.levels.settle_s));
+          errors.push_back(FollowError(run.beta, run.found, run.t[1] - run.t[0], settings.levels.settle_s));
       }
       shown[{kProfiles[p].name, f.method + (f.mu > 0 ? " " + std::to_string(f.mu).substr(0, 5) : "")}] =
           std::move(runs[place(k, p, 0)]);

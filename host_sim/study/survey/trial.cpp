@@ -7,6 +7,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
+#include "host_sim/study/survey/platform.hpp"
 
 namespace armcal::survey {
 
@@ -128,24 +129,44 @@ Statistic Summarise(std::vector<double> values) {
   return s;
 }
 
-Truth::Truth(codegen::Model model_of_truth, const codegen::Signals& train_motion, const codegen::Signals& other_motion)
+Truth::Truth(codegen::Model model_of_truth, calibration::Dataset train_log, Instants other_run)
     : model(std::move(model_of_truth)),
       z(SetParameters(model)),
       bodies(calibration::BodyMean(model)),
       friction(Friction(model, z)),
-      train(train_motion),
-      other(other_motion),
-      tau(Torque(model, train, z)),
-      tau_other(Torque(model, other, z)),
+      train(std::move(train_log)),
+      other(std::move(other_run.s)),
+      tau_other(std::move(other_run.tau)),
       sigma_Nm(model.joints()) {
   for (int j = 0; j < model.joints(); ++j) sigma_Nm[j] = model.robot().joint[j].torque_noise_Nm;
+}
+
+Truth AnalyticTruth(codegen::Model model, const codegen::Signals& train, const codegen::Signals& other) {
+  const VectorXd z = SetParameters(model);
+  calibration::Dataset log = Measured(train, Torque(model, train, z));
+  Instants run{other, Torque(model, other, z)};
+  return {std::move(model), std::move(log), std::move(run)};
+}
+
+calibration::Dataset Truth::Noisy(std::uint64_t seed) const {
+  calibration::Dataset log = train;
+  log.tau += Noise(train.samples(), sigma_Nm, seed);
+  return log;
+}
+
+MatrixXd Truth::Judged(const MatrixXd& of_train) const {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index k = 0; k < of_train.rows(); ++k)
+    if (train.used.row(k).minCoeff() == 1) rows.push_back(k);
+  return of_train(rows, Eigen::all);
 }
 
 Score Judge(const Truth& truth, const Levels& levels, const MatrixXd& measured, const calibration::Solution& solution,
             const VectorXd& bodies_before) {
   Score s;
   const BodyError body = CompareBodies(truth.bodies, solution.bodies, levels);
-  const TorqueError train = CompareTorques(measured - Torque(truth.model, truth.train, solution.z), levels.tau_max_Nm);
+  const TorqueError train =
+      CompareTorques(truth.Judged(measured - Torque(truth.model, truth.train.s, solution.z)), levels.tau_max_Nm);
   const MatrixXd difference = truth.tau_other - Torque(truth.model, truth.other, solution.z);
   const TorqueError other = CompareTorques(difference, levels.tau_max_Nm);
   s.e_d = body.e_d;

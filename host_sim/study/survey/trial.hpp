@@ -9,6 +9,7 @@
 #include "host_sim/identify/methods/method.hpp"
 #include "host_sim/study/survey/arm.hpp"
 #include "host_sim/study/survey/data_files.hpp"
+#include "host_sim/study/survey/plant_run.hpp"
 #include "host_sim/study/survey/sheet.hpp"
 
 namespace armcal::survey {
@@ -54,17 +55,28 @@ struct Statistic {
 };
 Statistic Summarise(std::vector<double> values);
 
-// What an estimate is compared with: the true model, the training motion, and a motion to which nothing was fitted.
+// What an estimate is compared with: the true parameters, the training motion, and a motion to which nothing was
+// fitted.
 struct Truth {
-  Truth(codegen::Model model_of_truth, const codegen::Signals& train_motion, const codegen::Signals& other_motion);
+  // The model says what the parameters mean; the torque may come from elsewhere.
+  Truth(codegen::Model model_of_truth, calibration::Dataset train_log, Instants other_run);
+
+  // The training log with the noise of Table 7.
+  calibration::Dataset Noisy(std::uint64_t seed) const;
+  // The rows at which all joints' samples are used: those can be compared with a model.
+  Eigen::MatrixXd Judged(const Eigen::MatrixXd& of_train) const;
 
   codegen::Model model;
   Eigen::VectorXd z, bodies;
   Eigen::MatrixXd friction;
-  codegen::Signals train, other;
-  Eigen::MatrixXd tau, tau_other;  // noise-free
-  Eigen::VectorXd sigma_Nm;        // Table 7, from the robot file
+  calibration::Dataset train;  // without noise
+  codegen::Signals other;
+  Eigen::MatrixXd tau_other;  // without noise
+  Eigen::VectorXd sigma_Nm;   // Table 7, from the robot file
 };
+
+// The survey's analytic form: torque is K z of the model itself, and every row may be used.
+Truth AnalyticTruth(codegen::Model model, const codegen::Signals& train, const codegen::Signals& other);
 
 struct Score {
   double e_d = 0, e_f = 0, e_T = 0, e_T_std = 0,

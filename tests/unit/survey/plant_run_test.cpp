@@ -1,9 +1,10 @@
-// survey tests - logs of the plant show the friction that the robot file states.
+// survey tests - logs of the plant show what the robot file states.
 #include "host_sim/study/survey/plant_run.hpp"
 
 #include <gtest/gtest.h>
 
 #include "host_sim/identify/choice/fit_model.hpp"
+#include "host_sim/study/survey/platform.hpp"
 #include "tests/unit/survey/survey_arm.hpp"
 
 namespace armcal::survey {
@@ -30,6 +31,48 @@ TEST(PlantRun, WithoutNoise_AFitMissesTheFilesFrictionByLessThanAQuarterOfADevia
                   0.25 * std::sqrt(found.covariance(place, place)))
           << name << j + 1;
     }
+}
+
+Settings SurveyOfTheFile() {
+  Settings settings;
+  settings.robot = test::File();
+  settings.records = test::AllRecords();
+  return settings;
+}
+
+Motions StudyMotions() {
+  Motions motions;
+  motions.linear.series = test::StudyLinear();
+  motions.nonlinear.series = test::StudyNonlinear();
+  motions.other = Validation(test::File(), test::AllRecords(), 5);
+  return motions;
+}
+
+// Two programs that do not know each other: the plant moves by KDL's forward dynamics, the model's torque comes from
+// armcal's regressor. Both take bodies and friction from the robot file.
+TEST(SurveyTruth, OfThePlant_IsTheTorqueThatTheModelHasForTheSetParameters) {
+  for (const Law law : {Law::kCoulombViscous, Law::kStribeck}) {
+    const Stribeck set = DrawStribeck(6, 3);
+    const auto truth = MakeTruth(SurveyOfTheFile(), StudyMotions(), law, set);
+    const Eigen::MatrixXd exact = truth->tau_other - Torque(truth->model, truth->other, truth->z);
+    EXPECT_GT(exact.rows(), 500);
+    EXPECT_LT(exact.cwiseAbs().maxCoeff(), 1e-6) << LawName(law);
+    // Through sensors and derivatives: far below the noise that is added later.
+    const Eigen::MatrixXd read = truth->Judged(truth->train.tau - Torque(truth->model, truth->train.s, truth->z));
+    EXPECT_GT(read.rows(), 500);
+    EXPECT_LT(BaseError(read, truth->sigma_Nm), 0.1) << LawName(law);
+  }
+}
+
+TEST(SurveyTruth, OfThePlant_LeavesOutRowsAtRest) {
+  const auto truth = MakeTruth(SurveyOfTheFile(), StudyMotions(), Law::kCoulombViscous, SetStribeck(6));
+  for (int j = 0; j < 6; ++j) {
+    EXPECT_GT(truth->other.qd.col(j).cwiseAbs().minCoeff(), test::File().joint[j].v_min_radps);
+    for (int k = 0; k < truth->train.samples(); ++k)
+      if (truth->train.used(k, j)) {
+        EXPECT_GT(std::abs(truth->train.s.qd(k, j)), test::File().joint[j].v_min_radps);
+      }
+  }
 }
 
 }  // namespace

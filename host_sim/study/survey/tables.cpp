@@ -116,6 +116,7 @@ Findings RunSurvey(const Settings& asked) {
   if (settings.Wants("shipped")) ShowShippedPrior(settings, motions, out);
   if (settings.Wants("laws")) ShowLaws(settings, motions, out);
   if (settings.Wants("choice")) ShowChoice(settings, motions, out);
+  if (settings.Wants("bounds")) ShowBounds(settings, motions, out);
   if (settings.Wants("online")) ShowOnline(settings, motions, out);
   out.sheets.push_back(Slips());
   return out;

@@ -35,6 +35,8 @@ void ShowLaws(const Settings& settings, const Motions& motions, Findings& out);
 void ShowChoice(const Settings& settings, const Motions& motions, Findings& out);
 // The firmware's own estimator on fresh draws, and whether it reports that its deviations cannot be trusted.
 void ShowOnline(const Settings& settings, const Motions& motions, Findings& out);
+// Base parameters of each estimator against the bound that applies.
+void ShowBounds(const Settings& settings, const Motions& motions, Findings& out);
 // Table 10: in the closed loop, and without one.
 void ShowDifferentiation(const Settings& settings, const Motions& motions, Findings& out);
 void ShowInstruments(const Settings& settings, const Motions& motions, Findings& out);

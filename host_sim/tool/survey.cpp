@@ -82,9 +82,9 @@ void AddSurvey(CLI::App& app, Action& action) {
                          "methods beside\nexample: armcal survey --table 8 --draws 20 --report survey.html");
   auto o = std::make_shared<SurveyOptions>();
   verb->add_option("--table", o->tables,
-                   "5 to 12, trajectories, priors, shipped, laws, choice, bounds, online, figures (default: "
+                   "5 to 12, trajectories, priors, shipped, widths, laws, choice, bounds, online, figures (default: "
                    "all but widths)")
-      ->check(OneOf({"5", "6", "7", "8", "9", "10", "11", "12", "trajectories", "priors", "shipped", "laws",
+      ->check(OneOf({"5", "6", "7", "8", "9", "10", "11", "12", "trajectories", "priors", "shipped", "widths", "laws",
                      "choice", "bounds", "online", "figures"}));
   verb->add_option("--draws", o->draws, "random draws of prior and noise")->check(AboveZero());
   verb->add_option("--slow-draws", o->slow_draws, "draws of the methods of (25), which take seconds each")

@@ -182,8 +182,8 @@ void Append(Solved solved, Outcome& out) {
 
 }  // namespace
 
-bool Settings::Wants(const std::string& table) const {
-  return tables.empty() || std::find(tables.begin(), tables.end(), table) != tables.end();
+bool Settings::Names(const std::string& table) const {
+  return std::find(tables.begin(), tables.end(), table) != tables.end();
 }
 
 std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motions, Law law, const Stribeck& stribeck) {

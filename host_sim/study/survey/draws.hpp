@@ -45,11 +45,12 @@ struct Settings {
   bool cad_feedforward = false;  // the loop's controller uses CAD values instead of the set parameters
   double search_s = 55;          // of each trajectory search at most; given enough time, the seed decides the results
   int searches = 0;              // starts of each trajectory search at most; 0: as many as it has
-  std::vector<std::string> tables;  // "5" .. "12", "figures"; empty: all
+  std::vector<std::string> tables;  // "5" .. "12", "figures"; empty: all but "widths"
   const std::atomic<bool>* stop = nullptr;
   std::function<void(const std::string& what, double share)> progress = [](const std::string&, double) {};
 
-  bool Wants(const std::string& table) const;
+  bool Names(const std::string& table) const;
+  bool Wants(const std::string& table) const { return tables.empty() || Names(table); }
   bool Stopped() const { return stop && *stop; }
 };
 

@@ -114,6 +114,7 @@ Findings RunSurvey(const Settings& asked) {
   ShowLoad(settings, motions, out);
   if (settings.Wants("priors")) ShowPriors(settings, motions, out);
   if (settings.Wants("shipped")) ShowShippedPrior(settings, motions, out);
+  if (settings.Names("widths")) ShowWidths(settings, motions, out);
   if (settings.Wants("laws")) ShowLaws(settings, motions, out);
   if (settings.Wants("choice")) ShowChoice(settings, motions, out);
   if (settings.Wants("bounds")) ShowBounds(settings, motions, out);

@@ -29,6 +29,9 @@ void ShowErrors(const Settings& settings, const Evidence& evidence, Findings& ou
 void ShowPriors(const Settings& settings, const Motions& motions, Findings& out);
 // The prior of the robot file as it ships on logs of the plant, under errors of the CAD values that it is not told.
 void ShowShippedPrior(const Settings& settings, const Motions& motions, Findings& out);
+// The same under every kind and width of error and after 10, 40 and 120 s. It takes hours with many draws, so only who
+// asks for it by name gets it.
+void ShowWidths(const Settings& settings, const Motions& motions, Findings& out);
 // Friction laws of joints found again in logs of the plant.
 void ShowLaws(const Settings& settings, const Motions& motions, Findings& out);
 // Whether `armcal choose` finds the law that a joint has.

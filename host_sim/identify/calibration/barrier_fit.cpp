@@ -200,6 +200,14 @@ class TableFit {
 
 }  // namespace
 
+namespace {
+
+// Of one weight of the barrier. Ten do where logs are short. Two minutes of a log leave a narrow curved valley where
+// CAD values are far off, since torque knows m c and the prior c; then steps are short.
+constexpr int kSteps = 1000;
+
+}  // namespace
+
 BarrierFit FitWithBarrier(const BarrierProblem& problem) {
   const TableFit fit(problem);
   VectorXd u = VectorXd::Zero(fit.free()), gradient;
@@ -209,7 +217,7 @@ BarrierFit FitWithBarrier(const BarrierProblem& problem) {
   for (const double eps : {1.0, 0.1, 0.01}) {
     double damping = 1e-9, cost = fit.Cost(u, eps);
     out.converged = false;
-    for (int k = 0; k < 60 && !out.converged && !stopped(); ++k, ++out.iterations) {
+    for (int k = 0; k < kSteps && !out.converged && !stopped(); ++k, ++out.iterations) {
       fit.Derivatives(u, eps, gradient, hessian);
       bool stepped = false;
       for (int attempt = 0; attempt < 12 && !stepped; ++attempt) {

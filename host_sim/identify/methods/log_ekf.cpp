@@ -4,6 +4,11 @@
 // of the torque. The amplitudes of nonlinear effects (Fs - Fc) and their positive eta (q_s) are filtered as logarithms,
 // cut to their range. So q_s can neither change its sign nor grow until exp(-(v / q_s)^2) is constant, which is how the
 // survey's filter fails.
+//
+// The first rows are linearised far from the truth, and a filter never looks at them again. So it passes over the log
+// again, from the same prior, with every row linearised at the end of the pass before. Each further pass is one step of
+// Gauss and Newton towards the most likely parameters; one that does not get nearer is not kept. The path is that of
+// the first pass, which knows only what is past.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -20,7 +25,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kRelinearised = 2;       // passes over one sample
+constexpr int kRelinearised = 2;       // of a sample in the first pass
+constexpr int kPasses = 6;             // over the log at most
 constexpr double kUnknownShare = 0.1;  // of its deviation: the start of an amplitude whose mean is zero
 constexpr double kWidestLog = 1.5;     // prior deviation of a logarithm: a factor of 4.5
 constexpr double kReach = 4;           // prior deviations that a logarithm may move from its start
@@ -81,84 +87,141 @@ struct Coordinates {
   }
 };
 
+// What one pass over the log ends with.
+struct Passed {
+  VectorXd state;
+  MatrixXd P;
+  int samples = 0;
+  bool diverged = false;
+};
+
+class LogFilter {
+ public:
+  LogFilter(const Problem& problem, const Coordinates& at)
+      : problem_(problem),
+        model_(*problem.model),
+        at_(at),
+        effects_(model_),
+        rows_(StackRows(problem, problem.start)),
+        row_(MatrixXd::Zero(model_.joints(), model_.columns())),
+        slope_(MatrixXd::Zero(model_.joints(), model_.nonlinear())) {}
+
+  // about: where each row is linearised; null: where the filter is. path: filled in, one row a sample; may be null.
+  Passed Pass(const VectorXd* about, MatrixXd* path) {
+    Passed now{at_.start.cwiseMax(at_.lower).cwiseMin(at_.upper), at_.covariance};
+    std::size_t next = 0;  // row
+    for (std::size_t l = 0; l < problem_.train.size(); ++l) {
+      const Dataset& log = *problem_.train[l];
+      for (int s = 0; s < log.samples(); ++s, ++now.samples) {
+        const std::size_t first = next;
+        while (next < rows_.joint.size() && rows_.log[next] == static_cast<int>(l) && rows_.sample[next] == s) ++next;
+        if (next > first && !Update(log, s, first, next, about, now)) {
+          now.diverged = true;
+          return now;
+        }
+        if (path) path->row(now.samples) = at_.Z(now.state);
+      }
+      if (Stopped(problem_)) break;
+    }
+    return now;
+  }
+
+  // What the logs and the prior say against a state, chi^2.
+  double Cost(const VectorXd& state) const {
+    const VectorXd off = state - at_.start;
+    return Linearise(problem_, at_.Z(state)).residual.squaredNorm() +
+           off.dot(at_.covariance.completeOrthogonalDecomposition().solve(off));
+  }
+
+ private:
+  // Rows first .. next - 1 of one sample. Returns whether the state is finite; if not, it stays as it was.
+  bool Update(const Dataset& log, int s, std::size_t first, std::size_t next, const VectorXd* about, Passed& now) {
+    const int columns = model_.columns();
+    const auto m = static_cast<Eigen::Index>(next - first);
+    const VectorXd q = log.s.q.row(s), qd = log.s.qd.row(s), qdd = log.s.qdd.row(s);
+    const VectorXd temp = log.s.temp.cols() == log.joints() ? VectorXd(log.s.temp.row(s)) : VectorXd();
+    VectorXd state = now.state;
+    H_.resize(m, now.state.size());
+    MatrixXd PH;
+    Eigen::LDLT<MatrixXd> S;
+    for (int pass = 0; pass < (about ? 1 : kRelinearised); ++pass) {
+      const VectorXd& here = about ? *about : state;
+      const VectorXd z = at_.Z(here), dz = at_.Slope(z);
+      effects_.Set(log.s.t.size() ? log.s.t[s] : 0, q, qd, qdd, temp, z);
+      effects_.Columns(row_);
+      if (model_.nonlinear()) effects_.Slope(slope_);
+      VectorXd innovation(m);
+      for (Eigen::Index i = 0; i < m; ++i) {
+        const auto r = static_cast<Eigen::Index>(first) + i;
+        const int j = rows_.joint[first + static_cast<std::size_t>(i)];
+        H_.row(i).head(columns) = row_.row(j);
+        H_.row(i).segment(model_.front(), model_.rigid()) = rows_.K.row(r).segment(model_.front(), model_.rigid());
+        H_.row(i).tail(model_.nonlinear()) = slope_.row(j);
+        innovation[i] = rows_.tau[r] - H_.row(i).head(columns).dot(z.head(columns));
+      }
+      H_ = H_ * dz.asDiagonal();
+      innovation -= H_ * (now.state - here);
+      PH = now.P * H_.transpose();
+      MatrixXd spread = H_ * PH;
+      for (Eigen::Index i = 0; i < m; ++i)
+        spread(i, i) += std::pow(problem_.sigma_Nm[rows_.joint[first + static_cast<std::size_t>(i)]], 2);
+      S.compute(spread);
+      state = (now.state + PH * S.solve(innovation)).cwiseMax(at_.lower).cwiseMin(at_.upper);
+    }
+    if (!state.allFinite()) return false;
+    now.state = state;
+    now.P -= PH * S.solve(PH.transpose());
+    now.P = (0.5 * (now.P + now.P.transpose())).eval();
+    return true;
+  }
+
+  const Problem& problem_;
+  const codegen::Model& model_;
+  const Coordinates& at_;
+  EffectPoint effects_;
+  Rows rows_;
+  MatrixXd row_, slope_, H_;
+};
+
 }  // namespace
 
 Solution LogEkf(const Problem& problem) {
   const double began = CpuSeconds();
   if (problem.covariance.size() == 0) throw io::InputError("method log_ekf: expected a prior");
-  const codegen::Model& model = *problem.model;
-  EffectPoint effects(model);
   const Coordinates at(problem);
-  const int size = static_cast<int>(problem.start.size()), columns = model.columns(), n = model.joints();
-  const Rows rows = StackRows(problem, problem.start);
+  const auto size = static_cast<std::size_t>(problem.start.size());
   int samples = 0;
   for (const Dataset* log : problem.train) samples += log->samples();
   Solution solution;
-  solution.path.resize(samples, size);
-  VectorXd state = at.start.cwiseMax(at.lower).cwiseMin(at.upper);
-  MatrixXd P = at.covariance, H, PH;
-  MatrixXd row = MatrixXd::Zero(n, columns), slope = MatrixXd::Zero(n, model.nonlinear());
-  std::size_t next = 0;  // row
-  int k = 0;             // sample over all logs
-  for (std::size_t l = 0; l < problem.train.size(); ++l) {
-    const Dataset& log = *problem.train[l];
-    for (int s = 0; s < log.samples(); ++s, ++k) {
-      const std::size_t first = next;
-      while (next < rows.joint.size() && rows.log[next] == static_cast<int>(l) && rows.sample[next] == s) ++next;
-      const auto m = static_cast<Eigen::Index>(next - first);
-      if (m > 0) {
-        const VectorXd q = log.s.q.row(s), qd = log.s.qd.row(s), qdd = log.s.qdd.row(s);
-        const VectorXd temp = log.s.temp.cols() == n ? VectorXd(log.s.temp.row(s)) : VectorXd();
-        const VectorXd predicted = state;
-        H.resize(m, size);
-        Eigen::LDLT<MatrixXd> S;
-        for (int pass = 0; pass < kRelinearised; ++pass) {
-          const VectorXd z = at.Z(state), dz = at.Slope(z);
-          effects.Set(log.s.t.size() ? log.s.t[s] : 0, q, qd, qdd, temp, z);
-          effects.Columns(row);
-          if (model.nonlinear()) effects.Slope(slope);
-          VectorXd innovation(m);
-          for (Eigen::Index i = 0; i < m; ++i) {
-            const auto r = static_cast<Eigen::Index>(first) + i;
-            const int j = rows.joint[first + static_cast<std::size_t>(i)];
-            H.row(i).head(columns) = row.row(j);
-            H.row(i).segment(model.front(), model.rigid()) = rows.K.row(r).segment(model.front(), model.rigid());
-            H.row(i).tail(model.nonlinear()) = slope.row(j);
-            innovation[i] = rows.tau[r] - H.row(i).head(columns).dot(z.head(columns));
-          }
-          H = H * dz.asDiagonal();
-          innovation -= H * (predicted - state);
-          PH = P * H.transpose();
-          MatrixXd spread = H * PH;
-          for (Eigen::Index i = 0; i < m; ++i)
-            spread(i, i) += std::pow(problem.sigma_Nm[rows.joint[first + static_cast<std::size_t>(i)]], 2);
-          S.compute(spread);
-          state = (predicted + PH * S.solve(innovation)).cwiseMax(at.lower).cwiseMin(at.upper);
-        }
-        P -= PH * S.solve(PH.transpose());
-        P = (0.5 * (P + P.transpose())).eval();
-        if (!state.allFinite()) {
-          solution.remark = "diverged at sample " + std::to_string(k);
-          solution.converged = false;
-          solution.z = at.Z(predicted);
-          solution.path.conservativeResize(k, size);
-          Finish(problem, began, solution);
-          return solution;
-        }
-      }
-      solution.path.row(k) = at.Z(state);
-    }
-    if (problem.progress) problem.progress(static_cast<double>(k) / samples, 0);
-    if (Stopped(problem)) break;
+  solution.path.resize(samples, problem.start.size());
+  LogFilter filter(problem, at);
+  Passed best = filter.Pass(nullptr, &solution.path);
+  solution.path.conservativeResize(best.samples, Eigen::NoChange);
+  solution.iterations = best.samples;
+  if (best.diverged) {
+    solution.remark = "diverged at sample " + std::to_string(best.samples);
+    solution.converged = false;
+    solution.z = at.Z(best.state);
+    Finish(problem, began, solution);
+    return solution;
   }
-  solution.path.conservativeResize(k, size);
-  solution.iterations = k;
+  double cost = filter.Cost(best.state);
+  for (int pass = 1; pass < kPasses && !Stopped(problem); ++pass) {
+    if (problem.progress) problem.progress(static_cast<double>(pass) / kPasses, cost);
+    Passed next = filter.Pass(&best.state, nullptr);
+    if (next.diverged || Stopped(problem)) break;
+    const double now = filter.Cost(next.state);
+    if (!(now < cost)) break;
+    const VectorXd moved = (next.state - best.state).cwiseAbs(), sd = next.P.diagonal().cwiseMax(0).cwiseSqrt();
+    best = std::move(next), cost = now;
+    if ((moved.array() <= kSettled * sd.array()).all()) break;
+  }
   if (at.guessed)
     solution.remark = "no prior mean for an amplitude: may have settled elsewhere, compare with variable_projection";
-  solution.z = at.Z(state);
+  solution.z = at.Z(best.state);
   const VectorXd dz = at.Slope(solution.z);
-  solution.covariance = dz.asDiagonal() * P * dz.asDiagonal();
-  solution.memory_bytes = static_cast<std::size_t>(size) * static_cast<std::size_t>(size + n) * 2 * sizeof(double);
+  solution.covariance = dz.asDiagonal() * best.P * dz.asDiagonal();
+  solution.memory_bytes = size * (size + static_cast<std::size_t>(problem.model->joints())) * 2 * sizeof(double);
   Finish(problem, began, solution);
   return solution;
 }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "tests/unit/methods/better_arm.hpp"
 #include "tests/unit/methods/classic_arm.hpp"
 
@@ -89,8 +90,7 @@ void Judge(Solve solve, const char* name, int first = 1) {
 // A filter that linearises each sample once needs a prior about as wide as the truths are: Fs - Fc a quarter of Fc give
 // or take half of that, q_s within a factor of 1.5. Left as wide as its range, it settles elsewhere in some draws. The
 // two others start from nothing.
-Solution InformedLogEkf(const Problem& problem) {
-  Problem p = problem;
+Problem Informed(Problem p) {
   const codegen::Model& model = *p.model;
   for (int c = 0; c < model.columns(); ++c) {
     if (model.is_rigid(c) || model.table()[model.table_index(c)].effect != "stribeck") continue;
@@ -101,7 +101,39 @@ Solution InformedLogEkf(const Problem& problem) {
     const int c = model.columns() + k;
     if (model.unknowns()[k].key == "vs") p.covariance(c, c) = std::pow(0.4 * p.start[c], 2);
   }
-  return LogEkf(p);
+  return p;
+}
+Solution InformedLogEkf(const Problem& problem) { return LogEkf(Informed(problem)); }
+
+// One pass over the log ends off this point, because its first rows are linearised at the prior.
+TEST(LogEkf, EndsWhereNoStepInALogarithmIsMoreLikely) {
+  for (const std::uint64_t seed : {11, 12, 13, 14}) {
+    const DrawnArm draw(seed);
+    const Problem p = Informed(draw.problem);
+    const codegen::Model& model = draw.arm.model();
+    const Solution found = LogEkf(p);
+    std::vector<int> logarithms;
+    for (int c = 0; c < p.start.size(); ++c)
+      if (c >= model.columns() ? p.lower[c] < p.upper[c]
+                               : !model.is_rigid(c) && model.table()[model.table_index(c)].effect == "stribeck")
+        logarithms.push_back(c);
+    ASSERT_EQ(logarithms.size(), 4U);
+    // chi^2: the logs, and a normal prior of each logarithm whose relative deviation is the problem's.
+    const auto against = [&](const VectorXd& z) {
+      const VectorXd error = Linearise(p, z).residual;
+      double sum = error.squaredNorm();
+      for (const int c : logarithms)
+        sum += std::pow(std::log(z[c] / p.start[c]), 2) / std::log1p(p.covariance(c, c) / (p.start[c] * p.start[c]));
+      return sum;
+    };
+    const double least = against(found.z);
+    for (const int c : logarithms)
+      for (const int side : {-1, 1}) {
+        VectorXd z = found.z;
+        z[c] *= std::exp(side * 0.1 * std::sqrt(found.covariance(c, c)) / z[c]);
+        EXPECT_GT(against(z), least) << seed << " " << c;
+      }
+  }
 }
 
 TEST(LogEkf, FindsStribeckTruths) { Judge(InformedLogEkf, "log_ekf", 11); }

@@ -1,6 +1,5 @@
 // end-to-end tests - compare armcal survey on fresh draws with the survey, and try every curve of armcal excite.
 #include <algorithm>
-#include <map>
 
 #include "tests/e2e/tool.hpp"
 
@@ -119,12 +118,7 @@ TEST_F(Survey, ForgettingFollowsBetterThanKalman_TheBankBetterThanBoth) {
   EXPECT_LT(bank, 0.6 * forgetting);
 }
 
-// Ten seconds of an arm that really sticks do not show a drawn Stribeck speed well enough. The goal stays, the tool
-// says that it is missed, and here stands how far from it the methods are at most.
-const std::map<std::string, double> kMissed{{"Table 9, (4) with drawn truths, noise, log_ekf: mean e_f", 0.10},
-                                            {"Table 9, (4) with drawn truths, noise, stribeck_basis: mean e_f", 0.09}};
-
-TEST_F(Survey, EveryTableAndFigureIsThere_AndTheExitCodeSaysWhetherEveryGoalIsMet) {
+TEST_F(Survey, EveryTableAndFigureIsThere_EveryGoalIsMet) {
   for (const char* table : {"trajectories", "5", "6", "7", "8", "9", "10", "10 tier 2", "11", "12", "(9)", "priors",
                             "shipped prior", "figure 4", "slips"})
     EXPECT_TRUE(all_.at("tables").contains(table)) << table;
@@ -132,17 +126,15 @@ TEST_F(Survey, EveryTableAndFigureIsThere_AndTheExitCodeSaysWhetherEveryGoalIsMe
   for (const char* figure : {"Figure 1", "Figure 2", "Figure 3", "Figure 4"})
     EXPECT_NE(page.find(figure), std::string::npos) << figure;
   EXPECT_GE(all_.at("goals").size(), 30U);
-  int shipped = 0, missed = 0;
+  int shipped = 0;
   for (const auto& goal : all_.at("goals")) {
     const std::string name = goal.at("name");
-    missed += !goal.at("met");
-    if (kMissed.contains(name)) EXPECT_LE(goal.at("value").get<double>(), kMissed.at(name)) << name;
-    else EXPECT_TRUE(goal.at("met")) << name << ": " << goal.at("value");
+    EXPECT_TRUE(goal.at("met")) << name << ": " << goal.at("value");
     EXPECT_TRUE(name.starts_with("Table ") || name.starts_with("Section ")) << name;
     shipped += name.find("shipped prior") != std::string::npos;
   }
   EXPECT_GE(shipped, 7);
-  EXPECT_EQ(run_.code, missed > 0 ? 5 : 0);
+  EXPECT_EQ(run_.code, 0);
 }
 
 TEST(Excite, WithEveryCurveAndCriterion_WritesATrajectoryWithinTheLimits) {

@@ -160,6 +160,7 @@ Solved SolveBoth(const Settings& settings, const DrawSettings& draws, const Trut
       continue;
     }
     out.score[with_noise] = Judge(truth, settings.levels, log.tau, *attempt.solution, bodies);
+    if (draws.random_truth) out.score[with_noise]->e_f_least = LeastFrictionError(truth, problem);
     attempt.solution->path.resize(0, 0);
     out.solution[with_noise] = *std::move(attempt.solution);
   }
@@ -201,6 +202,17 @@ std::unique_ptr<Truth> MakeTruth(const Settings& settings, const Motions& motion
   return std::make_unique<Truth>(std::move(model), std::move(train), RunExactly(file, motions.other, plant));
 }
 
+namespace {
+
+std::unique_ptr<Truth> MakeAnalytic(const Settings& settings, const Motions& motions, Law law,
+                                    const Stribeck& stribeck) {
+  const excitation::Series& series = law == Law::kStribeck ? motions.nonlinear.series : motions.linear.series;
+  codegen::Model model(Variant(settings.robot, law, Bodies::kStandard, stribeck), settings.records);
+  return std::make_unique<Truth>(AnalyticTruth(std::move(model), Sampled(series), Sampled(motions.other)));
+}
+
+}  // namespace
+
 void ForEachDraw(const Settings& settings, const std::string& what, int count, const std::function<void(int)>& work) {
   int done = 0;
   std::mutex line;
@@ -219,8 +231,9 @@ std::vector<Outcome> RunDraws(const Settings& settings, const Motions& motions, 
   std::vector<std::unique_ptr<Truth>> truths(
       static_cast<std::size_t>(draws.random_truth ? std::min(draws.draws, kTruths) : 0));
   ForEachDraw(settings, "runs of the plant", static_cast<int>(truths.size()), [&](int d) {
-    truths[static_cast<std::size_t>(d)] =
-        MakeTruth(settings, motions, draws.law, DrawStribeck(joints, SeedOf(draws.seed, d, 3)));
+    const Stribeck drawn = DrawStribeck(joints, SeedOf(draws.seed, d, 3));
+    truths[static_cast<std::size_t>(d)] = draws.analytic ? MakeAnalytic(settings, motions, draws.law, drawn)
+                                                         : MakeTruth(settings, motions, draws.law, drawn);
   });
   std::vector<std::vector<Solved>> solved(static_cast<std::size_t>(draws.draws));
   ForEachDraw(settings, LawName(draws.law) + ", " + PriorName(draws.prior), draws.draws, [&](int d) {

@@ -65,6 +65,7 @@ struct DrawSettings {
   Law law = Law::kCoulombViscous;
   PriorError prior;
   bool random_truth = false;  // qs and Fs / Fc of (4) are drawn, too
+  bool analytic = false;      // drawn truths in the survey's form instead of the plant
   int draws = 20, slow_draws = 5;
   std::uint64_t seed = 1;
   double clean_sigma = 1;  // share of Table 7's sigma that a method is told for noise-free data

@@ -1,10 +1,13 @@
 // survey - how well the better methods do under every prior, over fresh draws, and the goals that they must reach.
+#include <algorithm>
+
 #include "host_sim/study/survey/tables.hpp"
 
 namespace armcal::survey {
 namespace {
 
 constexpr double kWorst = 0.2;
+constexpr int kTruthsJudged = 20;  // at least: a mean over three drawn truths says nothing of a bound
 
 void AddRows(const std::string& prior, const std::string& case_name, const std::vector<Outcome>& outcomes, bool noise,
              Sheet& sheet) {
@@ -14,11 +17,13 @@ void AddRows(const std::string& prior, const std::string& case_name, const std::
     std::vector<Score> in_ms = scores;
     for (Score& s : in_ms) s.seconds *= 1e3;
     const Statistic e_d = Over(scores, &Score::e_d), e_f = Over(scores, &Score::e_f);
-    sheet.rows.push_back(
-        {prior, o.title, case_name, static_cast<double>(scores.size()), Cell(e_d.mean, e_d.low, e_d.high), e_d.p95,
-         Mean(scores, &Score::e_d_over_prior), Cell(e_f.mean, e_f.low, e_f.high), e_f.p95, Mean(scores, &Score::J_true),
-         Mean(scores, &Score::e_base), Mean(scores, &Score::coverage), Over(scores, &Score::physical).mean,
-         Over(in_ms, &Score::seconds).p95, static_cast<double>(o.failed)});
+    const double least = Over(scores, &Score::e_f_least).mean;
+    sheet.rows.push_back({prior, o.title, case_name, static_cast<double>(scores.size()),
+                          Cell(e_d.mean, e_d.low, e_d.high), e_d.p95, Mean(scores, &Score::e_d_over_prior),
+                          Cell(e_f.mean, e_f.low, e_f.high), e_f.p95, least > 0 ? Cell(least) : Cell("-"),
+                          Mean(scores, &Score::J_true), Mean(scores, &Score::e_base), Mean(scores, &Score::coverage),
+                          Over(scores, &Score::physical).mean, Over(in_ms, &Score::seconds).p95,
+                          static_cast<double>(o.failed)});
   }
 }
 
@@ -48,25 +53,28 @@ void ShowPriors(const Settings& settings, const Motions& motions, Findings& out)
   Sheet sheet{
       "priors",
       "methods that use the CAD values, under every prior",
-      {"prior", "method", "case", "draws", "e_d", "e_d p95", "e_d / e_d(prior)", "e_f", "e_f p95", "J_e*",
-       "base error / sigma", "coverage", "share physical", "time p95 / ms", "failed"},
+      {"prior", "method", "case", "draws", "e_d", "e_d p95", "e_d / e_d(prior)", "e_f", "e_f p95", "bound of e_f",
+       "J_e*", "base error / sigma", "coverage", "share physical", "time p95 / ms", "failed"},
       {},
-      {"Truth: the plant, as in Tables 8 and 9.",
+      {"Truth: the plant, as in Tables 8 and 9; \"analytic\": K z of armcal's own regressor, as in the survey.",
+       "Bound of e_f: what is left on average if the errors have the least covariance that the rows and the prior "
+       "allow "
+       "(Cramer and Rao), all parameters being unknown. A joint that is slow for a few samples shows little of its "
+       "Stribeck speed.",
        "Worst case: every mass, centre, moment and friction value is 20 % off, up or down. Of the 60 body "
        "parameters 24 directions are seen in no torque, so the prior's error in them stays whatever the data: e_d "
        "has a floor, and level A for e_d says as much about the prior as about the method.",
        "sigma / 10: the noise-free data with the torque noise declared ten times smaller than Table 7. With "
        "Table 7's own sigma an estimator rightly distrusts noise-free data as much as noisy ones."}};
-  const auto run_along = [&](const Motions& along, const PriorError& prior, Law law, bool random_truth,
-                             double clean_sigma, const std::vector<std::string>& methods) {
+  const auto settings_of = [&](const PriorError& prior, Law law, bool random_truth, double clean_sigma) {
     DrawSettings d;
     d.law = law, d.prior = prior, d.random_truth = random_truth, d.clean_sigma = clean_sigma;
     d.draws = settings.draws, d.slow_draws = settings.slow_draws, d.seed = settings.seed + 7;
-    return RunDraws(settings, along, d, methods);
+    return d;
   };
   const auto run = [&](const PriorError& prior, Law law, bool random_truth, double clean_sigma,
                        const std::vector<std::string>& methods) {
-    return run_along(motions, prior, law, random_truth, clean_sigma, methods);
+    return RunDraws(settings, motions, settings_of(prior, law, random_truth, clean_sigma), methods);
   };
   const std::vector<std::string> map{"map_barrier"}, laws{"log_ekf", "stribeck_basis"},
       laws_and_map{"log_ekf", "stribeck_basis", "map_barrier"};
@@ -86,20 +94,31 @@ void ShowPriors(const Settings& settings, const Motions& motions, Findings& out)
   const PriorError uniform{PriorError::kUniform, 0.2};
   for (const PriorError& prior : {uniform, worst, PriorError{PriorError::kUniform, 0.5}}) {
     const bool judged = PriorName(prior) == PriorName(uniform);
-    const auto stribeck = run(prior, Law::kStribeck, true, 1, judged ? laws_and_map : laws);
+    DrawSettings drawn = settings_of(prior, Law::kStribeck, true, 1);
+    if (judged) drawn.draws = std::max(drawn.draws, kTruthsJudged);
+    const auto stribeck = RunDraws(settings, motions, drawn, judged ? laws_and_map : laws);
     AddRows(PriorName(prior), "(4), drawn truths, noise", stribeck, true, sheet);
     if (!judged) continue;
     for (const std::string& name : laws)
       if (const Outcome* o = NoisyOf(stribeck, name))
-        out.goals.push_back({"Table 9, (4) with drawn truths, noise, " + o->name + ": mean e_f",
-                             Over(o->noisy, &Score::e_f).mean, 0.06, true});
+        out.goals.push_back(
+            {"Table 9, (4) with drawn truths on the plant, noise, " + name + ": mean e_f over its bound",
+             Over(o->noisy, &Score::e_f).mean / Over(o->noisy, &Score::e_f_least).mean, 1.15, true});
   }
+  DrawSettings analytic = settings_of(uniform, Law::kStribeck, true, 1);
+  analytic.analytic = true, analytic.draws = std::max(analytic.draws, kTruthsJudged);
+  const auto as_in_survey = RunDraws(settings, motions, analytic, laws);
+  AddRows(PriorName(uniform), "(4), drawn truths, noise, analytic", as_in_survey, true, sheet);
+  for (const std::string& name : laws)
+    if (const Outcome* o = NoisyOf(as_in_survey, name))
+      out.goals.push_back({"Table 9, (4) with drawn truths, analytic, noise, " + name + ": mean e_f",
+                           Over(o->noisy, &Score::e_f).mean, 0.06, true});
   // The same laws along a trajectory searched for friction: it has low speeds instead of a small cond(K).
   for (const ExcitedBy& e : motions.others) {
     if (e.law != Law::kGradient || e.criterion != excitation::Criterion::Kind::kAccuracy) continue;
     Motions along = motions;
     along.nonlinear = e;
-    const auto stribeck = run_along(along, uniform, Law::kStribeck, true, 1, laws);
+    const auto stribeck = RunDraws(settings, along, settings_of(uniform, Law::kStribeck, true, 1), laws);
     AddRows(PriorName(uniform), "(4), drawn truths, noise, friction-aware trajectory", stribeck, true, sheet);
   }
   out.sheets.push_back(sheet);

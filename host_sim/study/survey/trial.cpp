@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
+#include "host_sim/identify/methods/shared_steps.hpp"
 #include "host_sim/study/survey/platform.hpp"
 
 namespace armcal::survey {
@@ -159,6 +161,19 @@ MatrixXd Truth::Judged(const MatrixXd& of_train) const {
   for (Eigen::Index k = 0; k < of_train.rows(); ++k)
     if (train.used.row(k).minCoeff() == 1) rows.push_back(k);
   return of_train(rows, Eigen::all);
+}
+
+double LeastFrictionError(const Truth& truth, const calibration::Problem& problem) {
+  const calibration::Linearised at = calibration::Linearise(problem, truth.z);
+  MatrixXd covariance;
+  calibration::SolveRegularised(problem, at.A.transpose() * at.A, VectorXd::Zero(truth.z.size()), &covariance);
+  // Entries of the friction matrix are sums of parameters.
+  MatrixXd entries(truth.friction.size(), truth.z.size());
+  for (Eigen::Index c = 0; c < truth.z.size(); ++c)
+    entries.col(c) = Friction(truth.model, VectorXd::Unit(truth.z.size(), c)).reshaped();
+  const VectorXd sd = (entries * covariance * entries.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+  const double mean_of_normal = std::sqrt(2 / std::numbers::pi);  // of |x|, x of unit variance
+  return mean_of_normal * sd.cwiseQuotient(truth.friction.reshaped().cwiseAbs()).mean();
 }
 
 Score Judge(const Truth& truth, const Levels& levels, const MatrixXd& measured, const calibration::Solution& solution,

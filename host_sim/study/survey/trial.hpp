@@ -78,12 +78,17 @@ struct Truth {
 // The survey's analytic form: torque is K z of the model itself, and every row may be used.
 Truth AnalyticTruth(codegen::Model model, const codegen::Signals& train, const codegen::Signals& other);
 
+// The e_f that is left on average if the errors have the least covariance that the problem's rows and prior allow
+// (Cramer and Rao; with a prior the Bayesian bound), all parameters of the model being unknown.
+double LeastFrictionError(const Truth& truth, const calibration::Problem& problem);
+
 struct Score {
   double e_d = 0, e_f = 0, e_T = 0, e_T_std = 0,
          J_e = 0;                               // as in the survey's figures; torque against the measured one
   double e_T_printed = 0, e_T_std_printed = 0;  // as the survey's formulas
   double J_true = 0;                            // J_e with e_T, e_T_Std against noise-free torque of the other motion
   double e_d_over_prior = 0;                    // e_d over the e_d of the prior
+  double e_f_least = 0;                         // the bound of e_f for the same rows and prior
   double e_base = 0;                            // torque-equivalent base parameter error on the other motion, in sigma
   double coverage = 0;
   double physical = 0;  // 1: every link can exist

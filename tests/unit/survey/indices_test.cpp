@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "host_sim/identify/calibration/prior.hpp"
+#include "host_sim/study/survey/platform.hpp"
 #include "tests/unit/survey/survey_arm.hpp"
 
 namespace armcal::survey {
@@ -107,6 +108,23 @@ TEST(Coverages, CountTruthsInsideOnePointNineSixDeviations) {
   const MatrixXd P = Eigen::Vector4d(1, 4, 1, 0).asDiagonal();
   EXPECT_NEAR(Coverage(Eigen::Vector4d(0, 0, 0, 0), Eigen::Vector4d(1.9, 3.9, 2, 9), P), 2.0 / 3, 1e-12);
   EXPECT_TRUE(std::isnan(Coverage(Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero(), MatrixXd())));
+}
+
+// The mean over many noises of an efficient estimator's e_f is the bound.
+TEST(FrictionErrors, OfLeastSquaresOverManyNoises_AreTheBound) {
+  const Truth truth = AnalyticTruth(test::Arm(Law::kCoulombViscous, Bodies::kBase), Sampled(test::StudyLinear()),
+                                    Sampled(test::StudyNonlinear()));
+  std::vector<double> errors;
+  double least = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const calibration::Dataset log = truth.Noisy(seed);
+    calibration::Problem problem = calibration::MakeProblem(truth.model, {&log});
+    problem.covariance.resize(0, 0);
+    least = LeastFrictionError(truth, problem);
+    const calibration::Solution found = Solve(calibration::FindMethod("weighted_pseudo_inverse"), problem);
+    errors.push_back(FrictionError(truth.friction, Friction(truth.model, found.z)));
+  }
+  EXPECT_NEAR(Summarise(errors).mean / least, 1, 0.15);  // of 240 errors
 }
 
 TEST(FollowErrors, LookOnlyAtWhatComesAfterSettling) {

@@ -118,11 +118,28 @@ struct Running {
     scenario.spread = {0, settings.friction, settings.torque_constant, 0};
     scenario.joint_effects = settings.effects;
     scenario.torque_noise_scale = settings.noise;
+    if (settings.payload) scenario.payload = plant::PayloadStep{*settings.payload, 0, INFINITY};
+    scenario.flange = KDL::Frame::Identity();
     // A current that steps is not the same throughout a tick, and the reading at its end is not its mean. That moves
     // the torque by 0.08 ms against the position, and a fit takes most of this for viscous friction.
     scenario.command_ramps = true;
     return scenario;
   }
+};
+
+// What a payload adds to the joints' torque.
+class PayloadTorque {
+ public:
+  PayloadTorque(const plant::Arm& arm, const plant::Body& payload)
+      : bare_(arm.robot(), arm.truth().body, arm.robot().gravity_mps2),
+        laden_(arm.robot(), arm.truth().body, arm.robot().gravity_mps2,
+               plant::AttachedBody{payload, KDL::Frame::Identity()}) {}
+  VectorXd At(const plant::Arm& arm) {
+    return laden_.Torque(arm.q(), arm.qd(), arm.qdd()) - bare_.Torque(arm.q(), arm.qd(), arm.qdd());
+  }
+
+ private:
+  plant::Dynamics bare_, laden_;
 };
 
 // On the joints' side.
@@ -142,6 +159,8 @@ logs::Log RunPlant(const codegen::Robot& robot, const excitation::Series& series
   Running plant(robot, series, settings);
   const double step = plant.arm.tick_s() * robot.sample_ticks;
   const auto samples = static_cast<Eigen::Index>(settings.seconds / step);
+  std::optional<PayloadTorque> load;
+  if (settings.payload && settings.load_loss.size() > 0) load.emplace(plant.arm, *settings.payload);
   logs::Log log;
   log.joints = plant.arm.joints();
   log.source = "plant";
@@ -151,7 +170,9 @@ logs::Log RunPlant(const codegen::Robot& robot, const excitation::Series& series
     for (int tick = 0; tick < robot.sample_ticks; ++tick) {
       plant.loop.Tick();
       log.q.row(k) += plant.loop.Position().transpose() / robot.sample_ticks;
-      log.tau.row(k) += plant.loop.Torque().transpose() / robot.sample_ticks;
+      VectorXd torque = plant.loop.Torque();
+      if (load) torque += settings.load_loss.cwiseProduct(load->At(plant.arm));
+      log.tau.row(k) += torque.transpose() / robot.sample_ticks;
     }
   return log;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "codegen/src/robot/robot.hpp"
@@ -25,13 +26,16 @@ struct PlantSettings {
   double seconds = 10;
   double noise = 1;                                    // of the torque, over the robot file's
   std::vector<plant::PlacedJointEffect> effects = {};  // beside Coulomb and viscous friction
+  std::optional<plant::Body> payload = {};             // in the last link's frame
+  Eigen::VectorXd load_loss = {};                      // f1 of (9) for the payload's torque, of each joint, in RunPlant
 };
 
 // The plant starts at rest, reaches the series' pace within two seconds and is then recorded for `seconds`. A PD law
 // with feed-forward of the file's bodies (KDL) drives it by the gains in robot.control. The current goes on a straight
 // line from one tick's command to the next one's. A sample of the log is the average of robot.sample_ticks readings of
-// encoder and current. io::InputError: the plant cannot read the robot file;
-// the file has no [control] table.
+// encoder and current. With load_loss the motors give f1 times the payload's torque in addition. The loss takes it, so
+// the arm moves as it would without. io::InputError: the plant cannot read the robot file; the file has no [control]
+// table.
 logs::Log RunPlant(const codegen::Robot& robot, const excitation::Series& series, const PlantSettings& settings);
 
 // What an arm without rotors would have measured: the survey's arm has none. RunPlant's log at the model's rows, less

@@ -33,6 +33,32 @@ TEST(PlantRun, WithoutNoise_AFitMissesTheFilesFrictionByLessThanAQuarterOfADevia
     }
 }
 
+// The loss is made with KDL, and compared with the body columns of armcal's own regressor.
+TEST(PlantRun, WithALossByLoad_HasThePayloadsTorqueTimesF1Added) {
+  const codegen::Model model(test::File(), test::AllRecords());
+  PlantSettings settings;
+  settings.friction = settings.torque_constant = settings.noise = 0;
+  settings.seconds = 4;
+  settings.payload = plant::Body{8, {0.03, -0.02, 0.1}, {0.02, 0, 0, 0.02, 0, 0.02}};
+  const calibration::Dataset without =
+      calibration::Prepare(model, RunPlant(test::File(), test::StudyNonlinear(), settings), {50});
+  settings.load_loss = Eigen::VectorXd::LinSpaced(6, 0.05, 0.1);
+  const calibration::Dataset with =
+      calibration::Prepare(model, RunPlant(test::File(), test::StudyNonlinear(), settings), {50});
+  std::vector<Eigen::MatrixXd> column;
+  model.BodyColumns(without.s, 5, column);
+  Eigen::VectorXd body(10);
+  body << 8, 0.03, -0.02, 0.1, 0.02, 0, 0, 0.02, 0, 0.02;
+  const Eigen::VectorXd declared = calibration::ToOrigin(body);
+  for (int j = 0; j < 6; ++j)
+    for (int k = 0; k < with.samples(); ++k) {
+      // A joint that turns jolts the others, and the filtered acceleration does not show a jolt.
+      if (with.used.row(k).minCoeff() == 0) continue;
+      const double load = column[static_cast<std::size_t>(j)].row(k).dot(declared);
+      EXPECT_NEAR(with.tau(k, j) - without.tau(k, j), settings.load_loss[j] * load, 0.05) << j << " " << k;
+    }
+}
+
 Settings SurveyOfTheFile() {
   Settings settings;
   settings.robot = test::File();

@@ -77,7 +77,7 @@ if [[ $scope == peers ]]; then
   peers_programs() { python3 -m venv build/peers/venv && build/peers/venv/bin/pip install -q --disable-pip-version-check -r tests/peers/requirements.txt; }
   step "peers packages" toolchains/install.sh peers || finish
   step "other people's programs" peers_programs || finish
-  step "build armcal" configure_and_build host --target armcal armcal-generate || finish
+  step "build armcal" configure_and_build host --target armcal armcal-generate practice_robot judged_set judged_score || finish
   step "exports in MuJoCo and Pinocchio" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
   step "excitations in MuJoCo" build/peers/venv/bin/python tests/peers/collisions_test.py build/host/armcal build/peers/collisions
   step "logs by other people's libraries" build/peers/venv/bin/python tests/peers/logs_test.py build/host/armcal build/peers/logs
@@ -86,6 +86,7 @@ if [[ $scope == peers ]]; then
   step "packages of Conan, colcon, PlatformIO and Zephyr" build/peers/venv/bin/python tests/peers/packages_test.py . build/peers/packages
   if step "docs packages" toolchains/install.sh docs; then step "the site" cmake --build --preset host --target docs_site; fi
   step "the page about TLS" tests/docs/follow.sh docs/tls.md build/peers/tls build/host/armcal
+  step "the leaderboard" python3 tests/leaderboard/leaderboard_test.py build/peers/leaderboard_test
   step "the report in a browser" build/peers/venv/bin/python tests/peers/report_test.py build/host/armcal build/peers/report
   finish
 fi

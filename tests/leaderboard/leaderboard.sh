@@ -10,7 +10,7 @@ set -euo pipefail
 here=$(realpath "$(dirname "${BASH_SOURCE[0]}")")
 root=$(realpath "$here/../..")
 export ARMCAL_BUILD=$(realpath "${ARMCAL_BUILD:-$root/build/host}")
-seed=${1:-77} out=$(realpath -m "${2:-$root/build/leaderboard}") percent=${3:-3}
+seed=${1:-77} out=$(realpath -m "${2:-$root/build/leaderboard}") percent=${3:-2}
 rivals=("${@:4}")
 [[ ${#rivals[@]} -gt 0 ]] || rivals=("$here"/rivals/*)
 groups="controls_plain 60 controls_slow 70 controls_quiet 70 controls_late 70 controls_stamps 40 singles_ii 420 unrecorded 110 several 70"

@@ -46,9 +46,10 @@ def main():
 
     case, verdict = out / "cases" / "controls_plain_0000", folder / "verdict.json"
     floor = json.loads((out / "truth" / case.name / "truth.json").read_text())["test_floor_derived"]
+    python = [VENV / "bin" / "python", "-W", "ignore"]
     for rival in sorted((HERE / "rivals").glob("*.py")):
         verdict.unlink(missing_ok=True)
-        subprocess.run([VENV / "bin" / "python", "-W", "ignore", rival, case, verdict], check=True, env=os.environ | {"PYTHONPATH": str(HERE)})
+        subprocess.run([*python, rival, case, verdict], check=True, env=os.environ | {"PYTHONPATH": str(HERE)})
         worst = max(a / f for a, f in zip(json.loads(verdict.read_text())["after"], floor))
         check(worst < NEAR_FLOOR, f"{rival.stem}: {worst:.3f} times the floor where nothing is missing")
     sys.exit(1 if failures else 0)

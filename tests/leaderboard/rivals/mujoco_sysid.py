@@ -6,6 +6,7 @@ from mujoco import sysid
 
 SAMPLES = 1000  # each costs a call of the inverse dynamics for every parameter and iteration
 ITERATIONS = 20
+CONVERGED = 1e-4  # relative change of the cost
 
 
 def fit(case):
@@ -52,7 +53,7 @@ def fit(case):
         params.update_from_vector(x)
         return [((torque(params, state) - measured) * weights).ravel()], None, None
 
-    found, _ = sysid.optimize(params, residual, optimizer="scipy", verbose=False, max_iters=ITERATIONS, x_scale="jac")
+    found, _ = sysid.optimize(params, residual, optimizer="scipy", verbose=False, max_iters=ITERATIONS, ftol=CONVERGED, x_scale="jac")
     return lambda log, rows: torque(found, log.state(half, rows)), []
 
 

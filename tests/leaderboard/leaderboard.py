@@ -70,7 +70,8 @@ def row(out, score_program, rival):
     if not any(verdicts.glob("*.json")):
         lines = (verdicts / f"{cases[0].name}.txt").read_text().strip().splitlines()
         return result | {"cannot_run": lines[-1] if lines else "no verdict, no message"}
-    scored = out / f"{rival.stem}.json"
+    scored = out / "scores" / rival.stem / "score.json"
+    scored.parent.mkdir(parents=True)
     subprocess.run([score_program, out / "truth", verdicts, scored], stdout=subprocess.DEVNULL, check=True)
     score = json.loads(scored.read_text())
     return result | {

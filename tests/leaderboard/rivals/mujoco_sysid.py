@@ -1,4 +1,4 @@
-# row: MuJoCo 4.0.0, sysid | all ten numbers of each body, rotors, viscous and Coulomb friction, on inverse dynamics; window of the speeds by cross-validation
+# row: MuJoCo 4.0.0, sysid | all ten numbers of each body, rotors, viscous and Coulomb friction, on inverse dynamics of 1000 samples, at most 20 evaluations; window of the speeds by cross-validation
 import mujoco
 import numpy as np
 import rival

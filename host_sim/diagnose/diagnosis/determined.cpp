@@ -66,14 +66,18 @@ bool IsAtEdge(const codegen::EffectUnknown& u, double value) {
 Marks MarkParameters(const Term& t) {
   Marks out{std::vector<Mark>(t.eta.size(), Mark::kNone), std::vector<Mark>(t.columns.size(), Mark::kNone), true};
   int parameters = 0, marked = 0;
+  // A delay has no amplitude. Its gain may be large where the noise has another colour than was taken; then its
+  // deviation, which blocks of time tell, is large as well.
+  const bool any_free =
+      std::any_of(t.columns.begin(), t.columns.end(), [](const auto& c) { return !c.fixed_amplitude; });
+  const double sure = any_free ? 1 : kSure;
   for (std::size_t k = 0; k < t.eta.size() && IsSearched(t); ++k) {
     const double sd = t.eta_sd[static_cast<Index>(k)];
     if (IsAtEdge(t.unknowns[k], t.eta[k])) out.eta[k] = Mark::kOnBound;
-    else if (!(sd > 0) || !(std::abs(t.eta[k]) > sd)) out.eta[k] = Mark::kUndetermined;
+    else if (!(sd > 0) || !(std::abs(t.eta[k]) > sure * sd)) out.eta[k] = Mark::kUndetermined;
     ++parameters, marked += out.eta[k] != Mark::kNone;
   }
   std::vector<Index> seen;  // amplitudes of columns that the logs see at all
-  bool any_free = false;
   for (std::size_t c = 0; c < t.columns.size(); ++c) {
     const codegen::EffectColumn& column = t.columns[c];
     if (column.fixed_amplitude) continue;
@@ -83,7 +87,6 @@ Marks MarkParameters(const Term& t) {
     if (!(sd > 0) || !(std::abs(value) > sd)) out.amplitude[c] = Mark::kUndetermined;
     else if (beyond) out.amplitude[c] = Mark::kOnBound;
     ++parameters, marked += out.amplitude[c] != Mark::kNone;
-    any_free = true;
     if (sd > 0) seen.push_back(static_cast<Index>(c));
     if (IsForm(t)) out.amplitude[c] = Mark::kNone;
   }
@@ -93,13 +96,6 @@ Marks MarkParameters(const Term& t) {
     for (Index& p : place) p += static_cast<Index>(t.eta.size());
     out.usable =
         !seen.empty() && Significance(t.amplitude(seen), t.covariance(place, place)) > static_cast<double>(seen.size());
-  }
-  // A delay has no amplitude. Its gain may be large where the noise has another colour than was taken; then its
-  // deviation, which blocks of time tell, is large as well.
-  if (!any_free && IsSearched(t)) {
-    out.usable = false;
-    for (std::size_t k = 0; k < t.eta.size(); ++k)
-      out.usable |= std::abs(t.eta[k]) > kSure * t.eta_sd[static_cast<Index>(k)] && out.eta[k] == Mark::kNone;
   }
   out.usable = out.usable && (IsForm(t) || marked < parameters);
   return out;

@@ -14,7 +14,7 @@ bool IsAtEdge(const codegen::EffectUnknown& unknown, double value);
 
 enum class Mark {
   kNone,
-  kUndetermined,  // smaller than its own standard deviation, or without effect
+  kUndetermined,  // smaller than its own standard deviation (three, if the term has no amplitude), or without effect
   kOnBound,       // where its search ends, or beyond what its record allows
 };
 

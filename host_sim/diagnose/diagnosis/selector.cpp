@@ -32,11 +32,12 @@ constexpr double kNear = 0.05;             // of a score: the logs do not tell w
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr double kAsLarge = 0.5;           // of what it would gain there if it was as large as it seemed
 constexpr int kSharpenings = 3;
-constexpr double kNothing = 6;          // a gain that chance often has
-constexpr double kCauseExplains = 0.9;  // of what a curve explains: forms differ a little from any record
-constexpr int kFewTurns = 100;          // rows
-constexpr double kTurnShare = 0.03;     // of a joint's rows
-constexpr std::size_t kOtherNames = 2;  // a verdict with more than three names says nothing
+constexpr double kNothing = 6;            // a gain that chance often has
+constexpr double kCauseExplains = 0.9;    // of what a curve explains: forms differ a little from any record
+constexpr double kSimplerExplains = 0.5;  // of what a surface explains
+constexpr int kFewTurns = 100;            // rows
+constexpr double kTurnShare = 0.03;       // of a joint's rows
+constexpr std::size_t kOtherNames = 2;    // a verdict with more than three names says nothing
 
 // The first ones of all, and the first causes of each joint: a joint whose noise has a colour may take all places.
 std::vector<Found> FirstOf(const std::vector<Found>& ranked, int joints) {
@@ -312,14 +313,18 @@ void Selector::Sort(std::vector<Found>& ranked) {
   std::sort(ranked.begin(), ranked.end(), [&](const Found& a, const Found& b) { return standing(a) > standing(b); });
   if (ranked.empty() || !ranked[0].candidate->is_curve()) return;
   const Found& curve = ranked[0];
-  const auto cause = std::find_if(ranked.begin(), ranked.end(), [&](const Found& f) {
-    return !f.candidate->is_curve() && f.candidate->rows() == curve.candidate->rows() && f.log_chance < kLogRare &&
-           f.gain.gain > kCauseExplains * curve.gain.gain;
+  // A surface has so many coefficients that it fits a part of much else.
+  const bool is_surface = !curve.candidate->record().search.second.empty();
+  const double enough = is_surface ? kSimplerExplains : kCauseExplains;
+  const auto simpler = std::find_if(ranked.begin(), ranked.end(), [&](const Found& f) {
+    const bool is_simpler = is_surface ? f.candidate->record().search.second.empty() : !f.candidate->is_curve();
+    return is_simpler && f.candidate->rows() == curve.candidate->rows() && f.log_chance < kLogRare &&
+           f.gain.gain > enough * curve.gain.gain;
   });
-  if (cause == ranked.end()) return;
-  refused_[curve.candidate] =
-      fmt::format("names no cause, and this cause explains over {:.0f} % of what it explains", 100 * kCauseExplains);
-  std::rotate(ranked.begin(), cause, cause + 1);
+  if (simpler == ranked.end()) return;
+  refused_[curve.candidate] = fmt::format("names no cause, and this {} explains over {:.0f} % of what it explains",
+                                          simpler->candidate->is_curve() ? "curve" : "cause", 100 * enough);
+  std::rotate(ranked.begin(), simpler, simpler + 1);
 }
 
 // A chosen term, or one that looks like a chosen one on the same joints. The two together would only fit noise, and

@@ -2,7 +2,8 @@
 # leaderboard - makes cases, runs armcal and its rivals on them, scores all in the same way.
 #   tests/leaderboard/leaderboard.sh [SEED [OUT_DIR [PERCENT [RIVAL...]]]]
 # PERCENT scales the number of cases of the judged set's report2. RIVAL: programs in the place of all in rivals/.
-# OUT_DIR: cases (what a rival gets), truth, verdicts, scores, leaderboard.md, leaderboard.json.
+# OUT_DIR/cases holds what a rival gets, OUT_DIR/truth the rest. Verdicts and scores have folders of their own. The table is
+# OUT_DIR/leaderboard.md and leaderboard.json.
 # Needs build/host (targets armcal, practice_robot, judged_set, judged_score); another build folder: ARMCAL_BUILD. pip installs the
 # rivals into build/peers/leaderboard.
 set -euo pipefail

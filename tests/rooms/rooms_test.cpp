@@ -71,7 +71,7 @@ const Edges kEdges = {
                                    kHost + "diagnose/diagnosis"}},
     {"host_sim/diagnose/analysis", {kCode, kHost + "data/logs", kHost + "identify/calibration", kHost + "identify/methods",
                                     kHost + "diagnose/diagnosis", kHost + "diagnose/verdict"}},  // from logs to JSON
-    {"host_sim/diagnose/fleet", {kCode + "io", kHost + "data/report"}},  // verdicts of many arms over time
+    {"host_sim/diagnose/fleet", {kCode + "io", kHost + "data/files", kHost + "data/report"}},  // verdicts of many arms over time
     {"host_sim/diagnose/health", {kHost + "client"}},  // a drive's statistics -> a verdict
 
     // Client: what talks to a drive.

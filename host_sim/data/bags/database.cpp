@@ -1,23 +1,15 @@
 // bags - reads the SQLite database of rosbag2.
 #include <fmt/format.h>
-#include <sqlite3.h>
 
 #include <filesystem>
 #include <map>
-#include <memory>
 
 #include "host_sim/data/bags/container.hpp"
+#include "host_sim/data/files/sqlite.hpp"
 
 namespace armcal::bags {
 
 namespace {
-
-struct CloseDatabase {
-  void operator()(sqlite3* database) const { sqlite3_close(database); }
-};
-struct EndStatement {
-  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
-};
 
 class Database {
  public:
@@ -44,12 +36,7 @@ class Database {
   // Calls `row` for each row of the answer.
   template <class Row>
   void Ask(const std::string& question, Row row) const {
-    sqlite3_stmt* made = nullptr;
-    if (sqlite3_prepare_v2(database_.get(), question.c_str(), -1, &made, nullptr) != SQLITE_OK) Fail();
-    const std::unique_ptr<sqlite3_stmt, EndStatement> statement(made);
-    int code = SQLITE_ROW;
-    while ((code = sqlite3_step(made)) == SQLITE_ROW) row(made);
-    if (code != SQLITE_DONE) Fail();
+    if (!files::Ask(database_.get(), question, {}, row)) Fail();
   }
 
   // A plain table: a view or a virtual table could compute for ever.
@@ -75,7 +62,7 @@ class Database {
                                      database_ ? sqlite3_errmsg(database_.get()) : "no memory"));
   }
 
-  std::unique_ptr<sqlite3, CloseDatabase> database_;
+  files::Sqlite database_;
 };
 
 Bytes BytesOf(sqlite3_stmt* row, int column) {
@@ -98,7 +85,9 @@ void ReadDatabase(const std::string& path, Bytes file, const Taker& taker) {
   std::map<std::string, std::pair<std::string, std::string>> definition;  // by type: how it is written, and the text
   if (database.HasTable("message_definitions"))
     database.Ask("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions",
-                 [&](sqlite3_stmt* row) { definition[TextOf(row, 0)] = {TextOf(row, 1), TextOf(row, 2)}; });
+                 [&](sqlite3_stmt* row) {
+                   definition[TextOf(row, 0)] = {TextOf(row, 1), TextOf(row, 2)};
+                 });
   std::map<std::int64_t, Topic> wanted;
   database.Ask("SELECT id, name, type, serialization_format FROM topics", [&](sqlite3_stmt* row) {
     Topic topic{TextOf(row, 1), TextOf(row, 3), TextOf(row, 2), {}, {}};

@@ -46,7 +46,8 @@ class Candidate {
   bool reads(codegen::Quantity quantity) const;
   // What its columns read, and the load of its joints, which a search may ask for.
   std::set<codegen::InputId> inputs() const;
-  bool is_curve() const { return record().generic_penalty > 0; }  // fits a form, names no cause
+  bool is_curve() const { return record().generic_penalty > 0; }       // fits a form, names no cause
+  bool is_surface() const { return !record().search.second.empty(); }  // a curve over two signals
   // It happens at one time of the training log. One part of a log says nothing about it in another part, or in another
   // log.
   bool is_event() const { return record().search.how == codegen::SearchWay::kWindow; }

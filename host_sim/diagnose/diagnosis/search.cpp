@@ -14,11 +14,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-constexpr int kSweeps = 4;                           // of a pattern search at one step size
-constexpr double kWorthAStep = 0.3;                  // of chi^2: less is below what noise moves it by
-constexpr int kOnAGrid = 3;                          // unknowns at most; further ones start at their initial value
-constexpr int kClimbs = 12;                          // along a valley, at most
-constexpr double kLongest = 0.2, kSlopeStep = 1e-3;  // of an unknown's range
+constexpr int kSweeps = 4;                              // of a pattern search at one step size
+constexpr double kWorthAStep = 0.3;                     // of chi^2: less is below what noise moves it by
+constexpr int kOnAGrid = 3;                             // unknowns at most; further ones start at their initial value
+constexpr std::size_t kStarts = 2, kStartsOffGrid = 6;  // that climb; more where not every unknown is on the grid
+constexpr int kClimbs = 12;                             // along a valley, at most
+constexpr double kLongest = 0.2, kSlopeStep = 1e-3;     // of an unknown's range
 }  // namespace
 
 Searcher::Searcher(Candidate& candidate, const Ground& ground, const Found* simpler)
@@ -161,7 +162,7 @@ std::vector<double> Searcher::Climb(std::vector<double> eta) const {
   return eta;
 }
 
-// A coarse grid; its best two points climb.
+// A coarse grid; its best points climb.
 void Searcher::Profile() {
   const int count = static_cast<int>(c_.unknowns().size());
   std::vector<int> points(count, 4);
@@ -192,7 +193,7 @@ void Searcher::Profile() {
   Consider(Refine(tried[0].second, GridStep(), c_.delay() >= 0 ? 7 : 2, gain));
   if (!Promising()) return;
   Consider(Climb(best_.eta));
-  const std::size_t starts = count > kOnAGrid ? 6 : 2;
+  const std::size_t starts = count > kOnAGrid ? kStartsOffGrid : kStarts;
   for (std::size_t k = 1; k < std::min(starts, tried.size()); ++k) Consider(Climb(tried[k].second));
 }
 

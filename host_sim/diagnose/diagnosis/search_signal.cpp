@@ -117,7 +117,7 @@ void Searcher::Surface() {
 // Knots over the range that was seen, or over that part of it where the torque changes most; clamped outside, so that
 // the term cannot extrapolate.
 void Searcher::Spline() {
-  if (!c_.record().search.second.empty()) return Surface();
+  if (c_.is_surface()) return Surface();
   const std::string& name = c_.record().search.signal;
   const VectorXd signal = OwnSignal(c_, e_, name);
   if (signal.size() == 0 || signal.maxCoeff() - signal.minCoeff() <= 0) return;

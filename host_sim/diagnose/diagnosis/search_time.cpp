@@ -92,8 +92,8 @@ void Searcher::Onset() {
   if (best_.eta[1] - best_.eta[0] < minimum) best_.gain = Gain{};
 }
 
-// Isolated windows one after the other, each where the shape that the record gives fits best what the ones before have
-// left.
+// Isolated windows one after the other, each where a half sine, the shape of these records, fits best what the ones
+// before have left.
 void Searcher::Windows() {
   if (e_.logs.size() != 1) return;
   const auto& time = e_.logs[0].data->s.t;

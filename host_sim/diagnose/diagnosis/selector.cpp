@@ -314,10 +314,10 @@ void Selector::Sort(std::vector<Found>& ranked) {
   if (ranked.empty() || !ranked[0].candidate->is_curve()) return;
   const Found& curve = ranked[0];
   // A surface has so many coefficients that it fits a part of much else.
-  const bool is_surface = !curve.candidate->record().search.second.empty();
+  const bool is_surface = curve.candidate->is_surface();
   const double enough = is_surface ? kSimplerExplains : kCauseExplains;
   const auto simpler = std::find_if(ranked.begin(), ranked.end(), [&](const Found& f) {
-    const bool is_simpler = is_surface ? f.candidate->record().search.second.empty() : !f.candidate->is_curve();
+    const bool is_simpler = is_surface ? !f.candidate->is_surface() : !f.candidate->is_curve();
     return is_simpler && f.candidate->rows() == curve.candidate->rows() && f.log_chance < kLogRare &&
            f.gain.gain > enough * curve.gain.gain;
   });

@@ -18,7 +18,7 @@ using nlohmann::ordered_json;
 constexpr double kDeviations = 4, kShare = 0.1, kErrorShare = 0.25;
 const char* const kErrorName = "error of joint ";
 
-bool IsError(const std::string& name) { return name.rfind(kErrorName, 0) == 0; }
+bool IsError(const std::string& name) { return name.starts_with(kErrorName); }
 
 class Courses {
  public:
@@ -74,6 +74,8 @@ void FindChanges(const Course& course, std::vector<Change>& changes) {
   }
 }
 
+std::string OrNothing(const std::string& terms) { return terms.empty() ? "nothing" : terms; }
+
 std::string Words(const History& history, const Change& c) {
   const std::string when = history.entry[c.log].date + ": ";
   if (std::isnan(c.before)) return when + c.name;
@@ -95,10 +97,8 @@ History HistoryOf(const std::vector<Entry>& entries) {
       AddNumbers(verdict, log, courses);
       if (log > 0 && history.terms[log] != history.terms[log - 1])
         history.change.push_back(
-            {log,
-             "found: " + (history.terms[log].empty() ? "nothing" : history.terms[log]) +
-                 "; before: " + (history.terms[log - 1].empty() ? "nothing" : history.terms[log - 1]),
-             "", NAN, NAN});
+            {log, "found: " + OrNothing(history.terms[log]) + "; before: " + OrNothing(history.terms[log - 1]), "", NAN,
+             NAN});
     } catch (const nlohmann::json::exception&) {
       throw io::InputError(e.arm + ", " + e.date + ": expected a verdict of this version: diagnose anew");
     }
@@ -112,14 +112,13 @@ History HistoryOf(const std::vector<Entry>& entries) {
 
 std::string HistoryText(const History& history) {
   report::Table t{{"date", "payload kg", "found"}, {}};
-  for (std::size_t log = 0; log < history.entry.size(); ++log) {
-    double payload = 0;
-    for (const Course& c : history.course)
-      for (const Point& p : c.point)
-        if (c.name == "payload" && p.log == log) payload = p.value;
-    t.rows.push_back({history.entry[log].date, payload == 0 ? "-" : fmt::format("{:.3g}", payload),
-                      history.terms[log].empty() ? "nothing" : history.terms[log]});
-  }
+  std::vector<double> payload_kg(history.entry.size(), 0);
+  for (const Course& c : history.course)
+    if (c.name == "payload")
+      for (const Point& p : c.point) payload_kg[p.log] = p.value;
+  for (std::size_t log = 0; log < history.entry.size(); ++log)
+    t.rows.push_back({history.entry[log].date, payload_kg[log] == 0 ? "-" : fmt::format("{:.3g}", payload_kg[log]),
+                      OrNothing(history.terms[log])});
   std::string text = report::Text(t);
   text += history.change.empty() ? "nothing changed\n" : "changed:\n";
   for (const Change& c : history.change) text += "  " + Words(history, c) + "\n";
@@ -163,8 +162,7 @@ void WriteHistoryPage(const std::filesystem::path& path, const std::string& arm,
   page.AddGrid(plots, "Each point is one log, in the order of their dates.");
   report::Table t{{"log", "date", "found"}, {}};
   for (std::size_t log = 0; log < history.entry.size(); ++log)
-    t.rows.push_back({std::to_string(log + 1), history.entry[log].date,
-                      history.terms[log].empty() ? "nothing" : history.terms[log]});
+    t.rows.push_back({std::to_string(log + 1), history.entry[log].date, OrNothing(history.terms[log])});
   page.Section("Logs");
   page.Add(t);
   page.Write(path);

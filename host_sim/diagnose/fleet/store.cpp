@@ -2,11 +2,8 @@
 // log: it does not work over a network's file system, where a cluster's jobs meet.
 #include "host_sim/diagnose/fleet/store.hpp"
 
-#include <sqlite3.h>
-
-#include <memory>
-
 #include "codegen/src/io/require_file.hpp"
+#include "host_sim/data/files/sqlite.hpp"
 
 namespace armcal::fleet {
 namespace {
@@ -16,13 +13,6 @@ namespace fs = std::filesystem;
 constexpr int kPatience_ms = 60000;       // for other writers
 constexpr int kApplication = 0x61726D63;  // "armc": says whose database it is
 constexpr int kLayout = 1;
-
-struct CloseStore {
-  void operator()(sqlite3* database) const { sqlite3_close(database); }
-};
-struct EndQuery {
-  void operator()(sqlite3_stmt* query) const { sqlite3_finalize(query); }
-};
 
 class Store {
  public:
@@ -37,15 +27,7 @@ class Store {
   // Calls row(query) for each row of the answer.
   template <class Row>
   void Ask(const std::string& question, const std::vector<std::string>& values, Row row) {
-    sqlite3_stmt* made = nullptr;
-    if (sqlite3_prepare_v2(database_.get(), question.c_str(), -1, &made, nullptr) != SQLITE_OK) Fail();
-    const std::unique_ptr<sqlite3_stmt, EndQuery> query(made);
-    for (std::size_t k = 0; k < values.size(); ++k)
-      sqlite3_bind_text(made, static_cast<int>(k) + 1, values[k].c_str(), static_cast<int>(values[k].size()),
-                        SQLITE_TRANSIENT);
-    int code = SQLITE_ROW;
-    while ((code = sqlite3_step(made)) == SQLITE_ROW) row(made);
-    if (code != SQLITE_DONE) Fail();
+    if (!files::Ask(database_.get(), question, values, row)) Fail();
   }
   void Do(const std::string& command, const std::vector<std::string>& values = {}) {
     Ask(command, values, [](sqlite3_stmt*) {});
@@ -69,7 +51,7 @@ class Store {
   }
 
   fs::path path_;
-  std::unique_ptr<sqlite3, CloseStore> database_;
+  files::Sqlite database_;
 };
 
 Store Opened(const fs::path& path) {

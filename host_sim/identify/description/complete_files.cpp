@@ -18,12 +18,7 @@ using codegen::JointType;
 
 bool Slides(const Joint& joint) { return joint.kinematics.type == JointType::kPrismatic; }
 
-Eigen::Isometry3d Base(const codegen::Robot& robot) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(robot.base_rotation.data());
-  T.translation() = Eigen::Map<const Eigen::Vector3d>(robot.base_xyz_m.data());
-  return T;
-}
+Eigen::Isometry3d Base(const codegen::Robot& robot) { return codegen::ToPose(robot.base_xyz_m, robot.base_rotation); }
 
 // Each DH frame at joint position zero, seen from the one before; the first from the base.
 Eigen::Isometry3d FrameOf(const codegen::Robot& robot, std::size_t j) {

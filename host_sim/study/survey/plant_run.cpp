@@ -5,6 +5,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/machine/plant/arm.hpp"
+#include "host_sim/study/survey/online_run.hpp"
 
 namespace armcal::survey {
 
@@ -196,7 +197,7 @@ Instants RunExactly(const codegen::Robot& robot, const excitation::Series& serie
     for (int tick = 0; tick < robot.sample_ticks; ++tick) plant.loop.Tick();
     const VectorXd& qd = plant.arm.qd();
     bool moves = true;
-    for (int j = 0; j < n; ++j) moves &= std::abs(qd[j]) > robot.joint[static_cast<std::size_t>(j)].v_min_radps;
+    for (int j = 0; j < n; ++j) moves &= Moves(qd[j], robot.joint[static_cast<std::size_t>(j)]);
     if (!moves) continue;
     all.s.t[kept] = step * static_cast<double>(k);
     all.s.q.row(kept) = plant.arm.q(), all.s.qd.row(kept) = qd, all.s.qdd.row(kept) = plant.arm.qdd();

@@ -67,10 +67,10 @@ void Diagnosed::WriteJson() {
   json["fitted_at_turns"] = nlohmann::ordered_json::array();
   for (const int j : diagnosis->finding().at_turns) json["fitted_at_turns"].push_back(j + 1);
   json["torque_channel"] = nlohmann::ordered_json::array();
-  for (int j = 0; j < model->joints() && !channel_.empty(); ++j)
-    if (channel_.lag_s[j] != 0 || channel_.late_s[j] != 0)
+  for (std::size_t j = 0; j < channel_.size(); ++j)
+    if (const calibration::JointChannel& c = channel_[j]; !c.empty())
       json["torque_channel"].push_back(
-          {{"joint", j + 1}, {"lag_s", channel_.lag_s[j]}, {"late_s", channel_.late_s[j]}});
+          {{"joint", j + 1}, {"lag_s", c.lag_s}, {"late_s", c.late_s}, {"low_passes", c.lag_s == 0 ? 0 : c.lags}});
   // Averages of a limited band have less noise than the samples that `before` and `after` are about.
   const auto limited = [this](int j) {
     return std::any_of(whole_.begin(), whole_.end(), [j](const auto& log) { return log.averaged(j); });

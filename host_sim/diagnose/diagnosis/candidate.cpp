@@ -62,7 +62,7 @@ namespace {
 
 // Each column as it was a time before, linear between samples: friction's jumps stay jumps.
 Eigen::MatrixXd Earlier(const VectorXd& t, Eigen::MatrixXd y, double delay_s) {
-  for (auto column : y.colwise()) column = calibration::ThroughChannel(t, column, 0, delay_s);
+  for (auto column : y.colwise()) column = calibration::ThroughChannel(t, column, {0, delay_s, 1});
   return y;
 }
 

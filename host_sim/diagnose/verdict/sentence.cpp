@@ -153,12 +153,15 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
         band, n));
   if (const calibration::TorqueChannel& channel = (*v.train)[0].channel; !channel.empty()) {
     std::string each;
-    for (int j = 0; j < n; ++j)
-      each += fmt::format("{}{:.3g} / {:.2g}", j == 0 ? "" : ", ", 1000 * channel.lag_s[j], 1000 * channel.late_s[j]);
-    out.push_back(fmt::format(
-        "the torque as the joints made it: the logs show it through a low-pass and late, time constant / delay "
-        "in ms {} (joints 1 to {}); predictions pass the same before they are compared",
-        each, n));
+    int lags = 1;
+    for (const calibration::JointChannel& c : channel) {
+      each += fmt::format("{}{:.3g} / {:.2g}", each.empty() ? "" : ", ", 1000 * c.lag_s, 1000 * c.late_s);
+      lags = std::max(lags, c.lags);
+    }
+    out.push_back(
+        fmt::format("the torque as the joints made it: the logs show it through {} and late, time constant / delay "
+                    "in ms {} (joints 1 to {}); predictions pass the same before they are compared",
+                    lags == 1 ? "a low-pass" : "two equal low-passes", each, n));
   }
   if (std::isfinite(saved_Hz))
     out.push_back(fmt::format("torque above {:.3g} Hz: it was filtered away before the logs were saved", saved_Hz));

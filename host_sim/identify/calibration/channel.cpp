@@ -29,7 +29,9 @@ constexpr double kFewRowsForLag = 200;
 constexpr double kLongest_s = 0.25;
 constexpr std::array<double, 6> kLags_s{0.004, 0.008, 0.016, 0.032, 0.064, 0.128};
 constexpr std::array<double, 5> kDelays_s{0, 0.005, 0.01, 0.015, 0.02};
+constexpr double kDelayStep_s = 0.005;
 constexpr int kHalvings = 6;
+constexpr int kMostLags = 2;
 constexpr double kDelaysDiffer = 0.2;  // of the mean: delays that differ by less are one
 
 // One joint's row of the declared model over all logs.
@@ -40,7 +42,7 @@ struct Row {
   Index every = 1;                // of the rows that may be used, so many are skipped
 
   // Squared error of the best parameters with this channel, of `rows` rows. extra: one more column a log.
-  double Left(double lag_s, double late_s, Index& rows, VectorXd* best = nullptr,
+  double Left(const JointChannel& channel, Index& rows, VectorXd* best = nullptr,
               const std::vector<VectorXd>* extra = nullptr) const;
   bool Stands() const;
 };
@@ -51,7 +53,7 @@ bool Row::Stands() const {
   return static_cast<double>(used) < kFewRowsForLag;
 }
 
-double Row::Left(double lag_s, double late_s, Index& rows, VectorXd* best, const std::vector<VectorXd>* extra) const {
+double Row::Left(const JointChannel& channel, Index& rows, VectorXd* best, const std::vector<VectorXd>* extra) const {
   const Index own = columns[0].cols(), size = own + (extra ? 1 : 0);
   MatrixXd gram = MatrixXd::Zero(size, size);
   VectorXd right = VectorXd::Zero(size);
@@ -61,7 +63,7 @@ double Row::Left(double lag_s, double late_s, Index& rows, VectorXd* best, const
     const Dataset& log = *logs[l];
     const bool averaged = log.averaged(joint);
     MatrixXd A(log.samples(), size);
-    for (Index c = 0; c < own; ++c) A.col(c) = ThroughChannel(log.s.t, columns[l].col(c), lag_s, late_s);
+    for (Index c = 0; c < own; ++c) A.col(c) = ThroughChannel(log.s.t, columns[l].col(c), channel);
     if (extra) A.col(own) = (*extra)[l];
     VectorXd y = log.tau.col(joint);
     if (averaged) {
@@ -95,57 +97,66 @@ bool Clearly(double with, double without, Index rows) {
 bool LooksLate(const Row& row) {
   Index rows = 0;
   VectorXd x;
-  const double without = row.Left(0, 0, rows, &x);
+  const double without = row.Left({}, rows, &x);
   std::vector<VectorXd> lag;
   for (std::size_t l = 0; l < row.logs.size(); ++l) {
     const VectorXd torque = row.columns[l] * x;
-    lag.push_back(ThroughChannel(row.logs[l]->s.t, torque, kProbe_s, 0) - torque);
+    lag.push_back(ThroughChannel(row.logs[l]->s.t, torque, {kProbe_s, 0, 1}) - torque);
   }
-  return static_cast<double>(rows) > kFewRowsForLag && Clearly(row.Left(0, 0, rows, nullptr, &lag), without, rows);
+  return static_cast<double>(rows) > kFewRowsForLag && Clearly(row.Left({}, rows, nullptr, &lag), without, rows);
 }
 
 struct Late {
-  double lag_s = 0, late_s = 0;  // both free
-  double alone_s = 0;            // the delay if there is no low-pass
-  bool filtered = false, delayed = false;
+  JointChannel filtered[kMostLags];  // with one low-pass, with two, ...
+  double left[kMostLags];            // squared error with each
+  JointChannel delayed;              // the delay if there is no low-pass
+  double left_delayed = 0, left_without = 0;
+  Index rows = 0;
+
+  bool is_filtered(int lags) const {
+    return filtered[lags - 1].lag_s > 0 && Clearly(left[lags - 1], left_delayed, rows);
+  }
+  bool is_delayed() const { return Clearly(left_delayed, left_without, rows); }
 };
 
 Late Search(const Row& row) {
-  Index rows = 0;
-  const double without = row.Left(0, 0, rows);
-  struct Point {
-    double lag_s, late_s, left;
+  Late out;
+  const auto better = [&](const JointChannel& next, JointChannel& best, double& least) {
+    if (const double left = row.Left(next, out.rows); left < least) least = left, best = next;
   };
-  const auto at = [&](double lag_s, double late_s) { return Point{lag_s, late_s, row.Left(lag_s, late_s, rows)}; };
-  Point delay{0, 0, without}, both = delay;
-  for (const double late_s : kDelays_s)
-    if (const Point p = at(0, late_s); p.left < delay.left) delay = p;
-  both = delay;
-  for (const double lag_s : kLags_s)
-    for (const double late_s : {kDelays_s[0], kDelays_s[2], kDelays_s[4]})
-      if (const Point p = at(lag_s, late_s); p.left < both.left) both = p;
-  double factor = 1.4, step_s = 0.005;
-  for (int k = 0; k < kHalvings; ++k, factor = std::sqrt(factor), step_s /= 2) {
-    const double alone_s = delay.late_s, lag_s = both.lag_s, late_s = both.late_s;
+  out.left_delayed = out.left_without = row.Left({}, out.rows);
+  for (const double late_s : kDelays_s) better({0, late_s, 1}, out.delayed, out.left_delayed);
+  double step_s = kDelayStep_s;
+  for (int k = 0; k < kHalvings; ++k, step_s /= 2)
     for (const double by_s : {-step_s, step_s})
-      if (const Point p = at(0, std::max(0.0, alone_s + by_s)); p.left < delay.left) delay = p;
-    // A longer lag and a shorter delay look much alike: the two move apart and together.
-    for (const auto& [by, by_s] : {std::pair{1.0, -step_s},
-                                   {1.0, step_s},
-                                   {factor, 0.0},
-                                   {1 / factor, 0.0},
-                                   {factor, -step_s},
-                                   {1 / factor, step_s}})
-      if (const Point p = at(std::min(kLongest_s, lag_s * by), std::max(0.0, late_s + by_s)); p.left < both.left)
-        both = p;
+      better({0, std::max(0.0, out.delayed.late_s + by_s), 1}, out.delayed, out.left_delayed);
+  for (int lags = 1; lags <= kMostLags; ++lags) {
+    JointChannel& best = out.filtered[lags - 1] = out.delayed;
+    double& least = out.left[lags - 1] = out.left_delayed;
+    for (const double lag_s : kLags_s)
+      for (const double late_s : {kDelays_s[0], kDelays_s[2], kDelays_s[4]})
+        better({lag_s / lags, late_s, lags}, best, least);
+    double factor = 1.4;
+    step_s = kDelayStep_s;
+    for (int k = 0; k < kHalvings; ++k, factor = std::sqrt(factor), step_s /= 2) {
+      const JointChannel at = best;
+      // A longer lag and a shorter delay look much alike: the two move apart and together.
+      for (const auto& [by, by_s] : {std::pair{1.0, -step_s},
+                                     {1.0, step_s},
+                                     {factor, 0.0},
+                                     {1 / factor, 0.0},
+                                     {factor, -step_s},
+                                     {1 / factor, step_s}})
+        better({std::min(kLongest_s, at.lag_s * by), std::max(0.0, at.late_s + by_s), lags}, best, least);
+    }
   }
-  return {both.lag_s, both.late_s, delay.late_s, both.lag_s > 0 && Clearly(both.left, delay.left, rows),
-          Clearly(delay.left, without, rows)};
+  return out;
 }
 
 }  // namespace
 
-VectorXd ThroughChannel(const VectorXd& t, const VectorXd& torque, double lag_s, double late_s) {
+VectorXd ThroughChannel(const VectorXd& t, const VectorXd& torque, const JointChannel& channel) {
+  const double lag_s = channel.lag_s, late_s = channel.late_s;
   const Index samples = t.size(), last = samples - 1;
   VectorXd out = torque;
   if (late_s != 0) {
@@ -160,21 +171,22 @@ VectorXd ThroughChannel(const VectorXd& t, const VectorXd& torque, double lag_s,
     }
   }
   if (lag_s <= 0) return out;
-  double z = out[0], before = out[0], step = 0, rest = 1, ramp = 0;
-  for (Index i = 1; i < samples; ++i) {
-    const double dt = t[i] - t[i - 1];
-    if (std::abs(dt - step) > kSameStep * dt) step = dt, rest = std::exp(-dt / lag_s), ramp = lag_s / dt * (1 - rest);
-    z = rest * z + (ramp - rest) * before + (1 - ramp) * out[i];
-    before = out[i];
-    out[i] = z;
+  for (int pass = 0; pass < channel.lags; ++pass) {
+    double z = out[0], before = out[0], step = 0, rest = 1, ramp = 0;
+    for (Index i = 1; i < samples; ++i) {
+      const double dt = t[i] - t[i - 1];
+      if (std::abs(dt - step) > kSameStep * dt) step = dt, rest = std::exp(-dt / lag_s), ramp = lag_s / dt * (1 - rest);
+      z = rest * z + (ramp - rest) * before + (1 - ramp) * out[i];
+      before = out[i];
+      out[i] = z;
+    }
   }
   return out;
 }
 
 VectorXd ThroughChannel(const Dataset& data, int joint, VectorXd torque) {
-  const TorqueChannel& c = data.channel;
-  if (c.empty() || (c.lag_s[joint] == 0 && c.late_s[joint] == 0)) return torque;
-  return ThroughChannel(data.s.t, torque, c.lag_s[joint], c.late_s[joint]);
+  if (data.channel.empty() || data.channel[static_cast<std::size_t>(joint)].empty()) return torque;
+  return ThroughChannel(data.s.t, torque, data.channel[static_cast<std::size_t>(joint)]);
 }
 
 MatrixXd ThroughChannel(const Dataset& data, MatrixXd torque) {
@@ -215,20 +227,32 @@ TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Da
   if (!most(std::count_if(rows.begin(), rows.end(), LooksLate))) return {};
   std::vector<Late> late;
   for (const Row& row : rows) late.push_back(Search(row));
-  TorqueChannel out{VectorXd::Zero(n), VectorXd::Zero(n)};
-  if (most(std::count_if(late.begin(), late.end(), [](const Late& l) { return l.filtered; }))) {
+  TorqueChannel out(static_cast<std::size_t>(n));
+  const auto filtered = [&](int lags) {
+    return std::count_if(late.begin(), late.end(), [&](const Late& l) { return l.is_filtered(lags); });
+  };
+  // All joints have the same electronics, so all have one order.
+  const auto left = [&](int lags) {
+    double sum = 0;
+    for (const Late& l : late) sum += static_cast<double>(l.rows) * std::log(l.left[lags - 1]);
+    return sum;
+  };
+  int lags = 1;
+  for (int more = 2; more <= kMostLags; ++more)
+    if (left(more) < left(lags)) lags = more;
+  if (most(filtered(lags))) {
     for (std::size_t k = 0; k < rows.size(); ++k)
-      if (late[k].filtered) out.lag_s[rows[k].joint] = late[k].lag_s, out.late_s[rows[k].joint] = late[k].late_s;
-      else if (late[k].delayed) out.late_s[rows[k].joint] = late[k].alone_s;
+      if (late[k].is_filtered(lags)) out[static_cast<std::size_t>(rows[k].joint)] = late[k].filtered[lags - 1];
+      else if (late[k].is_delayed()) out[static_cast<std::size_t>(rows[k].joint)] = late[k].delayed;
     return out;
   }
-  if (!most(std::count_if(late.begin(), late.end(), [](const Late& l) { return l.delayed; }))) return {};
+  if (!most(std::count_if(late.begin(), late.end(), [](const Late& l) { return l.is_delayed(); }))) return {};
   double mean_s = 0, apart_s = 0;
-  for (const Late& l : late) mean_s += l.alone_s / static_cast<double>(late.size());
-  for (const Late& l : late) apart_s = std::max(apart_s, std::abs(l.alone_s - mean_s));
+  for (const Late& l : late) mean_s += l.delayed.late_s / static_cast<double>(late.size());
+  for (const Late& l : late) apart_s = std::max(apart_s, std::abs(l.delayed.late_s - mean_s));
   if (apart_s < kDelaysDiffer * mean_s) return {};
   for (std::size_t k = 0; k < rows.size(); ++k)
-    if (late[k].delayed) out.late_s[rows[k].joint] = late[k].alone_s;
+    if (late[k].is_delayed()) out[static_cast<std::size_t>(rows[k].joint)] = late[k].delayed;
   return out;
 }
 

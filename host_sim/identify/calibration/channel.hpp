@@ -9,9 +9,9 @@
 
 namespace armcal::calibration {
 
-// The torque [N] of one joint as its channel shows it: late by late_s and through a low-pass of first order with the
-// time constant lag_s. Exact for a torque that is linear between samples.
-Eigen::VectorXd ThroughChannel(const Eigen::VectorXd& t, const Eigen::VectorXd& torque, double lag_s, double late_s);
+// The torque [N] of one joint as its channel shows it. Exact with one low-pass, for a torque that is linear between
+// samples.
+Eigen::VectorXd ThroughChannel(const Eigen::VectorXd& t, const Eigen::VectorXd& torque, const JointChannel& channel);
 
 // The same for a joint of a log, with the log's own channel; for all joints [N x n].
 Eigen::VectorXd ThroughChannel(const Dataset& data, int joint, Eigen::VectorXd torque);

@@ -12,11 +12,14 @@
 
 namespace armcal::calibration {
 
-// How the torque of each joint [n] was measured, where a log shows it: through a low-pass of first order, and late.
-struct TorqueChannel {
-  Eigen::VectorXd lag_s, late_s;  // both empty: as it is
-  bool empty() const { return lag_s.size() == 0; }
+// How a joint's torque was measured, where a log shows it: late by late_s, and through so many equal low-passes of
+// first order with the time constant lag_s.
+struct JointChannel {
+  double lag_s = 0, late_s = 0;
+  int lags = 1;
+  bool empty() const { return lag_s == 0 && late_s == 0; }
 };
+using TorqueChannel = std::vector<JointChannel>;  // [n]; empty: as it is
 
 // N samples, n joints.
 struct Dataset {

@@ -78,7 +78,7 @@ class JointSum {
 
 // A joint whose rows are averages of samples, or whose columns pass a torque channel.
 bool IsFiltered(const Dataset& data, int j) {
-  return data.averaged(j) || (!data.channel.empty() && (data.channel.lag_s[j] != 0 || data.channel.late_s[j] != 0));
+  return data.averaged(j) || (!data.channel.empty() && !data.channel[static_cast<std::size_t>(j)].empty());
 }
 
 // What the rows of joint j take of a signal.

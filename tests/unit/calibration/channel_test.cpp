@@ -39,8 +39,9 @@ VectorXd Integrated(const VectorXd& t, const VectorXd& u, double lag_s, double l
 struct Arm {
   tests::SyntheticArm arm{tests::Er20(), 5};
   Dataset log = arm.Run(40, 6);
-  void Measure(int j, double lag_s, double late_s) {
-    log.tau.col(j) = Integrated(log.s.t, log.tau.col(j), lag_s, late_s);
+  void Measure(int j, double lag_s, double late_s, int lags = 1) {
+    for (int pass = 0; pass < lags; ++pass)
+      log.tau.col(j) = Integrated(log.s.t, log.tau.col(j), lag_s, pass == 0 ? late_s : 0);
   }
   TorqueChannel Seen() const { return SeeChannel(arm.model(), {&log}); }
 };
@@ -49,9 +50,9 @@ constexpr std::array kTimes{0.0, 0.01, 0.03, 0.04, 0.2, 1.0};
 
 TEST(Channel, ARampThroughALowPass_IsLateByItsTimeConstant) {
   const VectorXd t = VectorXd::Map(kTimes.data(), 6);
-  const VectorXd y = ThroughChannel(t, t, 0.05, 0);
+  const VectorXd y = ThroughChannel(t, t, {0.05, 0, 1});
   for (Index k = 0; k < t.size(); ++k) EXPECT_NEAR(y[k], t[k] - 0.05 * (1 - std::exp(-t[k] / 0.05)), 1e-12);
-  const VectorXd late = ThroughChannel(t, t, 0, 0.02);
+  const VectorXd late = ThroughChannel(t, t, {0, 0.02, 1});
   for (Index k = 1; k < t.size(); ++k) EXPECT_NEAR(late[k], std::max(0.0, t[k] - 0.02), 1e-12);
 }
 
@@ -61,8 +62,24 @@ TEST(Channel, LowPassesAndDelaysOfTheirOwn_AreFoundOnEveryJoint) {
   const TorqueChannel seen = a.Seen();
   ASSERT_FALSE(seen.empty());
   for (int j = 0; j < 6; ++j) {
-    EXPECT_NEAR(seen.lag_s[j], 0.02 + 0.01 * j, 0.15 * (0.02 + 0.01 * j)) << j;
-    EXPECT_NEAR(seen.late_s[j], 0.004 * (j % 3), 0.004) << j;
+    const JointChannel& own = seen[static_cast<std::size_t>(j)];
+    EXPECT_EQ(own.lags, 1) << j;
+    EXPECT_NEAR(own.lag_s, 0.02 + 0.01 * j, 0.15 * (0.02 + 0.01 * j)) << j;
+    EXPECT_NEAR(own.late_s, 0.004 * (j % 3), 0.004) << j;
+  }
+}
+
+TEST(Channel, TwoEqualLowPasses_AreToldFromOneWithADelay) {
+  Arm a;
+  for (int j = 0; j < 6; ++j) a.Measure(j, 0.03 + 0.004 * j, 0.005, 2);
+  const TorqueChannel seen = a.Seen();
+  ASSERT_FALSE(seen.empty());
+  for (int j = 0; j < 6; ++j) {
+    const JointChannel& own = seen[static_cast<std::size_t>(j)];
+    EXPECT_EQ(own.lags, 2) << j;
+    // Slow motion shows the sum of lags and delay well, and how the sum is shared less well.
+    EXPECT_NEAR(2 * own.lag_s + own.late_s, 2 * (0.03 + 0.004 * j) + 0.005, 0.003) << j;
+    EXPECT_NEAR(own.lag_s, 0.03 + 0.004 * j, 0.2 * (0.03 + 0.004 * j)) << j;
   }
 }
 

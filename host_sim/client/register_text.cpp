@@ -72,6 +72,8 @@ StatusText TextOf(Status status) {
       return {"Replayed", "the counter of the signed table is not above the highest one"};
     case Status::kOtherDrive:
       return {"OtherDrive", "the table is signed for another drive"};
+    case Status::kContracted:
+      return {"Contracted", "the firmware was compiled without -ffp-contract=off"};
     case Status::kStorageFault:
       return {"StorageFault", "the storage refused, or returned what was not written"};
     case Status::kBlank:

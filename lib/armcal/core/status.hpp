@@ -35,6 +35,7 @@ enum class [[nodiscard]] Status : std::uint8_t {
   kBadSignature = 21,   // a table is not signed, or its signature does not fit
   kReplayed = 22,       // a signed table has a counter that is not above the highest one
   kOtherDrive = 23,     // a table is signed for another drive
+  kContracted = 24,     // the firmware was compiled without -ffp-contract=off: see math::Contracts
   kStorageFault = 32,   // the storage refused or returned what was not written
   kBlank = 33,          // storage holds no record at all
   kCorrupt = 34,        // storage holds a record that fails its checks

@@ -3,6 +3,7 @@
 
 #include "armcal/estimator/row_gate.hpp"
 #include "armcal/filter/prior.hpp"
+#include "armcal/math/mul_add.hpp"
 #include "armcal/model/evaluate.hpp"
 #include "armcal/model/parameters.hpp"
 #include "armcal/physical/rigid_prior.hpp"
@@ -130,8 +131,9 @@ class TableBuild {
     stage_ = Stage::kBodies;
   }
 
-  // One slice. kBusy: call again. kOk: `adopted` is filled in. kWrongSchema; kUnphysical (a link's body, or a negative
-  // rotor inertia); kNotFinite (the map overflows). On refusal `adopted` is unchanged.
+  // One slice. kBusy: call again. kOk: `adopted` is filled in. kContracted (the compiler's flags); kWrongSchema;
+  // kUnphysical (a link's body, or a negative rotor inertia); kNotFinite (the map overflows). On refusal `adopted` is
+  // unchanged.
   core::Status Step() {
     switch (stage_) {
       case Stage::kBodies:
@@ -180,6 +182,7 @@ class TableBuild {
 
   // From bodies to base parameters: the mean.
   core::Status MapMeans() {
+    if (math::Contracts()) return core::Status::kContracted;
     if (table_->schema != Model::kSchema) return core::Status::kWrongSchema;
     for (int link = 0; link < Model::kJoints; ++link) {
       float body[kBlock];

@@ -16,7 +16,7 @@ namespace armcal::estimator {
 template <class Model>
 struct Row {
   float front[Model::kFront > 0 ? Model::kFront : 1] = {};  // from the joint's first column on
-  float dense[Model::kDense] = {};  // from kRowBegin[joint] on; what is before is not of this row
+  float dense[Model::kDense > 0 ? Model::kDense : 1] = {};  // from kRowBegin[joint] on; the rest is not of this row
   float eta[Model::kNonlinear > 0 ? Model::kNonlinear : 1] = {};  // extended filter only
   float y = 0.0f;
 };

@@ -13,8 +13,8 @@
 #include <type_traits>
 #include <utility>
 
-// Contraction (-ffp-contract=fast, which is GCC's default with -std=gnu++17) changes bits, too. No compiler tells a
-// program of it, so nothing here can refuse it: compile with -ffp-contract=off (port/PORTING.md).
+// Contraction (-ffp-contract=fast, which is GCC's default) changes bits, too. No compiler tells a program of it:
+// whoever builds a table asks Contracts in mul_add.hpp.
 #ifdef __FAST_MATH__
 #error "armcal needs exact IEEE arithmetic: argument reduction and the NaN checks fail under -ffast-math"
 #endif

@@ -21,4 +21,16 @@ T MulAdd(const T& a, const T& b, const T& c) {
   return a * b + c;
 }
 
+// True if the code around the call is compiled with contraction: a b + c of floats is then rounded once or twice as the
+// compiler likes, and the results are no longer those of other machines. GCC and clang contract by default if the core
+// has the instruction; -ffp-contract=off forbids it. No compiler tells a program of it, so this is tried when the
+// program runs: the square below is no float, and its rounded value leaves a rest only if the subtraction sees the
+// exact one. Context: any.
+[[gnu::always_inline]] inline bool Contracts() {
+  const volatile float x = 1.000244140625f;  // 1 + 2^-12; volatile: each product is computed, and from its own factors
+  const volatile float rounded = x * x;
+  const float a = x, b = x, c = rounded;
+  return a * b - c != 0.0f;
+}
+
 }  // namespace armcal::math

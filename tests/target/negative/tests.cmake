@@ -27,6 +27,13 @@ if(core STREQUAL cortex-m4f)  # a Cortex-M7 computes doubles without a library; 
   must_fail(Image_WithADouble_FailsTheCheck "double arithmetic: .*__aeabi_dmul"
     bash -c "cp \"$1\" double.elf && \"$0\" -DIMAGE=double.elf -DNM=\"$2\" -DOBJECTS=nowhere -P \"$3\"" ${CMAKE_COMMAND}
     $<TARGET_FILE:negative_double> ${CMAKE_NM} ${PROJECT_SOURCE_DIR}/toolchains/check_image.cmake)
+
+  # With the compiler's own flags no table is adopted: Contracted.
+  add_executable(negative_default_flags negative/default_flags.cpp $<TARGET_OBJECTS:armcal_runner>)
+  target_include_directories(negative_default_flags PRIVATE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/lib)
+  target_link_options(negative_default_flags PRIVATE -L${PROJECT_SOURCE_DIR}/port/mps2 -T ${ARMCAL_BOARD}.ld)
+  set_target_properties(negative_default_flags PROPERTIES CXX_STANDARD 17 CXX_EXTENSIONS ON)
+  must_fail(Firmware_WithDefaultFlags_AdoptsNoTable "table 24" ${run} ${ARMCAL_BOARD} $<TARGET_FILE:negative_default_flags>)
 endif()
 
 # Contraction is what would make target and PC differ first: the comparison has to see it.

@@ -59,6 +59,14 @@ def measure(rows, objects, size, faults):
     by_name = {Path(o).name.split(".")[0]: o for o in objects}
     figures = {"filters": [], "regressors": [], "estimators": [], "controllers": [], "read_outs": []}
     for row in rows:
+        is_filter = row["kind"] == "filter"
+        name = f"{row['name']}_{row['n']}" if is_filter else f"{row['kind']}_{row['name']}"
+        for key in [k for k in row if k.endswith("_least")]:
+            most = row[key.removesuffix("_least")]
+            if most != row[key]:
+                faults.append(f"{name}: {key.removesuffix('_least')} depend on the data: {row[key]} to {most}")
+        if row["kind"] == "stamps":  # nothing but the comparison above
+            continue
         if row["kind"] == "controller":
             figures["controllers"].append({"controller": row["name"]} | {k: row[k] for k in CONTROLLER_KEYS})
             continue
@@ -68,13 +76,7 @@ def measure(rows, objects, size, faults):
         if row["kind"] == "read_out":
             figures["read_outs"].append({"read_out": row["name"]} | {k: row[k] for k in READ_OUT_KEYS})
             continue
-        is_filter = row["kind"] == "filter"
-        name = f"{row['name']}_{row['n']}" if is_filter else f"regressor_{row['name']}"
         file = by_name[name]
-        for key in [k for k in row if k.endswith("_least")]:
-            most = row[key.removesuffix("_least")]
-            if most != row[key]:
-                faults.append(f"{name}: {key.removesuffix('_least')} depend on the data: {row[key]} to {most}")
         deep = stack_bytes(file, r"Instance<.*>::" if is_filter else r"::Evaluate\(", faults)
         if row["painted_bytes"] > deep >= 0:
             faults.append(f"{name}: painted stack {row['painted_bytes']} bytes, deeper than the bound {deep}")

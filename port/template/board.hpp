@@ -25,8 +25,9 @@ std::uint32_t Measure(armcal::model::RawSample<n>& raw, armcal::controller::SetP
   raw = {};
   set = {};
   raw.tick = target::CountTick();
-  // Here: counts and measured current of all axes at one instant, flags, temperatures (NaN without a sensor), and the
-  // set-point of your motion controller.
+  // Here: counts and measured current of all axes at one instant, flags, temperatures (NaN without a sensor), the time
+  // stamp of the encoders' latch (latch_ns, and stamped = true) if you have it, and the set-point of your motion
+  // controller.
   return 0;
 }
 inline void Command(const float*) {}  // here: [n] N m, to your current controllers

@@ -270,6 +270,8 @@ void Controller(const std::uint8_t* bytes, std::size_t count) {
           for (int j = 0; j < n; ++j)
             Must(std::abs(tau_Nm[j]) <= Model::kCeilings.joint[j].torque_Nm, "a torque beyond the ceiling");
           raw.tick = ++time.tick;
+          raw.stamped = (raw.flags[0] & 8u) != 0;
+          raw.latch_ns = raw.tick * 1000000u + static_cast<std::uint32_t>(raw.counts[0]);
           for (int j = 0; j < n; ++j) raw.counts[j] += static_cast<std::int32_t>(100.0f * set.qd[j]);
           (void)drive->Push(raw);
         }

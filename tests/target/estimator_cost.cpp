@@ -54,6 +54,24 @@ void Measure(const char* name) {
       .End();
 }
 
+// The tick's share of the same ticks with time stamps and without: the instructions must be the same.
+void MeasureStamps() {
+  static signal::SignalPath<Model::kJoints, Model::kSampleTicks> with(estimator::AxesOf<Model>()),
+      without(estimator::AxesOf<Model>());
+  RawTicks<Model::kJoints> ticks;
+  Range both;
+  std::uint32_t stamped = 0, bare = 0;
+  for (int k = 0; k < 2000; ++k) {
+    model::RawSample<Model::kJoints> raw = ticks.Next();
+    bare += CostOf([&] { (void)without.PushTick(raw); });
+    raw.latch_ns = raw.tick * model::TickLength_ns(Model::kTickRate_Hz);
+    raw.stamped = true;
+    stamped += CostOf([&] { (void)with.PushTick(raw); });
+  }
+  both.Add(stamped), both.Add(bare);
+  port::runner::Line("stamps").Text(Model::kName).Value("ticks", both.most).Value("ticks_least", both.least).End();
+}
+
 // Two sectors of RAM in the place of a flash memory.
 constexpr std::uint32_t kSector = 4096;
 std::uint8_t memory[2 * kSector];
@@ -249,6 +267,7 @@ void MeasureController() {
 
 void MeasureEstimators() {
   MeasureController();
+  MeasureStamps();
   if (!core::IsOk(estimator::BuildAdoptedTable(defaults, 1, rigid, adopted))) return;
   Measure<filter::ForgettingFilter<Model>>("forgetting");
   Measure<filter::KalmanFilter<Model, filter::Form::kBlock>>("kalman_block");

@@ -120,6 +120,8 @@ class Compiled final : public Firmware {
     const std::uint32_t tick = tick_.load();
     model::RawSample<n> raw;
     raw.tick = tick;
+    raw.latch_ns = tick * model::TickLength_ns(Model::kTickRate_Hz);
+    raw.stamped = true;
     for (int j = 0; j < n; ++j) {
       raw.counts[j] = readings[j].counts;
       raw.current[j] = readings[j].current_lsb;

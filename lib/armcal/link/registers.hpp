@@ -191,7 +191,7 @@ inline constexpr Register kRowsGatedB = In(0x0066, 1, kU32, "rows_gated_b", "", 
 inline constexpr Span kStatusBlock = Between(kTransactionState, kRowsGatedB);
 inline constexpr Register kRowsOutsideA = In(0x0068, 1, kU32, "rows_outside_a", "", "rows in motion that the row gate kept from filter A since the adoption");
 inline constexpr Register kRowsOutsideB = In(0x006A, 1, kU32, "rows_outside_b", "", "as above, filter B");
-inline constexpr Register kImplausibleTicks = In(0x006C, 1, kU32, "implausible_ticks", "", "ticks with a count or current that the arm cannot have made");
+inline constexpr Register kImplausibleTicks = In(0x006C, 1, kU32, "implausible_ticks", "", "ticks with a count, current or time stamp that cannot be right");
 inline constexpr Register kTableFallbacks = In(0x006E, 1, kU32, "table_fallbacks", "", "stored tables passed over since power-up: not readable any more, or refused at boot");
 inline constexpr Span kDoubtBlock = Between(kRowsOutsideA, kTableFallbacks);
 // Writing: why the last table was refused, who may write, and how long the board wants to wait.

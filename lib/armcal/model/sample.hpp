@@ -18,7 +18,17 @@ struct RawSample {
   std::int16_t current[n] = {};    // measured (not commanded) torque-producing current, LSB
   std::uint8_t flags[n] = {};      // kEnabled | kSaturated | kStale
   float temperature_degC[n] = {};  // joint or motor temperature; NaN where there is no sensor
+  // When the encoders latched these counts (not when the interrupt came), in ns of any clock that runs evenly. It
+  // wraps at 2^32, and only differences count. It is read if `stamped` is true, which is either so in every tick or in
+  // none.
+  std::uint32_t latch_ns = 0;
+  bool stamped = false;
 };
+
+// The distance of two ticks in RawSample::latch_ns, to the nearest nanosecond.
+constexpr std::uint32_t TickLength_ns(float tick_rate_Hz) {
+  return static_cast<std::uint32_t>(1e9f / tick_rate_Hz + 0.5f);
+}
 
 // Flags of one joint in a Sample.
 inline constexpr std::uint8_t kValid = 1;   // enabled and not saturated in all five windows, no axis stale

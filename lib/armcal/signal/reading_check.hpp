@@ -19,7 +19,8 @@ inline constexpr float kUsualAcceleration_radps2 = 10.0f;
 // differs from the last good step by at most a limit: three times the learned acceleration, plus four times the mean
 // noise, plus eight counts. The learned acceleration is the largest one that the axis has kept for three ticks; it
 // fades slowly. A step does not fit if it is faster than kLargestSpeed_radps, or if it is zero although the axis was
-// not about to stop.
+// not about to stop. If the frame of a tick was latched late, its step is as much longer, by the last good step. This
+// part is taken off before a step is compared.
 //   Good: the last steps fitted. The count can be believed.
 //   Away: a step did not fit. The differences from the last good step are summed up. When the sum is near zero again
 //     and the count moves, the state is Good. So after one flipped bit only one tick is refused. If the sum does not
@@ -33,6 +34,7 @@ inline constexpr float kUsualAcceleration_radps2 = 10.0f;
 class CountCheck {
  public:
   static constexpr float kPatience_s = 2.0f;
+  static constexpr std::int32_t kLate = 1 << 16;
 
   // counts_to_rad: angle of the joint (rad or m) by one count. Call it once, before the first Check.
   void Start(float counts_to_rad, float tick_rate_Hz) {
@@ -51,29 +53,37 @@ class CountCheck {
     sign_run_ = 0;
   }
 
-  // Takes the count of the next tick. Returns true if the count can be believed. The time depends on the counts by some
-  // instructions.
-  ARMCAL_NOINLINE bool Check(std::int32_t counts) {  // out of line, so that it has the registers
-    const std::int32_t step = Less(counts, last_), jump = Less(step, step_), bend = Less(step, before_);
+  // Takes the count of the next tick. late: by how much more than a tick it was latched after the count before, in
+  // 1/kLate of a tick, within 32 ticks: -kLate if this is the same frame again, 0 if this is not known. Returns true if
+  // the count can be believed. The time depends on the counts by some instructions.
+  ARMCAL_NOINLINE bool Check(std::int32_t counts, std::int32_t late) {  // out of line, so that it has the registers
+    const std::int32_t moved = Less(counts, last_);
+    const auto part = static_cast<std::int32_t>((std::int64_t{step_} * late) >> 16);  // a garbled step may make it wrap
+    const std::int32_t step = Less(moved, part), jump = Less(step, step_), bend = Less(step, before_);
+    const bool same = moved == 0 && 2 * late > -kLate;
     last_ = counts;
     before_ = step;
+    pace_ = 2 * static_cast<std::uint32_t>(step) + static_cast<std::uint32_t>(bend);
     if (age_ < 2) {  // no step yet to compare with
-      step_ = before_ = age_ == 0 ? 0 : step;
+      step_ = before_ = age_ == 0 ? 0 : First(moved, late);
+      pace_ = 2 * static_cast<std::uint32_t>(step_);
       bend_ = 0;
       ++age_;
       still_ = 0;
       return true;
     }
     const std::uint32_t limit = Limit();
-    const bool stops = step == 0 && SizeOf(step_) > kFewCounts + kWidth * recent_ / kRecent;
+    const bool stops = same && SizeOf(step_) > kFewCounts + kWidth * recent_ / kRecent;
     const bool fits = SizeOf(jump) <= limit && SizeOf(step) <= fastest_ && !stops;
     Learn(bend, fits, limit);
-    Follow(step, jump, fits, limit);
+    Follow(step, jump, same, fits, limit);
     age_ = age_ == ~0u ? kYoung : age_ + 1u;
-    still_ = step == 0 ? math::Min(still_ + 1u, kStill) : 0u;
+    still_ = same ? math::Min(still_ + 1u, kStill) : 0u;
     return state_ == kGood;
   }
   bool moved() const { return before_ != 0; }  // from the tick before to this one
+  // Twice the counts that the axis moves in a tick, at this tick.
+  std::int32_t pace() const { return static_cast<std::int32_t>(pace_); }
 
  private:
   // All numbers are whole, because an M4F compares these in a third of the instructions. A size is in parts of a count.
@@ -98,6 +108,11 @@ class CountCheck {
     return (static_cast<std::uint32_t>(counts) ^ sign) - sign;
   }
   static std::uint32_t Whole(float x) { return static_cast<std::uint32_t>(math::Min(x, 268435456.0f)); }
+  // The first step of all: nothing but the time says how much of it is a tick's.
+  static std::int32_t First(std::int32_t moved, std::int32_t late) {
+    const float share = 2 * late > -kLate ? static_cast<float>(late) / static_cast<float>(kLate + late) : 0.0f;
+    return Less(moved, static_cast<std::int32_t>(static_cast<float>(moved) * share));
+  }
   std::uint32_t Limit() const { return kFewCounts + 3 * sustained_ / kSustained + kWidth * (noise_ / kNoise); }
 
   // bend: the difference of two steps. Noise and a wrong count make it change its sign; an acceleration keeps it for
@@ -118,7 +133,7 @@ class CountCheck {
     lowest_ = size;
   }
 
-  void Follow(std::int32_t step, std::int32_t jump, bool fits, std::uint32_t limit) {
+  void Follow(std::int32_t step, std::int32_t jump, bool same, bool fits, std::uint32_t limit) {
     if (state_ == kGood) {
       if (fits) {
         step_ = step;
@@ -129,13 +144,13 @@ class CountCheck {
         offset_ = jump;
         since_ = 0;
         wild_ = 0;
-        frozen_ = step == 0;
+        frozen_ = same;
       }
     } else if (state_ == kAway) {
       const std::int32_t offset = Less(offset_, Less(0, jump));
-      if (step != 0 && SizeOf(offset) <= 2 * limit) {
+      if (!same && SizeOf(offset) <= 2 * limit) {
         state_ = kGood;
-      } else if (step == 0 && !fits) {
+      } else if (same && !fits) {
         frozen_ = true;
       } else if (frozen_) {
         Settle(step, kFit);
@@ -167,6 +182,7 @@ class CountCheck {
   std::uint32_t patience_ = 0;                          // ticks
   std::int32_t last_ = 0;                               // count of the tick before
   std::int32_t before_ = 0;                             // its step
+  std::uint32_t pace_ = 0;                              // twice the step between it and the next one
   std::int32_t bend_ = 0;                               // and its bend
   std::int32_t step_ = 0;                               // what the next step is compared with
   std::int32_t offset_ = 0;                             // how far the axis is away

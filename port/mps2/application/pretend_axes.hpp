@@ -36,6 +36,8 @@ class PretendAxes {
     float tau_Nm[n];
     model::ModelTorque(arm_, state, memory_, rows_, tau_Nm);
     raw.tick = tick;
+    raw.latch_ns = tick * model::TickLength_ns(Model::kTickRate_Hz);  // a real drive latches its encoders
+    raw.stamped = true;
     for (int i = 0; i < n; ++i) {
       const model::AxisInfo& axis = Model::kAxes[i];
       raw.counts[i] = axis.zero_counts + static_cast<std::int32_t>(state.q[i] / axis.counts_to_rad);

@@ -1,4 +1,5 @@
-// tests - the signal path on raw ticks with gaps, wrapping counts, stale and saturated axes and a coupling.
+// tests - the signal path on raw ticks with gaps, wrapping counts, stale and saturated axes, time stamps and a
+// coupling.
 #include "armcal/signal/signal_path.hpp"
 #include "port/runner/line.hpp"
 #include "tests/target/raw_ticks.hpp"
@@ -38,10 +39,15 @@ int Program() {
   }
   path.SetSettings(settings);
   RawTicks<n> ticks;
+  Numbers jitter(5);
   Digest digest;
   int samples = 0;
   for (int k = 1; k <= 64000; ++k) {
-    if (path.PushTick(ticks.Next())) {
+    model::RawSample<n> raw = ticks.Next();
+    raw.stamped = k > 32000;  // by up to 50 us early or late; a few frames are repeated
+    raw.latch_ns = (raw.tick - (jitter.Below(1000) == 0 ? 1u : 0u)) * 1000000u +
+                   static_cast<std::uint32_t>(jitter.Below(100001) - 50000);
+    if (path.PushTick(raw)) {
       ++samples;
       const model::Sample<n>& s = path.sample();
       digest.Add(s.tick);

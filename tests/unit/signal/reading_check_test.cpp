@@ -31,7 +31,7 @@ std::vector<int> Refused(const std::vector<std::int32_t>& counts) {
   check.Start(static_cast<float>(kCount_rad), 1000.0f);
   std::vector<int> refused;
   for (std::size_t k = 0; k < counts.size(); ++k)
-    if (!check.Check(counts[k])) refused.push_back(static_cast<int>(k));
+    if (!check.Check(counts[k], 0)) refused.push_back(static_cast<int>(k));
   return refused;
 }
 std::vector<int> Range(int from, int to) {

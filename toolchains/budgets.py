@@ -2,10 +2,12 @@
 """toolchains - what filters and regressors cost on a core: a table, the same as JSON, and a failure when a figure has risen.
 
   budgets.py --core NAME --bench TEXT --budgets TOML --json OUT --size PROGRAM --objects LIST
+             --image ELF --trace TEXT --names TEXT --objdump PROGRAM
 
 Instructions come from the bench that ran on the emulated board, bytes of code from the objects, stack from their call graphs
-(toolchains/stack.py); the bench's painted stack must not be deeper. Figures are compared with the core's accepted ones in
-TOML and with its limits; a message names the figure, and for accepted ones the line to put into TOML.
+(toolchains/stack.py); the bench's painted stack must not be deeper. Cycles are modelled (toolchains/cycles.py): IMAGE, TRACE
+and NAMES are what that program reads. Figures are compared with the core's accepted ones in TOML and with its limits; a
+message names the figure, and for accepted ones the line to put into TOML.
 """
 import argparse
 import json
@@ -15,6 +17,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import cycles
 import stack
 
 FILTER_KEYS = ["instructions", "solve", "read_out", "slice_max", "slice_min", "text_bytes", "own_bytes", "state_bytes",
@@ -23,6 +26,7 @@ REGRESSOR_KEYS = ["instructions", "text_bytes", "stack_bytes"]
 ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "slice_min", "state_bytes"]
 CONTROLLER_KEYS = ["push", "feed_forward", "feed_forward_new", "step_learning", "step_resetting", "step_checking",
                    "step_saving", "request", "other", "state_bytes"]
+MODELLED_KEYS = ["instructions", "cycles"]  # of a sample or call, and of a turn of a loop
 READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "state_bytes", "stack_bytes"]
 NOT_THE_FILTERS = re.compile(r"Get_|Calls|MakeParts|\.rodata.*\.str")  # the bench's own part of an object
 # One filter's own: code that knows the layout, and the rotations that the forgetting filter alone has. One copy of the rest serves
@@ -92,7 +96,7 @@ def measure(rows, objects, size, faults):
 def label(row):
     if "filter" in row:
         return f"{row['filter']}_{row['n']}"
-    return row.get("robot") or row.get("estimator") or row.get("controller") or row["read_out"]
+    return next(row[title] for title in ["robot", "estimator", "controller", "read_out", "modelled", "loop"] if title in row)
 
 
 def compare(rows, keys, accepted, limits, section, rise, faults):
@@ -110,7 +114,7 @@ def compare(rows, keys, accepted, limits, section, rise, faults):
             if most is not None and now > most:
                 faults.append(f"{name}: {key} {now}, limit {most}")
         ratio = limits.get(name, {}).get("slice_ratio")
-        if ratio is not None and row["slice_max"] > ratio * row["slice_min"]:
+        if ratio is not None and "slice_max" in row and row["slice_max"] > ratio * row["slice_min"]:
             faults.append(f"{name}: slices of {row['slice_min']} to {row['slice_max']}, limit 1 : {ratio}")
         if any(known.get(k) != row[k] for k in keys):
             lines.append(line)
@@ -119,6 +123,16 @@ def compare(rows, keys, accepted, limits, section, rise, faults):
     if lines:
         print(f"\nnot as accepted in toolchains/budgets.toml; the lines now, under [{section}]:")
         print("\n".join(lines))
+
+
+def compare_ratios(figures, most, faults):
+    """Fails on a loop or a filter's sample that needs too many cycles for its instructions. The latency of a division bounds a
+    loop that divides, whatever the order of its instructions."""
+    filters = {label(row) for row in figures["filters"]}
+    for row in figures["modelled"] + figures["loops"]:
+        ratio = row["cycles"] / row["instructions"]
+        if ratio > most and not row.get("divides") and ("loop" in row or label(row) in filters):
+            faults.append(f"{label(row)}: {ratio:.2f} modelled cycles an instruction, limit {most}")
 
 
 def grid(rows, columns):
@@ -131,12 +145,19 @@ def grid(rows, columns):
 
 
 def tables(figures, core, budgets):
-    clock, rate, cpi = budgets["clock_MHz"][core], budgets["sample_rate_Hz"], budgets["cycles_per_instruction"][core]
-    share = ("share", 8, ".2%", lambda row: row["instructions"] * cpi * rate / (clock * 1e6))
+    clock, rate = budgets["clock_MHz"][core], budgets["sample_rate_Hz"]
+    modelled = {row["modelled"]: row["cycles"] / row["instructions"] for row in figures["modelled"]}
+
+    def part(row):
+        """Of the core's time. Each filter has the cycles an instruction of its 60 columns, the bank those of its block filters."""
+        of = {"bank": "kalman_block"}.get(row["filter"], row["filter"]) + "_60" if "filter" in row else "er20_like"
+        return row["instructions"] * modelled[of] * rate / (clock * 1e6)
+
+    share = ("share", 8, ".2%", part)
     slices = [("slice", 8, "", "slice_max"), ("least", 8, "", "slice_min")]
     text, state, stack_ = ("text", 7, "", "text_bytes"), ("state", 7, "", "state_bytes"), ("stack", 7, "", "stack_bytes")
     whole = (f"{core}: instructions of a sample (six rows) or a call, bytes; share of {clock} MHz at {rate} samples/s, "
-             f"ESTIMATED with {cpi} cycles an instruction\n"
+             "from MODELLED cycles\n"
              "text: code and constants of a filter that is alone in an image; own: what it adds beside others of its form\n")
     whole += grid(figures["filters"], [
         ("filter", 14, "", "filter"), ("n", 4, "", "n"), ("front", 6, "", "n_front"), ("instr.", 9, "", "instructions"),
@@ -155,27 +176,31 @@ def tables(figures, core, budgets):
         whole += grid(figures["read_outs"], [
             ("physical read-out", 24, "", "read_out"), ("instr.", 10, "", "instructions"), ("slices", 8, "", "slices"),
             slices[0], ("hand-over", 11, "", "hand_over"), state, stack_])
-    return whole
+    return whole + cycles.table(core, figures["modelled"], figures["loops"])
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name in ["core", "bench", "budgets", "json", "size", "objects"]:
+    for name in ["core", "bench", "budgets", "json", "size", "objects", "image", "trace", "names", "objdump"]:
         parser.add_argument("--" + name, required=True)
     options = parser.parse_args()
     budgets = tomllib.loads(Path(options.budgets).read_text(encoding="utf-8"))
     faults = []
     objects = Path(options.objects).read_text(encoding="utf-8").split()
     figures = measure(read_bench(options.bench), objects, options.size, faults)
+    names = Path(options.names).read_text(encoding="utf-8").split()
+    figures["modelled"], figures["loops"] = cycles.measure(options.core, options.image, options.trace, names, options.objdump)
     Path(options.json).write_text(json.dumps({"core": options.core, **figures}, indent=1) + "\n", encoding="utf-8")
     text = tables(figures, options.core, budgets)
     Path(options.json).with_suffix(".txt").write_text(text, encoding="utf-8")
     print(text)
     accepted, rise = budgets.get(options.core, {}), budgets["rise"]
     for kind, keys in ("filters", FILTER_KEYS), ("regressors", REGRESSOR_KEYS), ("estimators", ESTIMATOR_KEYS), \
-            ("controllers", CONTROLLER_KEYS), \
-            ("read_outs", READ_OUT_KEYS):
+            ("controllers", CONTROLLER_KEYS), ("read_outs", READ_OUT_KEYS), ("modelled", MODELLED_KEYS), \
+            ("loops", MODELLED_KEYS):
         compare(figures[kind], keys, accepted.get(kind, {}), budgets["limits"], f"{options.core}.{kind}", rise, faults)
+    if (most := budgets["limits"]["cycles_per_instruction"].get(options.core)) is not None:
+        compare_ratios(figures, most, faults)
     for fault in faults:
         print(f"over budget: {fault}", file=sys.stderr)
     return int(bool(faults))

@@ -70,14 +70,20 @@ foreach(library target_filters ${regressor_libraries})
 endforeach()
 file(GENERATE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/objects.txt CONTENT "${objects}")
 string(REGEX REPLACE "nm$" "size" size_tool ${CMAKE_NM})
+set(trace ${CMAKE_CURRENT_BINARY_DIR}/cycles_trace.txt)
+set(names ${CMAKE_CURRENT_BINARY_DIR}/cycles_names.txt)
 set(budgets ${PROJECT_SOURCE_DIR}/toolchains/budgets.py --core ${core} --budgets ${PROJECT_SOURCE_DIR}/toolchains/budgets.toml
-            --size ${size_tool} --objects ${CMAKE_CURRENT_BINARY_DIR}/objects.txt)
+            --size ${size_tool} --objects ${CMAKE_CURRENT_BINARY_DIR}/objects.txt
+            --image $<TARGET_FILE:target_cycles> --trace ${trace} --names ${names} --objdump ${CMAKE_OBJDUMP})
 add_custom_target(budgets VERBATIM
   COMMAND bash -c "\"$0\" \"$1\" \"$2\" >\"$3\"" ${run} ${ARMCAL_BOARD} $<TARGET_FILE:target_bench> ${bench}
+  COMMAND bash -c "\"$0\" \"$1\" \"$2\" --trace \"$3\" >\"$4\"" ${run} ${ARMCAL_BOARD} $<TARGET_FILE:target_cycles> ${trace} ${names}
   COMMAND ${budgets} --bench ${bench} --json ${CMAKE_BINARY_DIR}/budgets.json
-  DEPENDS target_bench COMMENT "running the bench on ${ARMCAL_BOARD}")
+  DEPENDS target_bench target_cycles COMMENT "running the bench on ${ARMCAL_BOARD}")
 add_test(NAME budgets COMMAND ${CMAKE_COMMAND} --build ${CMAKE_BINARY_DIR} --target budgets)
 set_tests_properties(budgets PROPERTIES FIXTURES_SETUP bench LABELS target)
 set_tests_properties(Stack_OfEveryContextOfTheFirmware_IsBounded PROPERTIES LABELS target)
+add_test(NAME Cycles_OfSnippets_AreThoseCountedByHand COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/cycles_test.py)
+set_tests_properties(Cycles_OfSnippets_AreThoseCountedByHand PROPERTIES LABELS target)
 
 include(${CMAKE_CURRENT_SOURCE_DIR}/negative/tests.cmake)

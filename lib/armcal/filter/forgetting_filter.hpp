@@ -217,7 +217,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
     std::uint8_t column, columns, first, rows, length;
   };
   static constexpr int kMostRows = kJoints < 6 ? kJoints : 6;  // of a pass
-  static constexpr int kFewRows = kJoints < 3 ? kJoints : 3;   // so many are processed with four columns at a time
+  static constexpr int kFewRows = kJoints < 2 ? kJoints : 2;   // so many are processed with four columns at a time
   template <int most>
   struct Passes {
     Pass at[most] = {};

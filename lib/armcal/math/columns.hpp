@@ -81,7 +81,8 @@ ARMCAL_INLINE inline void Each(F f) {
 }
 
 // `turns` elements of each row and of each column (or stored row). They are loaded before the first store: a core that
-// issues in order (Cortex-M7) would otherwise wait for each element's chain before it starts the next one.
+// issues in order (Cortex-M7) would otherwise wait for each element's chain before it starts the next one. For the same
+// reason the pairs of a row and a stored row come in diagonals: pairs of one diagonal do not need each other.
 template <class Element, int rows, int stored, int stride, int turns, class T>
 ARMCAL_INLINE inline void BlockTurn(T* __restrict x, T* const* r, const T* c) {
   T own[turns * rows], kept[turns * stored];
@@ -89,11 +90,14 @@ ARMCAL_INLINE inline void BlockTurn(T* __restrict x, T* const* r, const T* c) {
     Each<rows>([&](auto i) ARMCAL_INLINE { own[t * rows + i] = x[t * stride + i]; });
     Each<stored>([&](auto j) ARMCAL_INLINE { kept[t * stored + j] = r[j][t]; });
   });
-  Each<rows>([&](auto i) ARMCAL_INLINE {
-    Each<stored>([&](auto j) ARMCAL_INLINE {
-      constexpr int kAt = 2 * (i * stored + j);
-      Each<turns>([&](auto t)
-                      ARMCAL_INLINE { Element()(own[t * rows + i], kept[t * stored + j], c[kAt], c[kAt + 1]); });
+  Each<rows + stored - 1>([&](auto diagonal) ARMCAL_INLINE {
+    Each<rows>([&](auto i) ARMCAL_INLINE {
+      constexpr int j = diagonal - i;
+      if constexpr (0 <= j && j < stored) {
+        constexpr int kAt = 2 * (i * stored + j);
+        Each<turns>([&](auto t)
+                        ARMCAL_INLINE { Element()(own[t * rows + i], kept[t * stored + j], c[kAt], c[kAt + 1]); });
+      }
     });
   });
   Each<turns>([&](auto t) ARMCAL_INLINE {

@@ -1,8 +1,9 @@
 # What a firmware image must not contain, and how large it may be. Called after the link:
 #   cmake -DIMAGE=a.elf -DNM=arm-none-eabi-nm "-DOBJECTS=folder;folder" -P check_image.cmake
+set(largest_data_bytes 256)  # of one object in .data, which takes flash and RAM; a filter belongs in .bss
 set(largest_frame_bytes 2048)  # of one function; 16 KB of stack serve background, tick and serial interrupt together
 
-execute_process(COMMAND ${NM} ${IMAGE} OUTPUT_VARIABLE symbols RESULT_VARIABLE failed)
+execute_process(COMMAND ${NM} -S ${IMAGE} OUTPUT_VARIABLE symbols RESULT_VARIABLE failed)
 if(failed)
   message(FATAL_ERROR "${IMAGE}: no symbols to look at")
 endif()
@@ -20,6 +21,17 @@ foreach(rule
     string(STRIP "${hit}" hit)
     string(APPEND found "\n  ${what}: ${hit}")
   endforeach()
+endforeach()
+
+string(REGEX MATCHALL "[0-9a-f]+ [dD] [^\n]+\n" objects "${symbols}")
+foreach(object ${objects})
+  string(REGEX MATCH "^[0-9a-f]+" bytes "${object}")
+  math(EXPR bytes "0x${bytes}")
+  if(object MATCHES " [dD] (data_begin|data_end)\n" OR bytes LESS_EQUAL largest_data_bytes)
+    continue()
+  endif()
+  string(STRIP "${object}" object)
+  string(APPEND found "\n  ${bytes} bytes of initialised data: ${object}")
 endforeach()
 
 # Stack: every frame bounded and small. (-fstack-usage writes "file:line:column:function<tab>bytes<tab>kind".)

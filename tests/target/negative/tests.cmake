@@ -22,6 +22,11 @@ negative_program(fpu_off)
 must_fail(Image_WithTheFpuOff_EndsWithNoCoprocessor "fault: CFSR 00080000\n.*ends with 99"
   bash -c "\"$0\" \"$1\" \"$2\" || echo ends with $?" ${run} ${ARMCAL_BOARD} $<TARGET_FILE:negative_fpu_off>)
 
+negative_program(data)
+must_fail(Image_WithAFilterInData_FailsTheCheck "260 bytes of initialised data: [0-9a-f]+ d .*numbers"
+  bash -c "cp \"$1\" data.elf && \"$0\" -DIMAGE=data.elf -DNM=\"$2\" -DOBJECTS=nowhere -P \"$3\"" ${CMAKE_COMMAND}
+  $<TARGET_FILE:negative_data> ${CMAKE_NM} ${PROJECT_SOURCE_DIR}/toolchains/check_image.cmake)
+
 if(core STREQUAL cortex-m4f)  # a Cortex-M7 computes doubles without a library; the sources are the same
   negative_program(double)
   must_fail(Image_WithADouble_FailsTheCheck "double arithmetic: .*__aeabi_dmul"

@@ -6,7 +6,8 @@
 namespace armcal::port::mps2 {
 
 // 8 sectors of 4 KB, program unit 8 bytes, erased to 0xFF. Programming can only clear bits. QEMU may back the memory
-// with a file; then its content survives a power cycle.
+// with a file; then its content survives a power cycle. If the tick lies in RAM, reading the code's flash during an
+// erase is a fault: see flash_guard.hpp.
 hardware::Storage PsramStorage();
 
 }  // namespace armcal::port::mps2

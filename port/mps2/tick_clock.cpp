@@ -36,9 +36,11 @@ std::uint32_t CountTick() {
   return tick;
 }
 
+std::uint32_t Ticks() { return tick_count.load(std::memory_order_relaxed); }
+bool TickRuns() { return (Register(kControl) & 1u) != 0; }
+
 hardware::Clock TickClock() {
-  return {nullptr, [](void*) { return tick_count.load(std::memory_order_relaxed); },
-          [](void*) { return ms_count.load(std::memory_order_relaxed); }};
+  return {nullptr, [](void*) { return Ticks(); }, [](void*) { return ms_count.load(std::memory_order_relaxed); }};
 }
 
 }  // namespace armcal::port::mps2

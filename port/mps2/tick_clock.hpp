@@ -13,6 +13,10 @@ void StartTick(std::uint32_t tick_rate_Hz);
 // Call it once in TickInterrupt. Returns the number of the tick that has begun.
 std::uint32_t CountTick();
 
+// How many ticks have begun, and whether StartTick has been called.
+std::uint32_t Ticks();
+bool TickRuns();
+
 // Ticks, and milliseconds that are counted by ticks.
 hardware::Clock TickClock();
 

@@ -46,6 +46,16 @@ add_test(NAME Firmware_StoredTables_SurvivePowerCuts
   COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/stored_tables.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_firmware>)
 set_tests_properties(Firmware_StoredTables_SurvivePowerCuts PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 1200 LABELS long)
 
+# The same firmware with its tick in RAM: while the flash is erased, nothing may read it.
+if(ARMCAL_TICK_IN_RAM)
+  set(ram_image --image $<TARGET_FILE:armcal_firmware_ram> --map ${PROJECT_BINARY_DIR}/port/mps2/armcal_firmware_ram.map --within 20000000-20400000)
+  add_test(NAME Tick_InRam_ReachesNothingElsewhere COMMAND ${ARMCAL_REACH} ${ram_image})
+  add_test(NAME Tick_InRam_GoesOnWhileTheFlashIsErased
+    COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tick_in_ram.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_firmware_ram>)
+  set_tests_properties(Tick_InRam_ReachesNothingElsewhere PROPERTIES LABELS target)
+  set_tests_properties(Tick_InRam_GoesOnWhileTheFlashIsErased PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300 LABELS target)
+endif()
+
 # The public rules of Modbus, asked of the same firmware: a few of them, and all with the long tests.
 set(rules ${PROJECT_SOURCE_DIR}/build/host/tests/e2e/test_e2e_modbus_rules)
 foreach(part "Firmware_OverItsSerialLine_KeepsRulesOfModbus|*.AReply_*:*/Requests.ReadingRegisters/serial|target"

@@ -33,10 +33,10 @@ BODY = 11  # numbers of a link; the last is its rotor
 class Board:
     """One start of the emulated board; leaving the block is a power cut."""
 
-    def __init__(self, board, image, memory, debugger=None):
+    def __init__(self, board, image, memory, debugger=None, options=()):
         words = ["qemu-system-arm", "-M", f"{board},memory-backend=psram", "-m", f"{MEMORY >> 20}M"]
         words += ["-object", f"memory-backend-file,id=psram,size={MEMORY},mem-path={memory},share=on"]
-        words += ["-display", "none", "-monitor", "none", "-serial", "null", "-serial", "pty", "-kernel", image]
+        words += ["-display", "none", "-monitor", "none", "-serial", "null", "-serial", "pty", "-kernel", image, *options]
         if debugger:
             words += ["-gdb", f"unix:{debugger},server=on,wait=off"]
         self.qemu = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
@@ -119,6 +119,14 @@ class Debugger:
     def watch(self, on):
         command = b"%s2,%x,%x" % (b"Z" if on else b"z", self.storage, SECTORS)
         assert self.ask(command) == b"OK", "no watchpoint"
+
+
+def blank_memory(folder):
+    memory = os.path.join(folder, "psram")
+    with open(memory, "wb") as file:
+        file.write(b"\xff" * SECTORS)
+        file.truncate(MEMORY)
+    return memory
 
 
 def packed(table):
@@ -210,10 +218,7 @@ def main():
         print("skipped: no qemu-system-arm (toolchains/install.sh cross)")
         return 77
     with tempfile.TemporaryDirectory() as folder:
-        memory = os.path.join(folder, "psram")
-        with open(memory, "wb") as file:
-            file.write(b"\xff" * SECTORS)
-            file.truncate(MEMORY)
+        memory = blank_memory(folder)
         default = round_trips(board, image, memory, trips)
         cuts(board, image, memory, folder, default, number)
     return 0

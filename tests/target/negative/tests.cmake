@@ -61,6 +61,16 @@ foreach(proof "Recursion:Odd:recursion. .*Odd.*Even.*Odd" "DataSizedFrame:DataSi
     ${stack_check} --limit 512 --root " ${root}\\(" ${unbounded})
 endforeach()
 
+# One function of the tick stays in flash.
+if(ARMCAL_TICK_IN_RAM)
+  must_fail(Tick_WithAFunctionLeftInFlash_IsNamed "not in 20000000-20400000: [0-9a-f]+ float armcal::model::RowTorque"
+    ${ARMCAL_REACH} --image $<TARGET_FILE:negative_tick_in_flash> --map ${PROJECT_BINARY_DIR}/port/mps2/negative_tick_in_flash.map
+    --within 20000000-20400000)
+  must_fail(Tick_WithAFunctionLeftInFlash_EndsWithAFault "silent after a fault: Prefetch Abort"
+    ${CMAKE_CURRENT_SOURCE_DIR}/tick_in_ram.py ${ARMCAL_BOARD} $<TARGET_FILE:negative_tick_in_flash>)
+  must_fail(Tick_CallThroughAPointerThatNobodyListed_IsFound "call through a pointer: TickInterrupt" ${ARMCAL_REACH} ${ram_image} --pointers /dev/null)
+endif()
+
 # budgets.py has to see a count that depends on data, a figure that rose, and a loop that takes too many cycles.
 must_fail(Budgets_FiguresThatAreWrong_AreNamed
   "forgetting_60: instructions depend on the data.*forgetting_60: solve 1[0-9]+, was [0-9]+ .\\+.*FoldBlock_1_4_6: [0-9.]+ modelled cycles an instruction, limit 0.5"

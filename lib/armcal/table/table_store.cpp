@@ -12,7 +12,10 @@ using core::Status;
 
 namespace {
 
-constexpr int kRechecks = 3;  // of the record in force before an erase
+// A weak cell reads well only sometimes. The more often a record is read before the other one is erased, and the more
+// often it is tried at power-up, the less likely it is that a record passes here and fails there.
+constexpr int kRechecks = 8;   // of the record in force before an erase
+constexpr int kReadings = 64;  // of both slots at power-up, at most
 
 struct Header {
   std::uint16_t format;
@@ -61,9 +64,10 @@ SlotState TableStore::Inspect(int slot) {
   if (core::GetBytes32(bytes) != kRecordMagic || header.words > kMaxPayloadWords) return SlotState::kCorrupt;
   if (RecordBytes(header.words, storage_.program_unit) > slot_bytes) return SlotState::kCorrupt;
 
-  std::uint32_t crc = 0;
+  // The header is not read again: a weak cell could read differently, and the checksum would not be that of `header`.
+  std::uint32_t crc = core::Crc32(bytes, kHeaderBytes, 0);
   const std::uint32_t covered = kHeaderBytes + 2 * header.words;
-  for (std::uint32_t at = 0; at < covered;) {
+  for (std::uint32_t at = kHeaderBytes; at < covered;) {
     const std::uint32_t count = covered - at < sizeof bytes ? covered - at : static_cast<std::uint32_t>(sizeof bytes);
     if (!IsOk(storage_.Read(base + at, bytes, count))) return SlotState::kCorrupt;
     crc = core::Crc32(bytes, count, crc);
@@ -112,11 +116,16 @@ Status TableStore::Load(std::uint16_t* out) {
   if (!Fits()) return Status::kWrongSize;
   if (busy()) return Status::kBusy;
   revocable_ = false;
-  for (int slot = 0; slot < kSlots; ++slot) {
-    state_[slot] = Inspect(slot);
-    fallbacks_ += state_[slot] == SlotState::kCorrupt;
+  const std::uint32_t before = fallbacks_;
+  for (int reading = 1;; ++reading) {
+    fallbacks_ = before;
+    for (int slot = 0; slot < kSlots; ++slot) {
+      state_[slot] = Inspect(slot);
+      fallbacks_ += state_[slot] == SlotState::kCorrupt;
+    }
+    const Status status = TakeBest(out);
+    if (IsOk(status) || Newest(SlotState::kCorrupt) < 0 || reading == kReadings) return status;
   }
-  return TakeBest(out);
 }
 
 Status TableStore::LoadOlder(std::uint16_t* out) {

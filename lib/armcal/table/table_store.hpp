@@ -46,7 +46,7 @@ enum class SlotState : std::uint8_t {
   kRefused = 4,  // whole, but its content was refused at boot
 };
 
-// The steps of a save: it reads the record in force three times and checks it, because a weak cell may read well only
+// The steps of a save: it reads the record in force eight times and checks it, because a weak cell may read well only
 // sometimes. It erases the other slot, programs it, reads it back, programs the commit word and reads that back. Each
 // Step erases one sector, programs one piece of at most kChunkBytes, or reads up to three such pieces.
 // If the record in force can no longer be read and the other slot holds a good record, the new record replaces the bad
@@ -60,7 +60,8 @@ class TableStore {
   TableStore(const hardware::Storage& storage, std::uint32_t schema, std::uint32_t words, std::uint32_t shorter = 0);
 
   // Reads both slots and copies the good record with the highest sequence to `out` [words]; words_in_force() says how
-  // many of them the record has. It reads everything at once, so call it at power-up only. kOk. Without a good record:
+  // many of them the record has. It reads everything at once, so call it at power-up only. If no record is good but one
+  // is damaged, it reads up to 64 times, because a weak cell may read well the next time. kOk. Without a good record:
   // kWrongSchema (another one is kept), kCorrupt or kBlank. kWrongSize: a record does not fit this storage. kBusy: a
   // save is running. Unless kOk, `out` may hold words of a record that was rejected.
   core::Status Load(std::uint16_t* out);

@@ -24,8 +24,11 @@ struct Cut {
 
 class NorFlash {
  public:
-  explicit NorFlash(const Geometry& g)
-      : geometry_(g), cells_(g.sectors * g.sector_bytes, g.erased), written_(cells_.size() / g.unit, false) {}
+  explicit NorFlash(const Geometry& g, std::uint32_t seed = 7)
+      : geometry_(g),
+        cells_(g.sectors * g.sector_bytes, g.erased),
+        written_(cells_.size() / g.unit, false),
+        random_(seed) {}
 
   hardware::Storage storage() {
     return {this, geometry_.sectors, geometry_.sector_bytes, geometry_.unit, geometry_.erased, &Read, &Program, &Erase};
@@ -41,10 +44,16 @@ class NorFlash {
   void FailOperation(int operation) { failing_ = operation; }   // answers kStorageFault, does nothing
   void SkipOperation(int operation) { skipping_ = operation; }  // answers kOk, does nothing
   void Fade(std::uint32_t address, int bit) { cells_[address] ^= static_cast<std::uint8_t>(1 << bit); }
-  // From now on this bit reads as it likes, until it is erased or programmed.
-  void MakeUnstable(std::uint32_t address, int bit) { unstable_[address] = static_cast<std::uint8_t>(1 << bit); }
+  // From now on this bit reads wrong in a share of all readings, until it is erased or programmed.
+  void MakeUnstable(std::uint32_t address, int bit, double wrong = 0.5) {
+    unstable_[address] = {static_cast<std::uint8_t>(1 << bit), wrong, false};
+  }
+  // From now on a share of all operations wears a cell out: one bit of its range reads wrong, always or in a share of
+  // all readings, and no operation mends it.
+  void Wear(double share) { wear_ = share; }
 
   std::vector<std::uint8_t>& cells() { return cells_; }
+  bool IsUnstable(std::uint32_t address) const { return unstable_.count(address) != 0; }
   int operations() const { return operations_; }
   int erases(std::uint32_t sector) const { return sector < erases_.size() ? erases_[sector] : 0; }
   bool dead() const { return dead_; }
@@ -56,8 +65,8 @@ class NorFlash {
     auto& f = *static_cast<NorFlash*>(self);
     if (f.dead_ || address + count > f.cells_.size()) return core::Status::kStorageFault;
     for (std::uint32_t i = 0; i < count; ++i) bytes[i] = f.cells_[address + i];
-    for (const auto& [at, bit] : f.unstable_)
-      if (at >= address && at < address + count && f.random_() % 2 != 0) bytes[at - address] ^= bit;
+    for (auto at = f.unstable_.lower_bound(address); at != f.unstable_.end() && at->first < address + count; ++at)
+      if (f.Chance() < at->second.wrong) bytes[at->first - address] ^= at->second.bit;
     return core::Status::kOk;
   }
 
@@ -97,22 +106,35 @@ class NorFlash {
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::uint8_t old = cells_[base + i];
       if (cut && i > cut_.bytes) break;
-      unstable_.erase(base + i);
+      if (const auto weak = unstable_.find(base + i); weak != unstable_.end() && !weak->second.worn)
+        unstable_.erase(weak);
       const std::uint8_t wanted = new_value(i);
       const auto done = static_cast<std::uint8_t>(random_());
       cells_[base + i] = cut && i == cut_.bytes ? static_cast<std::uint8_t>((wanted & done) | (old & ~done)) : wanted;
     }
+    if (wear_ > 0.0 && Chance() < wear_) {
+      const auto at = base + static_cast<std::uint32_t>(random_() % count);
+      unstable_[at] = {static_cast<std::uint8_t>(1 << random_() % 8), random_() % 2 != 0 ? 1.0 : Chance(), true};
+    }
     dead_ = cut;
     return cut ? core::Status::kStorageFault : core::Status::kOk;
   }
+
+  struct Weak {
+    std::uint8_t bit;
+    double wrong;  // share of readings
+    bool worn;     // for good
+  };
+  double Chance() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
 
   Geometry geometry_;
   std::vector<std::uint8_t> cells_;
   std::vector<bool> written_;
   std::vector<int> erases_;
   std::vector<std::uint32_t> lengths_;
-  std::mt19937 random_{7};
-  std::map<std::uint32_t, std::uint8_t> unstable_;
+  std::mt19937 random_;
+  std::map<std::uint32_t, Weak> unstable_;
+  double wear_ = 0.0;
   Cut cut_{-1, 0};
   int failing_ = -1, skipping_ = -1;
   int operations_ = 0;

@@ -219,14 +219,13 @@ TEST_P(PowerCut, Store_WhoseRecordsBothFaded_WritesOverTheOlderOne) {
 }
 
 // Cells of one slot fade or read as they like, and the save is cut: never a mixture, and never nothing while the other
-// slot holds a record that reads well. An unstable cell that reads well three times in turn can hide: one in eight
-// cases, of which the cut must then hit the save.
+// slot holds a record that reads well. An unstable cell can pass all eight readings before an erase; but then it also
+// passes one of the readings at power-up.
 TEST_P(PowerCut, Store_WithBadCellsInOneSlot_LoadsAWholeTable) {
   std::mt19937 random(12);
   const std::uint32_t bytes = table::BodyBytes(kWords);
   const std::vector<Cut> cuts = AllCuts(GetParam());
-  int lost = 0, faded_lost = 0, cases = 600;
-  for (int k = 0; k < cases; ++k) {
+  for (int k = 0; k < 600; ++k) {
     LoadedStore loaded(GetParam());
     const int slot = static_cast<int>(random() % 2);
     const bool fades = random() % 2 != 0;
@@ -239,12 +238,9 @@ TEST_P(PowerCut, Store_WithBadCellsInOneSlot_LoadsAWholeTable) {
     loaded.flash.CutAt(cuts[random() % cuts.size()]);
     static_cast<void>(loaded.Save(3));
     const Words found = PowerUpAndLoad(loaded.flash);
-    ASSERT_TRUE(found.empty() || found == Table(1) || found == Table(2) || found == Table(3)) << "a mixture";
-    lost += found.empty();
-    faded_lost += found.empty() && fades;
+    ASSERT_FALSE(found.empty()) << "lost";
+    ASSERT_TRUE(found == Table(1) || found == Table(2) || found == Table(3)) << "a mixture";
   }
-  EXPECT_EQ(faded_lost, 0);
-  EXPECT_LE(lost, cases / 40);
 }
 
 // The oracle must be able to fail. A store that wrote the commit word before the payload would hand out a mixture.

@@ -26,7 +26,7 @@ cortex-m4f: Arm's Technical Reference Manual, tables of the core and of the FPU.
 - One instruction a cycle. A load or store takes 2, and 1 if the instruction before it was one, too. Of several registers: one
   cycle more than registers. A branch that is taken takes 3 (1 + P with P = 2).
 - VFMA and VMLA take 3, VDIV and VSQRT 14. An FPU result that the next instruction uses costs one cycle more.
-- MLA and MLS take 2, integer divisions 12.
+- Multiplications of integers take 1, with an addition and with a 64-bit result, too. Integer divisions take 12.
 """
 import argparse
 import re
@@ -278,7 +278,7 @@ class M7:
 
 
 class M4:
-    COST = {"mla": 2, "div": 12, "fma": 3, "fdiv": 14}
+    COST = {"div": 12, "fma": 3, "fdiv": 14}
 
     def __init__(self):
         self.spent, self.before = 0, None

@@ -86,6 +86,7 @@ class M4F(unittest.TestCase):
         self.assertEqual(once("cortex-m4f", "vmul.f32 s0, s2, s3\nvadd.f32 s1, s0, s5"), 3)
         self.assertEqual(once("cortex-m4f", "vfma.f32 s0, s2, s3\nadds r0, #1"), 4)
         self.assertEqual(once("cortex-m4f", "vdiv.f32 s0, s2, s3\nadds r0, #1"), 15)
+        self.assertEqual(once("cortex-m4f", "smlal r0, r1, r2, r3\nmla r4, r5, r6, r7"), 2)
         self.assertEqual(once("cortex-m4f", "vpush {d8-d15}"), 17)
 
     def test_a_loop(self):

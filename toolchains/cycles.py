@@ -41,6 +41,12 @@ SYMBOL = re.compile(r"^([0-9a-f]+) <(.*)>:$")
 CONDITION = "eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le|hs|lo"
 ALIAS = {"sl": "r10", "fp": "r11", "ip": "r12", "r13": "sp", "r14": "lr", "r15": "pc"}
 COMPARE = ("cmp", "cmn", "tst", "teq")
+# Names that end like a condition and have none.
+NOT_CONDITIONAL = ("teq", "mls", "muls", "vmls", "vnmls", "movs", "lsls", "adcs", "sbcs", "bics", "svc", "vcvt", "smlal", "umlal", "umull", "smull")
+SYSTEM = ("vmsr", "nop", "dsb", "isb", "dmb", "bkpt", "cpsid", "cpsie", "mrs", "msr", "wfi", "wfe", "sev", "udf", "svc")
+INTEGER = (r"(add|sub|rsb|adc|sbc|and|orr|orn|eor|bic|mov|mvn|neg|lsl|lsr|asr|ror|rrx|clz|rev|rbit|[us]xt|[us]bfx|bfi|bfc|[us]sat|adr|"
+           r"cpy|qadd|qsub|sel|pkh|usad|uadd|sadd)")
+ONE_OPERAND = r"(mov[sw]?$|mvn|neg|clz|rev|rbit|[us]xt[bh]$|adr)"
 FLAGS = "flags"
 
 
@@ -67,114 +73,135 @@ def registers(text):
 class Instruction:
     """What the models need to know of one line of a disassembly."""
 
-    # kinds: alu shift mul mla div load store loads stores branch indirect call fpu fma fdiv move alone
+    # kinds: alu shift mul mla div load store loads stores branch indirect call fpu fma fdiv alone
     def __init__(self, address, mnemonic, operands):
         self.address, self.text = address, f"{mnemonic} {operands}".strip()
         self.reads, self.writes, self.base, self.cell, self.target = set(), set(), set(), None, None
-        self.count = 1
-        self._classify(re.sub(r"\.[wn]$", "", mnemonic), operands.strip())
-
-    def _classify(self, name, text):
+        self.kind, self.count, self.always = None, 1, False
+        text = operands.strip()
         parts = [p.strip() for p in re.split(r",(?![^\[{]*[\]}])", text)] if text else []
-        stem = name.split(".")[0]
-        conditional = re.fullmatch(rf"(b|[a-z]{{2,}}?)({CONDITION})", stem)
-        known = ("teq", "mls", "muls", "vmls", "smulls", "movs", "lsls", "adcs", "sbcs", "bics", "bls", "svc", "vcvt", "umlal", "vmovcs", "vcmpe", "vsel")
-        if conditional and stem not in known and not stem.startswith("vsel"):
-            self.reads.add(FLAGS)
-            if stem != "b" + conditional[2]:
-                stem = conditional[1]
+        stem = self._without_condition(re.sub(r"\.[wn]$", "", mnemonic).split(".")[0])
+        for reader in self._branch, self._several, self._load_or_store, self._system, self._float, self._multiply, self._integer:
+            if reader(stem, text, parts):
+                break
+        else:
+            raise Unknown(f"{self.address:x}: {self.text}")
+        if "pc" in self.writes:
+            self.kind = "indirect"
+
+    def _without_condition(self, stem):
+        """Of an instruction of an IT block; a branch keeps its condition."""
+        found = re.fullmatch(rf"([a-z]{{2,}}?)({CONDITION})", stem)
+        if not found or stem in NOT_CONDITIONAL or stem.startswith("vsel") or re.fullmatch(rf"b({CONDITION})", stem):
+            return stem
+        self.reads.add(FLAGS)
+        return found[1]
+
+    def _branch(self, stem, text, parts):
         if re.fullmatch(rf"b({CONDITION})?", stem) or stem in ("cbz", "cbnz"):
             self.kind = "branch"
             self.target = int(re.match(r"[0-9a-f]+", parts[-1])[0], 16)
-            self.reads |= set(registers(parts[0])) if stem.startswith("cb") else set()
-            if stem not in ("b", "cbz", "cbnz"):
+            if stem.startswith("cb"):
+                self.reads |= set(registers(parts[0]))
+            elif stem != "b":
                 self.reads.add(FLAGS)
-            self.always = stem == "b" and FLAGS not in self.reads
+            self.always = stem == "b"
         elif stem in ("bl", "blx", "bx", "tbb", "tbh"):
             self.kind = "call" if stem == "bl" else "indirect"
             self.reads |= set(registers(text)) if stem != "bl" else set()
             self.writes |= {"lr"} if stem in ("bl", "blx") else set()
-        elif re.match(r"(v?push|v?pop|v?ldm|v?stm)", stem):
-            listed = registers(re.search(r"{(.*)}", text)[1])
-            self.count = len(listed)
-            load = "pop" in stem or "ldm" in stem
-            self.base = {"sp"} if "p" in stem and "{" == text[0] else set(registers(parts[0]))
-            single = self.count == 1 and stem.startswith("v")
-            self.kind = ("load" if single else "loads") if load else ("store" if single else "stores")
-            (self.writes if load else self.reads).update(listed)
-            if "!" in text or text[0] == "{":
-                self.writes |= self.base
-            if "pc" in self.writes:
-                self.kind = "indirect"
-        elif re.match(r"(v?ldr|v?str)", stem):
-            inside = re.search(r"\[(.*?)\](!?)(.*)", text)
-            load = "ld" in stem
-            values = registers(text[: inside.start()]) if inside else registers(parts[0])
-            self.base = set(registers(inside[1] + inside[3])) if inside else {"pc"}
-            self.base.discard("pc")
-            self.count = len(values)
-            (self.writes if load else self.reads).update(values)
-            if inside:
-                self.cell = inside[1].replace(" ", "")
-                if inside[2] or inside[3]:
-                    self.writes |= set(registers(inside[1])[:1])
-            self.kind = "load" if load else "store"
-            if self.count > 1:
-                self.kind += "s"
-            if "pc" in self.writes:
-                self.kind = "indirect"
-        elif stem == "vmrs":
-            self.kind = "alone"
+        return self.kind
+
+    def _several(self, stem, text, parts):
+        """Loads and stores of a list; a list of one float is a plain one."""
+        if not re.match(r"(v?push|v?pop|v?ldm|v?stm)", stem):
+            return False
+        listed = registers(re.search(r"{(.*)}", text)[1])
+        self.count = len(listed)
+        load, single = "pop" in stem or "ldm" in stem, self.count == 1 and stem.startswith("v")
+        self.base = {"sp"} if text[0] == "{" else set(registers(parts[0]))
+        self.kind = ("load" if load else "store") + ("" if single else "s")
+        (self.writes if load else self.reads).update(listed)
+        if "!" in text or text[0] == "{":
+            self.writes |= self.base
+        return True
+
+    def _load_or_store(self, stem, text, parts):
+        if not re.match(r"(v?ldr|v?str)", stem):
+            return False
+        inside = re.search(r"\[(.*?)\](!?)(.*)", text)
+        load = "ld" in stem
+        values = registers(text[: inside.start()]) if inside else registers(parts[0])
+        self.count = len(values)
+        (self.writes if load else self.reads).update(values)
+        if inside:
+            self.base = set(registers(inside[1] + inside[3])) - {"pc"}
+            self.cell = inside[1].replace(" ", "")
+            if inside[2] or inside[3]:
+                self.writes |= set(registers(inside[1])[:1])
+        self.kind = ("load" if load else "store") + ("s" if self.count > 1 else "")
+        return True
+
+    def _system(self, stem, text, parts):
+        if stem == "vmrs":
             self.reads.add("fpscr")
             self.writes |= {FLAGS} if "APSR" in text else set(registers(parts[0]))
-        elif stem == "vmsr":
-            self.kind = "alone"
-        elif stem.startswith("v"):
-            fused = re.match(r"v(n?ml[as]|f?n?m[as]|fn?m[as])$", stem)
-            self.kind = "fdiv" if stem in ("vdiv", "vsqrt") else "fma" if fused else "fpu"
-            if stem.startswith("vcmp"):
-                self.reads |= set(registers(text))
-                self.writes.add("fpscr")
-            else:
-                self.writes |= set(registers(parts[0]))
-                self.reads |= set(registers(" ".join(parts[0 if fused or len(parts) == 1 else 1:])))
-            if stem.startswith("vsel"):
-                self.reads.add(FLAGS)
         elif re.fullmatch(r"it[te]{0,3}", stem):
-            self.kind = "alone"
             self.reads.add(FLAGS)
-        elif stem in ("nop", "dsb", "isb", "dmb", "bkpt", "cpsid", "cpsie", "mrs", "msr", "wfi", "udf", "svc", "sev", "wfe"):
-            self.kind = "alone"
+        elif stem in SYSTEM:
             self.reads |= set(registers(text))
-        elif stem in ("udiv", "sdiv"):
+        else:
+            return False
+        self.kind = "alone"
+        return True
+
+    def _float(self, stem, text, parts):
+        if not stem.startswith("v"):
+            return False
+        fused = re.match(r"v(n?ml[as]|fn?m[as])$", stem)
+        self.kind = "fdiv" if stem in ("vdiv", "vsqrt") else "fma" if fused else "fpu"
+        if stem.startswith("vcmp"):
+            self.reads |= set(registers(text))
+            self.writes.add("fpscr")
+        else:
+            self.writes |= set(registers(parts[0]))
+            self.reads |= set(registers(" ".join(parts[0 if fused or len(parts) == 1 else 1 :])))
+        if stem.startswith("vsel"):
+            self.reads.add(FLAGS)
+        return True
+
+    def _multiply(self, stem, text, parts):
+        if stem in ("udiv", "sdiv"):
             self.kind = "div"
-            self._whole(parts, 1)
         elif re.match(r"(mla|mls|sml|uml|smmla|umaal)", stem):
             self.kind = "mla"
-            self._whole(parts, 2 if re.match(r"(smlal|umlal)", stem) else 1)
-            self.reads |= self.writes if re.match(r"(smlal|umlal)", stem) else set()
         elif re.match(r"(mul|smul|umul|smmul)", stem):
             self.kind = "mul"
-            self._whole(parts, 2 if stem in ("umull", "smull") else 1)
-        elif stem in COMPARE:
-            self.kind = "alu"
+        else:
+            return False
+        self._whole(parts, 2 if re.match(r"([su]mlal|[su]mull|umaal)", stem) else 1)
+        if re.match(r"([su]mlal|umaal)", stem):
+            self.reads |= self.writes
+        return True
+
+    def _integer(self, stem, text, parts):
+        self.kind = "alu"
+        if stem in COMPARE:
             self.reads |= set(registers(text))
             self.writes.add(FLAGS)
-        elif re.match(r"(add|sub|rsb|adc|sbc|and|orr|orn|eor|bic|mov|mvn|neg|lsl|lsr|asr|ror|rrx|clz|rev|rbit|[us]xt|[us]bfx|bfi|bfc|"
-                      r"[us]sat|adr|cpy|q?(add|sub)|sel|pkh|usad|uadd|sadd)", stem):
-            shifted = re.search(r"\b(lsl|lsr|asr|ror|rrx)\b", text) or re.match(r"(lsl|lsr|asr|ror)", stem)
-            self.kind = "shift" if shifted else "alu"
-            self._whole(parts, 1)
-            if stem.endswith("s") and stem not in ("abs",):
-                self.writes.add(FLAGS)
-            if re.match(r"(adc|sbc|rrx)", stem):
-                self.reads.add(FLAGS)
-            if len(parts) == 2 and not re.match(r"(mov[sw]?$|mvn|neg|clz|rev|rbit|[us]xt[bh]$|adr)", stem) or stem in ("movt", "bfi", "bfc"):
-                self.reads |= set(registers(parts[0]))
-            if "pc" in self.writes:
-                self.kind = "indirect"
-        else:
-            raise Unknown(f"{self.address:x}: {self.text}")
+            return True
+        if not re.match(INTEGER, stem):
+            return False
+        if re.search(r"\b(lsl|lsr|asr|ror|rrx)\b", text) or re.match(r"(lsl|lsr|asr|ror)", stem):
+            self.kind = "shift"
+        self._whole(parts, 1)
+        if stem.endswith("s"):
+            self.writes.add(FLAGS)
+        if re.match(r"(adc|sbc|rrx)", stem):
+            self.reads.add(FLAGS)
+        if len(parts) == 2 and not re.match(ONE_OPERAND, stem) or stem in ("movt", "bfi", "bfc"):
+            self.reads |= set(registers(parts[0]))
+        return True
 
     def _whole(self, parts, results):
         self.writes |= set(registers(" ".join(parts[:results])))

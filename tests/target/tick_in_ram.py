@@ -13,7 +13,10 @@ import shutil
 import sys
 import tempfile
 
-from stored_tables import BLANK, Board, blank_memory, variant
+from stored_tables import BLANK, Board, blank_memory, variant  # first: it knows where firmware_session lies
+import firmware_session
+
+firmware_session.REPLY_SECONDS = 0.5  # how soon silence is looked into; the board may still answer later
 
 SAVES = 3
 

@@ -27,7 +27,7 @@ ESTIMATOR_KEYS = ["push", "push_max", "sample", "slice_max", "slice_min", "state
 CONTROLLER_KEYS = ["push", "feed_forward", "feed_forward_new", "step_learning", "step_resetting", "step_checking",
                    "step_saving", "request", "other", "state_bytes"]
 MODELLED_KEYS = ["instructions", "cycles"]  # of a sample or call, and of a turn of a loop
-READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "state_bytes", "stack_bytes"]
+READ_OUT_KEYS = ["instructions", "slices", "slice_max", "hand_over", "hand_over_max", "state_bytes", "stack_bytes"]
 NOT_THE_FILTERS = re.compile(r"Get_|Calls|MakeParts|\.rodata.*\.str")  # the bench's own part of an object
 # One filter's own: code that knows the layout, and the rotations that the forgetting filter alone has. One copy of the rest serves
 # all filters of a form.
@@ -175,7 +175,7 @@ def tables(figures, core, budgets):
     if figures["read_outs"]:
         whole += grid(figures["read_outs"], [
             ("physical read-out", 24, "", "read_out"), ("instr.", 10, "", "instructions"), ("slices", 8, "", "slices"),
-            slices[0], ("hand-over", 11, "", "hand_over"), state, stack_])
+            slices[0], ("hand-over", 11, "", "hand_over"), ("a call", 8, "", "hand_over_max"), state, stack_])
     return whole + cycles.table(core, figures["modelled"], figures["loops"])
 
 

@@ -46,6 +46,7 @@ class ReadOutArm {
   }
 
   bool Begin(bool warm) { return core::IsOk(estimator::BeginPhysical(adopted_, rigid_, estimator_, warm, read_out)); }
+  bool HandOver() { return estimator::ContinuePhysical(estimator_, read_out) == core::Status::kBusy; }
 
   physical::MapReadOut<Model, double> read_out;
 

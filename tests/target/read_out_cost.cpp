@@ -13,8 +13,14 @@ ReadOutArm arm;
 
 // Hand-over: the filter's columns, during which it waits. Instructions: all slices after that.
 void Measure(const char* name, bool warm) {
-  const std::uint32_t hand_over = CostOf([] { (void)arm.Begin(false); });
-  (void)arm.Begin(warm);
+  Range call;
+  call.Add(CostOf([&] { (void)arm.Begin(warm); }));
+  std::uint32_t hand_over = call.most;
+  for (bool more = true; more;) {
+    const std::uint32_t spent = CostOf([&] { more = arm.HandOver(); });
+    call.Add(spent);
+    hand_over += spent;
+  }
   Range slice;
   std::uint32_t sum = 0, slices = 0;
   for (bool done = false; !done; ++slices) {
@@ -22,7 +28,11 @@ void Measure(const char* name, bool warm) {
     slice.Add(spent);
     sum += spent;
   }
-  std::uint32_t deepest = port::runner::StackOf([&] { (void)arm.Begin(warm); });
+  std::uint32_t deepest = port::runner::StackOf([&] {
+    (void)arm.Begin(warm);
+    while (arm.HandOver()) {
+    }
+  });
   for (bool done = false; !done;) {
     const std::uint32_t bytes = port::runner::StackOf([&] { done = arm.read_out.Step(); });
     deepest = bytes > deepest ? bytes : deepest;
@@ -33,6 +43,7 @@ void Measure(const char* name, bool warm) {
       .Value("slices", slices)
       .Value("slice_max", slice.most)
       .Value("hand_over", hand_over)
+      .Value("hand_over_max", call.most)
       .Value("state_bytes", sizeof arm.read_out)
       .Value("stack_bytes", deepest)
       .End();

@@ -59,7 +59,7 @@ class HostPort {
     Run();
     (void)a_->Take(a);
     (void)b_->Take(b);
-    const core::Status begun = estimator::BeginPhysical(*adopted_, *rigid_, *b_, false, *bodies_);
+    const core::Status begun = estimator::HandOverPhysical(*adopted_, *rigid_, *b_, false, *bodies_);
     if (!core::IsOk(begun))
       throw io::InputError("physical read-out: refused, status " + std::to_string(static_cast<int>(begun)));
     while (!bodies_->Step()) {

@@ -93,7 +93,7 @@ OnlineResult Run(const codegen::Model& prior, const calibration::Dataset& log, c
   out.inconsistent = drive->estimates.inconsistent;
   out.filter = Eigen::Map<const Eigen::VectorXf>(drive->estimates.value, Arm::kColumns).cast<double>();
   out.filter_sd = Eigen::Map<const Eigen::VectorXf>(drive->estimates.sd, Arm::kColumns).cast<double>();
-  const core::Status begun = estimator::BeginPhysical(drive->adopted, drive->rigid, arm, false, drive->read_out);
+  const core::Status begun = estimator::HandOverPhysical(drive->adopted, drive->rigid, arm, false, drive->read_out);
   while (core::IsOk(begun) && !drive->read_out.Step()) {
   }
   out.inconsistent |= estimator::PriorIsTooNarrow(drive->read_out);

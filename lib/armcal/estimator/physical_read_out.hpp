@@ -22,28 +22,45 @@ const auto& EstimateOf(const filter::KalmanFilter<Layout, form, beside>& filter,
   return filter.estimate();
 }
 
-// Copies estimate and covariance of an estimator's filter to `read_out`. Call it when no sample is being processed.
-// Then call read_out.Step until it returns true; the estimator may go on meanwhile. table: the table of the estimator.
-// rigid: the work space that BuildAdoptedTable filled for this table. Both must not change until the read-out is done.
-// warm: true if the last read-out was of the same table. kBusy: the filter has no finished read-out
-// (Estimator::read_out); call RequestReadOut, wait, and call this again. All other answers are those of
-// MapReadOut::Begin and AddSpread. Takes some kColumns^3 multiplications and additions. For shorter slices, call Begin
-// and AddSpread yourself, as below. Context: background.
+// Starts to copy estimate and covariance of an estimator's filter to `read_out`. Call it when no sample is being
+// processed, and then ContinuePhysical until it answers kOk; the estimator must not Step before that. Then call
+// read_out.Step until it returns true; the estimator may go on meanwhile. table: the table of the estimator. rigid: the
+// work space that BuildAdoptedTable filled for this table. Both must not change until the read-out is done. warm: true
+// if the last read-out was of the same table. kBusy: the filter has no finished read-out (Estimator::read_out); call
+// RequestReadOut, wait, and call this again. All other answers are those of MapReadOut::Begin. Context: background.
 template <class Model, class Filter, class Source, class T>
 core::Status BeginPhysical(const AdoptedTable<Model>& table, const physical::RigidPrior<Model, float>& rigid,
                            const Estimator<Model, Filter, Source>& estimator, bool warm,
                            physical::MapReadOut<Model, T>& read_out) {
   const typename Filter::ReadOut* done = estimator.read_out();
   if (done == nullptr) return core::Status::kBusy;
-  core::Status status =
-      read_out.Begin({rigid.mean, rigid.sd, table.committed.p, table.scale, table.prior.dense_ud}, done->x, warm);
+  return read_out.Begin({rigid.mean, rigid.sd, table.committed.p, table.scale, table.prior.dense_ud}, done->x, warm);
+}
+
+// One slice of that: a column of the filter's factor, some kColumns^2 multiplications and additions. kBusy: call it
+// again. kOk: all columns are copied. All other answers are those of MapReadOut::AddSpread. Context: background.
+template <class Model, class Filter, class Source, class T>
+core::Status ContinuePhysical(const Estimator<Model, Filter, Source>& estimator,
+                              physical::MapReadOut<Model, T>& read_out) {
+  const typename Filter::ReadOut* done = estimator.read_out();
+  if (done == nullptr) return core::Status::kBusy;
   const auto& estimate = EstimateOf(estimator.filter(), *done);
   constexpr int kSize = std::decay_t<decltype(estimate)>::kSize;
-  for (int p = 0; p < kSize && core::IsOk(status); ++p) {
-    float spread[kSize];
-    const float d = estimate.Spread(p, spread);
-    status = read_out.AddSpread(d, spread);
-  }
+  float spread[kSize];
+  const float d = estimate.Spread(read_out.spreads(), spread);
+  const core::Status status = read_out.AddSpread(d, spread);
+  return core::IsOk(status) && read_out.spreads() < kSize ? core::Status::kBusy : status;
+}
+
+// Both at once, some kColumns^3 multiplications and additions: for a PC. Context: background.
+template <class Model, class Filter, class Source, class T>
+core::Status HandOverPhysical(const AdoptedTable<Model>& table, const physical::RigidPrior<Model, float>& rigid,
+                              const Estimator<Model, Filter, Source>& estimator, bool warm,
+                              physical::MapReadOut<Model, T>& read_out) {
+  core::Status status = BeginPhysical(table, rigid, estimator, warm, read_out);
+  if (!core::IsOk(status)) return status;
+  do status = ContinuePhysical(estimator, read_out);
+  while (status == core::Status::kBusy);
   return status;
 }
 

@@ -50,6 +50,7 @@ class MapReadOut {
     warm_ = warm && result_.converged;
     for (int k = 0; k < kColumns; ++k) x_[k] = T(x[k]);
     for (T& u : ud_) u = T(0);
+    halvings_ = 0;
     Enter(Stage::kSpread);
     return core::Status::kOk;
   }
@@ -66,8 +67,11 @@ class MapReadOut {
     if (!good) Enter(Stage::kDone);
     if (stage_ != Stage::kSpread) return core::Status::kNotFinite;
     math::UdAdd<kColumns>(ud_, T(d), spread_);
+    ++next_;
     return core::Status::kOk;
   }
+  // Columns that AddSpread has taken since Begin; 0 from the first Step on.
+  int spreads() const { return stage_ == Stage::kSpread ? next_ : 0; }
 
   // One bounded slice. Returns true when the read-out is done and result() holds it.
   bool Step() {
@@ -92,8 +96,8 @@ class MapReadOut {
         Enter(Stage::kColumn);
         return false;
       case Stage::kColumn:
-        MakeColumn(k, kBarrier[level_]);
-        if (next_ == kFree) Enter(Stage::kLower);
+        MakeOrFactor(k, kBarrier[level_]);
+        if (next_ == 2 * kFree) Enter(Stage::kLower);
         return false;
       case Stage::kLower:
         math::SolveLower<kFree>(factor_, step_);
@@ -104,11 +108,15 @@ class MapReadOut {
         Enter(Stage::kTrial);
         return false;
       case Stage::kTrial:
-        Try(k);
+        Try(halvings_);
+        Enter(Stage::kWeigh);
+        return false;
+      case Stage::kWeigh:
+        Weigh();
         return false;
       case Stage::kCurvature:
-        MakeColumn(k, T(0));
-        if (next_ == kFree) Enter(Stage::kBody);
+        MakeOrFactor(k, T(0));
+        if (next_ == 2 * kFree) Enter(Stage::kBody);
         return false;
       case Stage::kBody:
         ReadBody(k);
@@ -129,7 +137,7 @@ class MapReadOut {
  private:
   // clang-format off
   enum class Stage : std::uint8_t {
-    kSpread, kData, kStart, kColumn, kLower, kUpper, kTrial, kCurvature, kBody, kColumnRead, kDone
+    kSpread, kData, kStart, kColumn, kLower, kUpper, kTrial, kWeigh, kCurvature, kBody, kColumnRead, kDone
   };
   // clang-format on
   static constexpr int kLast = 2;  // of kBarrier
@@ -145,7 +153,14 @@ class MapReadOut {
   // y of point_ (see DataInformation).
   T Shift(int i) const { return i < kBodies ? point_.body[i] - T(arm_.prior().body[i]) : point_.u[i]; }
 
-  // Makes column k of the Hessian, adds it to the factor, and sets entry k of minus the gradient.
+  // A column of the Hessian takes two slices.
+  void MakeOrFactor(int slice, T eps) {
+    const int k = slice / 2;
+    if (slice % 2 == 0) MakeColumn(k, eps);
+    else math::CholeskyColumn(factor_, k, kLeastPivot, factor_ + math::UdIndex(0, k));
+  }
+
+  // Makes column k of the Hessian, where the factor's column will stand, and sets entry k of minus the gradient.
   void MakeColumn(int k, T eps) {
     T* column = factor_ + math::UdIndex(0, k);
     const int begin = k < kBodies ? k / Arm::kBlock * Arm::kBlock : k;
@@ -161,36 +176,45 @@ class MapReadOut {
     for (int i = 0; i <= k; ++i) column[i] = change_[i];
     slope += arm_.AddCurvature(point_, eps, k, column);
     step_[k] = slope_[k] = -slope;
-    math::CholeskyColumn(factor_, k, kLeastPivot, column);
   }
 
-  // Tries the step, halved `halvings` times. It is taken, or halved once more, or given up. Then enters the next stage.
+  // Makes the trial point of the step, halved `halvings` times, and what barrier and prior change there.
   void Try(int halvings) {
+    share_ = T(1);
+    for (int i = 0; i < halvings; ++i) share_ *= T(0.5);
+    cost_ = T(0);
+    arm_.Step(point_, share_, step_, trial_);
+    inside_ = arm_.AddBarrierChange(point_, trial_, cost_);
+    cost_ *= T(0.5) * kBarrier[level_];
+    for (int i = 0; i < kFree; ++i) {
+      const T moved = trial_.u[i] - point_.u[i];
+      change_[i] = i < kBodies ? trial_.body[i] - point_.body[i] : moved;
+      if (i < kBodies) cost_ += moved * (point_.u[i] + T(0.5) * moved);
+    }
+  }
+
+  // Adds what the data change there. The step is taken, or halved once more, or given up. Then enters the next stage.
+  void Weigh() {
     constexpr T kGain = T(1e-4);                        // a gain is at least this share of the expected decrease
     constexpr T kEnough = T(0.1), kNothing = T(1e-10);  // expected decrease at which an eps ends; the same, last eps
     constexpr T kConverged = T(1e-4);
     constexpr int kMostHalvings = 30;
-    T expected = T(0), cost = T(0), share = T(1);
-    for (int i = 0; i < halvings; ++i) share *= T(0.5);
+    T expected = T(0);
     for (int i = 0; i < kFree; ++i) expected += slope_[i] * step_[i];
-    arm_.Step(point_, share, step_, trial_);
-    const bool inside = arm_.AddBarrierChange(point_, trial_, cost);
-    cost *= T(0.5) * kBarrier[level_];
-    for (int i = 0; i < kFree; ++i) {
-      const T moved = trial_.u[i] - point_.u[i];
-      change_[i] = i < kBodies ? trial_.body[i] - point_.body[i] : moved;
-      if (i < kBodies) cost += moved * (point_.u[i] + T(0.5) * moved);
-    }
     information_.Times(change_, turned_);
-    for (int i = 0; i < kFree; ++i) cost += change_[i] * (gradient_[i] + T(0.5) * turned_[i]);
-    const bool last = level_ == kLast, gain = inside && cost < -kGain * share * expected;
+    for (int i = 0; i < kFree; ++i) cost_ += change_[i] * (gradient_[i] + T(0.5) * turned_[i]);
+    const bool last = level_ == kLast, gain = inside_ && cost_ < -kGain * share_ * expected;
     const bool enough = expected <= (last ? kNothing : kEnough);
     if (gain) {
       for (int i = 0; i < kFree; ++i) gradient_[i] += turned_[i];
       point_ = trial_;
     }
     result_.steps += gain;
-    if (!gain && !enough && halvings < kMostHalvings) return;  // Stage::kTrial again
+    if (!gain && !enough && halvings_ < kMostHalvings) {
+      ++halvings_;
+      return Enter(Stage::kTrial);
+    }
+    halvings_ = 0;
     if (gain && !enough && result_.steps < kMostSteps) return Enter(Stage::kColumn);
     result_.barrier = kBarrier[level_];
     result_.converged = expected <= kConverged;
@@ -237,8 +261,9 @@ class MapReadOut {
   T step_[kFree] = {}, slope_[kFree] = {}, change_[kFree] = {}, turned_[kFree] = {};
   MapPoint<Layout, T> point_, trial_;
   Result result_;
-  int next_ = 0, level_ = 0;
-  bool warm_ = false;
+  T share_ = T(1), cost_ = T(0);  // of the step that is tried
+  int next_ = 0, level_ = 0, halvings_ = 0;
+  bool warm_ = false, inside_ = false;
   Stage stage_ = Stage::kDone;
 };
 

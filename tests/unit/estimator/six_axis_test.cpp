@@ -94,7 +94,7 @@ TEST(SixAxis, PhysicalReadOut_OfBothFilters_IsTheSameArmAndNearerToTheTruthThanT
   auto one = std::make_unique<ReadOut>(), two = std::make_unique<ReadOut>();
   const auto begin = [](auto& host, ReadOut& out) {
     host.Read();
-    return BeginPhysical(host.adopted, host.rigid, host.estimator, false, out);
+    return HandOverPhysical(host.adopted, host.rigid, host.estimator, false, out);
   };
   ASSERT_EQ(begin(*kalman, *one), core::Status::kOk);
   ASSERT_EQ(begin(*forgetting, *two), core::Status::kOk);

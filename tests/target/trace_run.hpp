@@ -10,7 +10,7 @@ namespace armcal::target {
 
 template <class Model, class Filter>
 struct Run {
-  const char* name;
+  const char* name = nullptr;
   estimator::Estimator<Model, Filter> estimator;
   estimator::Estimates<Model> estimates;
   Digest rows;  // what every row did

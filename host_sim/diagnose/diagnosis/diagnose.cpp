@@ -244,6 +244,8 @@ std::optional<Refutation> Worse(const Chosen& term, const VectorXd& with, const 
 }
 
 std::optional<Refutation> Worse(const Chosen& term, const Errors& with, const Errors& without) {
+  // What is about turns and rest is judged where they count: the rows that slide are among the fitted ones.
+  if (term.candidate->record().search.at_turns) return Worse(term, with.fitted, without.fitted);
   if (const auto why = Worse(term, with.sliding, without.sliding)) return why;
   return Worse(term, with.fitted, without.fitted);
 }
@@ -286,10 +288,10 @@ double GainOn(const calibration::Dataset& log, const Candidate& candidate, const
   return std::max(white, coloured);
 }
 
-// The first term, of curves the weakest one and then of causes, that predicts one of its joints, or all joints
-// together, worse than the declared model does, or worse than the other terms do without it. A delay is not compared
-// with the other terms: they were found on logs that it had aligned. A state of a run may also be refuted by the way
-// that it takes there, another term by gaining much less than its torque on this log and its gain in training promise.
+// The weakest term that predicts one of its joints, or all joints together, worse than the declared model does, or
+// worse than the other terms do without it. A delay is not compared with the other terms: they were found on logs that
+// it had aligned. A state of a run may also be refuted by the way that it takes there, another term by gaining much
+// less than its torque on this log and its gain in training promise.
 Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calibration::Carried& payload,
                 const MatrixXd& before, const MatrixXd& after, std::optional<Refutation>& why) {
   const Errors error_before = ErrorsOf(w, log, before), error_after = ErrorsOf(w, log, after);
@@ -298,35 +300,31 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
     if (w.turns[static_cast<std::size_t>(j)]) calibration::UseTurns(seen, j);
   std::map<const Chosen*, VectorXd> amplitude;
   for (const Chosen* c : Confirmed(w.chosen)) amplitude.emplace(c, w.estimate.amplitude[amplitude.size()]);
-  // The chosen are sorted, the strongest first. Curves are asked before causes: a curve that does not hold makes the
-  // causes beside it look wrong.
-  std::vector<Chosen*> asked;
-  for (const bool curves : {true, false})
-    for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c)
-      if (c->confirmed && !c->candidate->is_event() && c->candidate->is_curve() == curves) asked.push_back(&*c);
-  for (Chosen* c : asked) {
-    if ((why = Worse(*c, error_after, error_before))) return c;
+  for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
+    if (!c->confirmed || c->candidate->is_event()) continue;
+    if ((why = Worse(*c, error_after, error_before))) return &*c;
     const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
     if (c->delay_s != 0) continue;
     const MatrixXd without = Leaves(w, others, log, payload);
     if (!others.empty() && (why = Worse(*c, error_after, ErrorsOf(w, log, without)))) {
       why->beside_others = true;
-      return c;
+      return &*c;
     }
-    if (GoesToAndFroOn(*c->candidate, amplitude.at(c), AtEstimate(w, others, seen), without)) {
+    if (GoesToAndFroOn(*c->candidate, amplitude.at(&*c), AtEstimate(w, others, seen), without)) {
       c->unconfirmed = "on the held-out log it goes to and fro, which a state of a run does not";
-      return c;
+      return &*c;
     }
     if (IsOfTheRun(*c)) continue;
     const double gained = GainOn(seen, *c->candidate, without, after);
     if (gained >= kShows) continue;
-    const Share trained = ShareOf(w, *c, amplitude.at(c), w.train), shown = ShareOf(w, *c, amplitude.at(c), {&seen});
+    const Share trained = ShareOf(w, *c, amplitude.at(&*c), w.train),
+                shown = ShareOf(w, *c, amplitude.at(&*c), {&seen});
     const double promised = c->found.rated * std::min(shown.square / trained.square, shown.rows / trained.rows);
     if (gained < kOfThePromise * promised) {
       c->unconfirmed =
           fmt::format("the held-out log gains {:.0f} by it, where {:.0f} was to be expected from the training logs",
                       gained, promised);
-      return c;
+      return &*c;
     }
   }
   return nullptr;

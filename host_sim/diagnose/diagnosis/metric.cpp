@@ -155,18 +155,14 @@ Gain Metric::Try(const Projection& p) const {
   return gain;
 }
 
-double Metric::CurveEvidence(const Projection& p, int along, MatrixXd* precision) const {
+double Metric::CurveEvidence(const Projection& p, MatrixXd* precision) const {
   const int k = static_cast<int>(p.g.size());
   const MatrixXd S = p.gram - p.B.transpose() * factor_.solve(p.B);
   double best = 0;
-  for (const double length : {0.1, 1.5, 4.0}) {  // in knots: coefficients of their own, or neighbours alike
-    if (length > 2 && along == k) continue;      // a curve has few knots
+  for (const double length : {0.1, 1.5}) {  // in knots: coefficients of their own, or neighbours alike
     MatrixXd alike(k, k);
     for (int i = 0; i < k; ++i)
-      for (int m = 0; m < k; ++m) {
-        const double apart = std::hypot(i / along - m / along, i % along - m % along);
-        alike(i, m) = std::exp(-0.5 * std::pow(apart / length, 2)) + 1e-4 * (i == m);
-      }
+      for (int m = 0; m < k; ++m) alike(i, m) = std::exp(-0.5 * std::pow((i - m) / length, 2)) + 1e-4 * (i == m);
     const Eigen::LLT<MatrixXd> factor(alike);
     const MatrixXd root = factor.matrixL();
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(root.transpose() * S * root));

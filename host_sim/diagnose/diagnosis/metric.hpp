@@ -69,9 +69,9 @@ class Metric {
   Gain Try(const Projection& p) const;
   Gain Try(const Columns& c) const { return Try(Project(c)); }
   // Twice the log evidence of a curve, its coefficients' size and smoothness as the data like them best: gain less what
-  // the freedom that is really used would gain by chance. along: coefficients of one row of a surface; of a curve all.
-  // precision: of the coefficients, where that evidence is largest.
-  double CurveEvidence(const Projection& p, int along, Eigen::MatrixXd* precision = nullptr) const;
+  // the freedom that is really used would gain by chance. precision: of the coefficients, where that evidence is
+  // largest.
+  double CurveEvidence(const Projection& p, Eigen::MatrixXd* precision = nullptr) const;
   // No bounded parameter of the joints given leaves its range at g (by more than 2 standard deviations).
   bool InBounds(const Gain& g, const std::vector<int>& joints) const;
   const Eigen::VectorXd& Residual(int j) const { return residual_[static_cast<std::size_t>(j)]; }  // whitened

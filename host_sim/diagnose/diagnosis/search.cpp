@@ -54,7 +54,8 @@ Found Searcher::Finish(const Found& rough) {
 Found Searcher::Scored() const {
   Found f = best_;
   f.penalty = PenaltyOf(f.gain.rank + f.searched, c_, e_);
-  if (f.gain.gain > 0 && c_.record().search.how == codegen::SearchWay::kSpline) PriceCurve(f, metric(), seen_);
+  if (f.gain.gain > 0 && c_.record().search.how == codegen::SearchWay::kSpline)
+    f.penalty = f.gain.gain - metric().CurveEvidence(seen_, &f.precision);
   Rate(f, f.gain.gain);
   return f;
 }
@@ -200,11 +201,6 @@ double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evi
   int rows = 0;
   for (const int j : candidate.rows()) rows += evidence.index[j].size();
   return parameters * std::log(std::max(2, rows));
-}
-
-void PriceCurve(Found& found, const Metric& metric, const Projection& projection) {
-  const int along = found.candidate->columns(found.eta) / static_cast<int>(found.candidate->record().linear.size());
-  found.penalty = metric.Try(projection).gain - metric.CurveEvidence(projection, along, &found.precision);
 }
 
 double PriceOf(const Found& found, double gain) {

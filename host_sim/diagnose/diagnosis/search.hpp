@@ -31,8 +31,6 @@ struct Found {
   double log_chance = 0;
 };
 
-// Sets what a curve's coefficients cost, and how smooth they are, as a metric sees its columns.
-void PriceCurve(Found& found, const Metric& metric, const Projection& projection);
 // What its parameters cost. Of k parameters each costs ln(gain / k), as under a prior whose width makes the gain the
 // likeliest (local empirical Bayes), at least 1, and at most ln(rows). With ln(rows) alone a true term of three
 // parameters that gains 40 loses to an untrue one of one parameter that gains 23.

@@ -235,17 +235,8 @@ bool Selector::Best(std::vector<Candidate*> reach, const std::vector<const Chose
   refused_.clear();
   Sort(ranked);
   for (std::size_t k = 0; k < ranked.size(); ++k)
-    if (IsRare(ranked[k]) && !ShowsOnce(ranked, k) && Accept(grounds, terms, ranked, k, out)) return true;
+    if (IsRare(ranked[k]) && Accept(grounds, terms, ranked, k, out)) return true;
   return false;
-}
-
-// A curve would only follow what a cause explains that showed in one fold.
-bool Selector::ShowsOnce(const std::vector<Found>& ranked, std::size_t k) const {
-  const Found& f = ranked[k];
-  return f.candidate->is_curve() && std::any_of(ranked.begin(), ranked.end(), [&](const Found& other) {
-           return std::find(bursts_.begin(), bursts_.end(), other.candidate) != bursts_.end() &&
-                  other.candidate->rows() == f.candidate->rows() && other.gain.gain > kCauseExplains * f.gain.gain;
-         });
 }
 
 bool Selector::StillEarns(Chosen& term, const std::vector<const Chosen*>& others) {
@@ -302,15 +293,7 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
 
 void Selector::Rescore(const Grounds& grounds, Found& f) const {
   const Columns c = GatherColumns(*f.candidate, w_.evidence, f.eta);
-  std::vector<NoiseModel> noise;
-  const double with = grounds.metric().RefittedDeviance(c, &noise);
-  const auto has_colour = [&](int j) { return !IsWhite(noise[static_cast<std::size_t>(j)]); };
-  // Noise that counts as white gives a curve a price as large as the gain that such noise shows.
-  if (f.candidate->record().search.how == codegen::SearchWay::kSpline &&
-      std::any_of(c.joints.begin(), c.joints.end(), has_colour)) {
-    const Metric coloured(w_.rows, noise);
-    PriceCurve(f, coloured, coloured.Project(c));
-  }
+  const double with = grounds.metric().RefittedDeviance(c);
   Rate(f, grounds.DevianceWithout(c.joints) - with);
 }
 

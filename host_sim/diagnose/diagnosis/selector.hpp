@@ -33,7 +33,6 @@ class Selector {
   // The strongest candidates by white score.
   std::vector<Found> Rank(const std::vector<Candidate*>& candidates, const Grounds& grounds);
   void Rescore(const Grounds& grounds, Found& f) const;
-  bool ShowsOnce(const std::vector<Found>& ranked, std::size_t k) const;
   bool IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   bool StandsOrTurns(int joint, bool averaged_only) const;
   bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;

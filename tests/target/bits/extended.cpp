@@ -8,7 +8,10 @@ using namespace armcal;  // NOLINT: the program is about all of it
 using Model = generated::Er20Stribeck;
 
 namespace {
-target::Run<Model, filter::ExtendedKalmanFilter<Model>> run = {"ekf", {}, {}, {}};
+target::Run<Model, filter::ExtendedKalmanFilter<Model>> run;
 }  // namespace
 
-int Program() { return target::RunAlong(run); }
+int Program() {
+  run.name = "ekf";  // from the start it would put the run in .data
+  return target::RunAlong(run);
+}

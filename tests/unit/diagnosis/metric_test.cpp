@@ -1,5 +1,4 @@
-// diagnosis tests - a bound is asked of the parameter itself, on a base of one column that is solved by hand; a
-// surface is as smooth along one axis as along the other.
+// diagnosis tests - a bound is asked of the parameter itself, on a base of one column that is solved by hand.
 #include "host_sim/diagnose/diagnosis/metric.hpp"
 
 #include <gtest/gtest.h>
@@ -45,20 +44,6 @@ TEST(InBounds, AsksTheParameter_NotItsDeviationFromThePrior) {
     EXPECT_FALSE(in_bounds(outside, {0})) << outside;
     EXPECT_TRUE(in_bounds(outside, {1})) << "the bound of another joint, " << outside;
   }
-}
-
-// A surface of 6 by 6 coefficients that changes along one axis only, each known with the same precision. Exchanging the
-// axes changes nothing of how likely it is.
-TEST(CurveEvidence, OfASurface_DoesNotKnowTheAxesApart) {
-  const BaseRows rows = OneParameter();
-  const Metric metric(rows, {NoiseModel{}});
-  constexpr int kSide = 6;
-  Projection along{MatrixXd::Identity(36, 36) * 4, MatrixXd::Zero(1, 36), VectorXd::Zero(36)}, across = along;
-  for (int a = 0; a < kSide; ++a)
-    for (int b = 0; b < kSide; ++b) along.g[kSide * a + b] = across.g[kSide * b + a] = 8 * (a == 3);
-  const double evidence = metric.CurveEvidence(along, kSide);
-  EXPECT_GT(evidence, 20);
-  EXPECT_NEAR(metric.CurveEvidence(across, kSide), evidence, 1e-9 * evidence);
 }
 
 }  // namespace

@@ -21,6 +21,8 @@ void Print(const char* name, const double* values, int count) {
 
 bool ReadOut(bool warm) {
   if (!arm.Begin(warm)) return false;
+  while (arm.HandOver()) {
+  }
   while (!arm.read_out.Step()) {
   }
   const auto& r = arm.read_out.result();

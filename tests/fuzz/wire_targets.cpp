@@ -41,6 +41,13 @@ struct Source {
   }
 };
 
+template <class Model>
+std::vector<std::uint16_t> OwnTable() {
+  std::vector<std::uint16_t> words(estimator::Table<Model>::kWords);
+  model::Encode(estimator::DefaultTable<Model>(), words.data());
+  return words;
+}
+
 // Requests of three connections to the engine of a device. step: what the device's background does.
 class Clients {
  public:
@@ -188,8 +195,11 @@ void Engine(const std::uint8_t* bytes, std::size_t count) {
         clients.Request(what % 8, in, stage);
         break;
     }
-    if (!drive->application.built.empty()) checked.push_back(drive->application.built);
-    for (int step = 0; step < 40; ++step) drive->device.Step(now_ms);
+    const std::vector<std::uint16_t>& built = drive->application.built;
+    if (!built.empty() && (checked.empty() || checked.back() != built)) checked.push_back(built);
+    // The first step lets the time pass. Further ones matter only while a table is being checked, stored or adopted.
+    drive->device.Step(now_ms);
+    for (int step = 1; step < 40 && drive->transaction.busy(); ++step) drive->device.Step(now_ms);
     const bool old = drive->active == before;
     Must(old || std::find(checked.begin(), checked.end(), drive->active) != checked.end(),
          "a table in force that nobody has checked");
@@ -216,8 +226,7 @@ void Controller(const std::uint8_t* bytes, std::size_t count) {
   const auto trace = std::make_unique<controller::RawTrace<Model, 1024>>();
   Must(core::IsOk(drive->Record(*trace)), "a trace that cannot be served");
   (void)drive->Boot();
-  std::vector<std::uint16_t> usual(estimator::Table<Model>::kWords);
-  model::Encode(estimator::DefaultTable<Model>(), usual.data());
+  static const std::vector<std::uint16_t> usual = OwnTable<Model>();
   std::vector<std::uint16_t> stage = usual;
   Source in{bytes, count};
   Clients clients(
@@ -289,8 +298,8 @@ void Controller(const std::uint8_t* bytes, std::size_t count) {
 // The model's own table, with words changed.
 void Table(const std::uint8_t* bytes, std::size_t count) {
   using Model = generated::Er20Like;
-  std::vector<std::uint16_t> words(estimator::Table<Model>::kWords);
-  model::Encode(estimator::DefaultTable<Model>(), words.data());
+  static const std::vector<std::uint16_t> own = OwnTable<Model>();
+  std::vector<std::uint16_t> words = own;
   for (Source in{bytes, count}; in.left > 0;) words[in.Word() % words.size()] = in.Word();
   const bool head = core::IsOk(model::CheckHeading<Model::kJoints, Model::kParameters>(
       words.data(), static_cast<int>(words.size()), Model::kSchema));
@@ -319,6 +328,8 @@ void Vendor(const std::uint8_t* bytes, std::size_t count) {
     const std::size_t most[] = {1, 1, 4, 14};
     const std::size_t number = how < 200 ? most[how % 4] : in.Byte() % 123u;
     for (std::size_t k = 0; k < number; ++k) words[k] = in.Word();
+    // Short motions take little time and can be loaded whole. One setup in five is written as it comes.
+    if (how < 160 && first == client::kPlayerSetup) words[0] = 0, words[1] %= 64;
     (void)map.Write(first, static_cast<std::uint16_t>(number), words);
     (void)map.Read(how % 2 == 0 ? link::RegisterKind::kInput : link::RegisterKind::kHolding, first, 8, words);
   }

@@ -3,6 +3,8 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <cstdio>
+#include <cstdlib>
 #include <string>
 
 #include "codegen/src/io/input_error.hpp"
@@ -15,21 +17,19 @@
 namespace armcal::fuzz {
 namespace {
 
-// Reads the bytes as a file of this name; bad input is what a reader may say.
+// Reads the bytes as a file; bad input is what a reader may say. One file in memory serves all inputs.
 template <class Read>
 void AsFile(const std::uint8_t* bytes, std::size_t count, Read read) {
-  const int file = ::memfd_create("fuzz", MFD_CLOEXEC);
-  if (file < 0) return;
-  for (std::size_t done = 0; done < count;) {
-    const ssize_t written = ::write(file, bytes + done, count - done);
-    if (written <= 0) break;
-    done += static_cast<std::size_t>(written);
+  static const int file = ::memfd_create("fuzz", MFD_CLOEXEC);
+  static const std::string name = "/proc/self/fd/" + std::to_string(file);
+  if (::ftruncate(file, 0) != 0 || ::pwrite(file, bytes, count, 0) != static_cast<ssize_t>(count)) {
+    std::fprintf(stderr, "no file in memory\n");
+    std::abort();
   }
   try {
-    read("/proc/self/fd/" + std::to_string(file));
+    read(name);
   } catch (const io::InputError&) {
   }
-  ::close(file);
 }
 
 }  // namespace

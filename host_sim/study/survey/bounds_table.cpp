@@ -296,13 +296,6 @@ class BoundTrial {
   MatrixXd asked_;
 };
 
-// Nothing here changes while a filter runs, and a filter may be told so.
-codegen::Catalogue Constant(codegen::Catalogue records) {
-  for (auto& [name, record] : records)
-    for (codegen::LinearParameter& parameter : record.linear) parameter.process_noise = 0;
-  return records;
-}
-
 codegen::Robot WithoutPrior(codegen::Robot robot) {
   for (double* width :
        {&robot.link_relative_sd, &robot.center_floor_m, &robot.inertia_floor_ratio, &robot.friction_relative_sd})
@@ -343,7 +336,7 @@ void ShowBounds(const Settings& settings, const Motions& motions, Findings& out)
        "Kalman filter without a prior: the file's widths times 30. Its interval on the plant is its own; that of "
        "least squares there comes from what blocks of 0.25 s leave.",
        "Seed of motion m and draw d: (" + std::to_string(settings.seed * kSeeds) + " + m) 1000 + 4 d."}};
-  const codegen::Catalogue constant = Constant(settings.records);
+  const codegen::Catalogue constant = WithoutProcessNoise(settings.records);
   const codegen::Model model(settings.robot, constant), drifting(settings.robot, settings.records),
       wide(WithoutPrior(settings.robot), constant);
   if (!CompiledFor(model, OnlineFilter::kKalman)) {

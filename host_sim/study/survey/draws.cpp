@@ -76,6 +76,12 @@ codegen::Robot DrawPrior(const codegen::Robot& truth, const PriorError& error, s
   return robot;
 }
 
+codegen::Catalogue WithoutProcessNoise(codegen::Catalogue records) {
+  for (auto& [name, record] : records)
+    for (codegen::LinearParameter& parameter : record.linear) parameter.process_noise = 0;
+  return records;
+}
+
 Stribeck DrawStribeck(int joints, std::uint64_t seed) {
   plant::Random random(seed);
   Stribeck s = SetStribeck(joints);

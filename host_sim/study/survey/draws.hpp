@@ -32,6 +32,9 @@ Stribeck DrawStribeck(int joints, std::uint64_t seed);
 // The middle of that range, which is believed before the draw.
 Stribeck BelievedStribeck(int joints);
 
+// A filter is told that no parameter changes while it runs, as in (18), (19) and (21).
+codegen::Catalogue WithoutProcessNoise(codegen::Catalogue records);
+
 struct Settings {
   codegen::Robot robot;        // its CAD and friction are the set parameters phi_s
   codegen::Catalogue records;  // as read; Records() is applied by the survey

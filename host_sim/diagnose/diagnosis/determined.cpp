@@ -18,6 +18,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kSure = 3;     // deviations from zero, for a term that has nothing but an unknown
+constexpr double kClear = 16;   // chi^2 of all amplitudes: such a torque is there, even if its parameters trade off
 constexpr double kEdge = 1e-3;  // of a range: a search that ends at a bound stops this close to it
 
 bool IsSearched(const Term& t) {
@@ -44,6 +45,20 @@ double Significance(const VectorXd& a, const MatrixXd& C) {
     if (const double value = eigen.eigenvalues()[k]; value > 1e-9)
       sum += std::pow(eigen.eigenvectors().col(k).dot(scaled), 2) / value;
   return sum;
+}
+
+// Of the amplitudes `seen` if the nonlinear parameters were known.
+MatrixXd AmplitudeCovariance(const Term& t, std::vector<Index> seen) {
+  std::vector<Index> searched;
+  for (Index k = 0; k < static_cast<Index>(t.eta.size()); ++k)
+    if (t.covariance(k, k) > 0) searched.push_back(k);
+  for (Index& at : seen) at += static_cast<Index>(t.eta.size());
+  const MatrixXd own = t.covariance(seen, seen);
+  if (searched.empty()) return own;
+  const MatrixXd across = t.covariance(searched, seen);
+  MatrixXd of_searched = t.covariance(searched, searched);
+  of_searched.diagonal() *= 1 + 1e-9;
+  return own - across.transpose() * of_searched.ldlt().solve(across);
 }
 
 std::string MarkedValue(const std::string& name, double value, double sd, const std::string& unit, Mark mark) {
@@ -90,14 +105,15 @@ Marks MarkParameters(const Term& t) {
     if (sd > 0) seen.push_back(static_cast<Index>(c));
     if (IsForm(t)) out.amplitude[c] = Mark::kNone;
   }
-  // By chance alone the sum is about as large as there are amplitudes.
-  if (any_free) {
-    std::vector<Index> place = seen;
-    for (Index& p : place) p += static_cast<Index>(t.eta.size());
-    out.usable =
-        !seen.empty() && Significance(t.amplitude(seen), t.covariance(place, place)) > static_cast<double>(seen.size());
-  }
-  out.usable = out.usable && (IsForm(t) || marked < parameters);
+  // By chance alone chi^2 is about as large as there are amplitudes. Parameters that trade off against each other may
+  // all be marked, although their torque is clearly there.
+  const double chi2 = seen.empty() ? 0 : Significance(t.amplitude(seen), AmplitudeCovariance(t, seen));
+  if (any_free) out.usable = chi2 > static_cast<double>(seen.size());
+  const auto on_bound = [](const std::vector<Mark>& marks) {
+    return std::find(marks.begin(), marks.end(), Mark::kOnBound) != marks.end();
+  };
+  const bool only_trade_off = chi2 > kClear && !on_bound(out.eta) && !on_bound(out.amplitude);
+  out.usable = out.usable && (IsForm(t) || marked < parameters || only_trade_off);
   return out;
 }
 

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 
@@ -80,7 +82,7 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
     t.folds = c.folds, t.also_fits = c.also_fits;
     t.rivals = c.rivals;
     t.training_only = c.candidate->is_event(), t.confirmed = t.in_fit = c.confirmed;
-    t.unconfirmed = c.unconfirmed;
+    t.unconfirmed = c.unconfirmed, t.not_held_out = c.not_held_out;
     t.amplitude = VectorXd::Zero(c.candidate->columns(c.eta)), t.sd = t.amplitude;
     t.eta_sd = VectorXd::Zero(static_cast<Eigen::Index>(c.eta.size()));
     if (c.confirmed) {
@@ -150,6 +152,7 @@ namespace {
 
 constexpr double kWorse = 1.005;        // what gets worse by more refutes a term
 constexpr double kOfThePromise = 0.15;  // of the gain that training promises: what gains less is not on this log
+constexpr double kKnock = 4;            // deviations: what is larger is no noise
 constexpr double kShows = 25;           // a gain that a term without any freedom never has by chance
 
 bool IsOfTheRun(const Chosen& c) { return c.candidate->record().effect_class == codegen::EffectClass::kRunState; }
@@ -270,28 +273,66 @@ Share ShareOf(const Diagnosis::Work& w, const Chosen& c, const VectorXd& amplitu
   return out;
 }
 
-// How much more likely a log is with a term than without it, twice the logarithm, over the term's joints. The larger
-// one of two figures: with white noise, and with noise of the colour of what is left. What the base model does not
-// predict of another motion is slow, and whitening takes slow terms for it.
+// 1.48 times the median of |e|: the standard deviation of normal noise, whatever a few large values are.
+double RobustDeviation(const VectorXd& e) {
+  std::vector<double> size(e.begin(), e.end());
+  if (size.empty()) return 0;
+  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
+  for (double& v : size) v = std::abs(v);
+  std::nth_element(size.begin(), middle, size.end());
+  return 1.4826 * *middle;
+}
+
+// How much more likely a log is with a term than without it, twice the logarithm, over the term's joints. The largest
+// of four figures: with white noise, and with noise of the colour of what is left; with all of the residuals, and with
+// residuals cut at four deviations. What the base model does not predict of another motion is slow, and whitening takes
+// slow terms for it. A few knocks on the log would hide what the term gains in all other rows.
 double GainOn(const calibration::Dataset& log, const Candidate& candidate, const MatrixXd& without,
               const MatrixXd& with) {
-  double white = 0, coloured = 0;
+  std::array<double, 4> sum{};
   for (const int j : candidate.rows()) {
     const RowIndex rows = UsedRows({&log}, j);
     VectorXd before(rows.size()), after(rows.size());
     rows.Take(0, without.col(j), before), rows.Take(0, with.col(j), after);
-    const NoiseModel noise = FitNoise(rows, after);
-    const auto gain = [&](double of, double to) { return to > 0 ? rows.size() * std::log(of / to) : 0; };
-    white += gain(before.squaredNorm(), after.squaredNorm());
-    coloured += gain(Whiten(noise, rows, before).squaredNorm(), Whiten(noise, rows, after).squaredNorm());
+    const double most = kKnock * RobustDeviation(before);
+    const auto add = [&](std::size_t at, const VectorXd& of, const VectorXd& to) {
+      const auto gain = [&](double a, double b) { return b > 0 ? rows.size() * std::log(a / b) : 0; };
+      const NoiseModel noise = FitNoise(rows, to);
+      sum[at] += gain(of.squaredNorm(), to.squaredNorm());
+      sum[at + 1] += gain(Whiten(noise, rows, of).squaredNorm(), Whiten(noise, rows, to).squaredNorm());
+    };
+    add(0, before, after);
+    add(2, before.cwiseMax(-most).cwiseMin(most), after.cwiseMax(-most).cwiseMin(most));
   }
-  return std::max(white, coloured);
+  return *std::max_element(sum.begin(), sum.end());
 }
 
-// The weakest term that predicts one of its joints, or all joints together, worse than the declared model does, or
-// worse than the other terms do without it. A delay is not compared with the other terms: they were found on logs that
-// it had aligned. A state of a run may also be refuted by the way that it takes there, another term by gaining much
-// less than its torque on this log and its gain in training promise.
+// Of the terms that predict one of their joints, or all joints together, worse than the declared model does, the one
+// whose absence helps all joints most: a wrong term bends the base fit, and then the right ones beside it predict
+// badly, too. Delays come last.
+Chosen* WorstThanDeclared(Diagnosis::Work& w, const calibration::Dataset& log, const calibration::Carried& payload,
+                          const Errors& before, const Errors& after, std::optional<Refutation>& why) {
+  std::vector<std::pair<Chosen*, Refutation>> suspects;
+  for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c)  // sorted, the strongest first
+    if (c->confirmed && !c->candidate->is_event())
+      if (const auto reason = Worse(*c, after, before)) suspects.emplace_back(&*c, *reason);
+  if (suspects.empty()) return nullptr;
+  auto worst = suspects.begin();
+  double most = -std::numeric_limits<double>::infinity();
+  for (auto s = suspects.begin(); s != suspects.end() && suspects.size() > 1; ++s) {
+    if (s->first->delay_s != 0) continue;
+    const Errors without = ErrorsOf(w, log, Leaves(w, Rivals(w.chosen, *s->first), log, payload));
+    const double helps = (after.fitted.array().max(1e-12) / without.fitted.array().max(1e-12)).log().sum();
+    if (helps > most) most = helps, worst = s;
+  }
+  why = worst->second;
+  return worst->first;
+}
+
+// The term that is to go first. Else the weakest that predicts worse than the other terms do without it. A delay is not
+// compared with the other terms: they were found on logs that it had aligned. A state of a run may also be refuted by
+// the way that it takes there, another term by gaining much less than its torque on this log and its gain in training
+// promise.
 Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calibration::Carried& payload,
                 const MatrixXd& before, const MatrixXd& after, std::optional<Refutation>& why) {
   const Errors error_before = ErrorsOf(w, log, before), error_after = ErrorsOf(w, log, after);
@@ -300,9 +341,9 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
     if (w.turns[static_cast<std::size_t>(j)]) calibration::UseTurns(seen, j);
   std::map<const Chosen*, VectorXd> amplitude;
   for (const Chosen* c : Confirmed(w.chosen)) amplitude.emplace(c, w.estimate.amplitude[amplitude.size()]);
-  for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {  // sorted, the strongest first
+  if (Chosen* worst = WorstThanDeclared(w, log, payload, error_before, error_after, why)) return worst;
+  for (auto c = w.chosen.rbegin(); c != w.chosen.rend(); ++c) {
     if (!c->confirmed || c->candidate->is_event()) continue;
-    if ((why = Worse(*c, error_after, error_before))) return &*c;
     const std::vector<const Chosen*> others = Rivals(w.chosen, *c);
     if (c->delay_s != 0) continue;
     const MatrixXd without = Leaves(w, others, log, payload);
@@ -312,6 +353,7 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
     }
     if (GoesToAndFroOn(*c->candidate, amplitude.at(&*c), AtEstimate(w, others, seen), without)) {
       c->unconfirmed = "on the held-out log it goes to and fro, which a state of a run does not";
+      c->not_held_out = true;
       return &*c;
     }
     if (IsOfTheRun(*c)) continue;
@@ -324,6 +366,7 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
       c->unconfirmed =
           fmt::format("the held-out log gains {:.0f} by it, where {:.0f} was to be expected from the training logs",
                       gained, promised);
+      c->not_held_out = true;
       return &*c;
     }
   }
@@ -380,7 +423,10 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test, double gain_tolerance
   }
   if (out.payload.named) out.without_payload = Leaves(w, Confirmed(w.chosen), test, {});
   WriteTerms(w, finding_);
-  for (std::size_t k = 0; k < why.size(); ++k) finding_.terms[k].refuted = why[k];
+  for (std::size_t k = 0; k < why.size(); ++k) {
+    finding_.terms[k].refuted = why[k];
+    if (why[k]) finding_.terms[k].not_held_out = true;
+  }
   return out;
 }
 

@@ -13,8 +13,9 @@
 
 namespace armcal::diagnosis {
 
-// A term is accepted where noise alone gains as much in one search of 100 000. Above one in 100 it is not looked at.
-inline constexpr double kLogRare = -11.5, kLogLikely = -4.6;
+// A term is accepted where noise alone gains as much in one search of 10 000. The held-out log judges it again. Above
+// one in 100 it is not looked at.
+inline constexpr double kLogRare = -9.21, kLogLikely = -4.6;
 
 // Which joints' rows near turns and at rest are looked at, too. kWhereAveraged: where the band is limited, so that an
 // average reaches over a turn.
@@ -55,6 +56,7 @@ struct Term {
   bool confirmed = true;               // false: the held-out log did not bear it out, or nobody could use it
   std::optional<Refutation> refuted;   // how the held-out log refuted it
   std::string unconfirmed;             // else why it is not confirmed
+  bool not_held_out = false;           // the held-out log refuted it, or gave that reason
   bool in_fit = true;                  // it is in the model that was compared; false: refuted, or not determined
 };
 

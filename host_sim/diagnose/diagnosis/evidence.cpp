@@ -12,7 +12,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kSmooth_s = 0.02;  // over which columns are taken to be smooth
+constexpr double kSmooth_s = 0.02;     // over which columns are taken to be smooth
+constexpr double kRounding_Nm = 1e-9;  // of a column at the width of its prior: such as gravity's about an upright axis
 
 // The samples about row k are all used and in one piece.
 bool IsWhole(const RowIndex& rows, int k, int reach) {
@@ -35,6 +36,14 @@ Columns Gather(const Candidate& candidate, const std::vector<Quantities>& logs, 
           index.Take(static_cast<int>(log), calibration::ThroughChannel(*logs[log].data, out.joints[r], v),
                      out.block[r].col(c));
     }
+  }
+  for (int c = 0; c < candidate.columns(eta); ++c) {
+    const double width = candidate.column(c).sd;
+    const auto shows = [&](const MatrixXd& block) {
+      return block.col(c).lpNorm<Eigen::Infinity>() * width > kRounding_Nm;
+    };
+    if (width > 0 && std::none_of(out.block.begin(), out.block.end(), shows))
+      for (MatrixXd& block : out.block) block.col(c).setZero();
   }
   return out;
 }

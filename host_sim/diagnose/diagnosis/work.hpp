@@ -28,8 +28,9 @@ struct Chosen {
   bool coloured = false;  // it was found in rows whose noise had been whitened
   bool earns = true;      // its place beside the others, as last seen
   bool confirmed = true;
-  std::string unconfirmed;  // why it is not, where no error of the held-out log refuted it
-  double delay_s = 0;       // of a term that delays the measurement: as it has been applied to the logs
+  std::string unconfirmed;    // why it is not, where no error of the held-out log refuted it
+  bool not_held_out = false;  // the held-out log gave that reason
+  double delay_s = 0;         // of a term that delays the measurement: as it has been applied to the logs
 };
 
 // The confirmed terms, except `without`.

@@ -80,7 +80,9 @@ std::string CauseText(const DiagnosisView& v, std::size_t term) {
   } else if (t.training_only) {
     out += ": explains a time of the training log";
   } else if (!t.confirmed) {
-    out += t.refuted ? ": the held-out log refutes it" : ": the training logs do not determine it";
+    out += t.refuted        ? ": the held-out log refutes it"
+           : t.not_held_out ? ": the held-out log does not show it"
+                            : ": the training logs do not determine it";
   }
   return out;
 }

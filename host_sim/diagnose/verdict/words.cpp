@@ -38,7 +38,7 @@ std::string Headline(const diagnosis::Finding& f) {
   const auto any = [&](auto is) { return std::any_of(f.terms.begin(), f.terms.end(), is); };
   if (!AnyConfirmed(f) && any([](const Term& t) { return t.in_fit; }))
     return "none confirmed. The held-out log repeats a training trajectory: terms are found on this trajectory only";
-  if (!AnyConfirmed(f) && any([](const Term& t) { return t.refuted.has_value(); }))
+  if (!AnyConfirmed(f) && any([](const Term& t) { return t.not_held_out; }))
     return "none. What the training logs suggested did not hold on the held-out log";
   if (!AnyConfirmed(f)) return "none. What the training logs suggested they do not determine";
   const bool of_the_arm =
@@ -48,7 +48,7 @@ std::string Headline(const diagnosis::Finding& f) {
 
 std::string Remark(const Term& t) {
   if (!t.confirmed && t.in_fit) return " (found on this trajectory, NOT CONFIRMED)";
-  if (!t.confirmed) return t.refuted ? " (NOT CONFIRMED on the held-out log)" : " (NOT CONFIRMED: not determined)";
+  if (!t.confirmed) return t.not_held_out ? " (NOT CONFIRMED on the held-out log)" : " (NOT CONFIRMED: not determined)";
   return t.training_only ? " (in the training log only)" : "";
 }
 

@@ -87,6 +87,39 @@ TEST(StatefulEffects, Backlash_EqualsAPinInARing) {
   }
 }
 
+// The flank's place follows the load's sign through T y' = x - y twice; every row has -gap/2 M times its acceleration.
+// The load is straight between samples.
+TEST(StatefulEffects, BacklashUnderLoad_EqualsFineIntegration) {
+  const double T = 0.012, mass = 3.7;
+  Log log;
+  for (int k = 0; k < 300; ++k) {
+    log["dt"].push_back(kDt);
+    log["tau_rigid2"].push_back(50 * std::sin(0.11 * k + 0.4) + 5 * std::sin(0.9 * k) - 11);
+    for (int r = 0; r < 6; ++r) log["M" + std::to_string(r) + "_1"].push_back(mass + r);
+  }
+  const auto& load = log.at("tau_rigid2");
+  EffectRun run("backlash_load");
+  ASSERT_EQ(run.instance().columns[0].rows.size(), 6u);
+  for (const int row : {0, 1, 5}) {
+    const auto column = run.Column(0, row, log, {{"T", T}});
+    double first = 0, place = 0;
+    for (std::size_t k = 1; k < load.size(); ++k) {
+      constexpr int kSteps = 2000;
+      const double h = kDt / kSteps;
+      double mean = 0;  // of the sign
+      for (int i = 0; i < kSteps; ++i)
+        mean += Sign(load[k - 1] + (load[k] - load[k - 1]) * (i + 0.5) / kSteps) / kSteps;
+      for (int i = 0; i < kSteps; ++i) {  // Heun
+        const double a = (mean - first) / T, b = (first - place) / T;
+        const double a2 = (mean - first - h * a) / T, b2 = (first + h * a - place - h * b) / T;
+        first += h / 2 * (a + a2), place += h / 2 * (b + b2);
+      }
+      const double acceleration = (mean - 2 * first + place) / (T * T);
+      ASSERT_NEAR(column[k], -0.5 * (mass + row) * acceleration, 1e-3 * (mass + row) / (T * T)) << k;
+    }
+  }
+}
+
 // The link hangs on the motor by a spring and a damper: a_link'' = w0^2 (a_motor - a_link) + 2 zeta w0 (a_motor' -
 // a_link'), in every row times M; a_motor straight between samples.
 TEST(StatefulEffects, BeltElasticity_EqualsATwoMassSimulation) {

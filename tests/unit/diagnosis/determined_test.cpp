@@ -66,13 +66,25 @@ TEST(Determined, ATermWhoseAmplitudeIsWithinItsDeviation_IsNotUsable) {
 // determined.
 TEST(Determined, AmplitudesThatAreDeterminedTogether_AreUsable) {
   Term t = TermOf("torque_ripple", {48}, {0.01}, {0.6, 0.4}, {1, 1});
-  t.covariance(1, 2) = t.covariance(2, 1) = -0.9999;  // their sum: 1 +- 0.014
+  t.covariance(1, 2) = t.covariance(2, 1) = -0.95;  // their sum: 1 +- 0.32, chi^2 10
   EXPECT_TRUE(MarkParameters(t).amplitude[0] == Mark::kUndetermined);
-  // Every single one is marked, so nobody could use the parameters, whatever their sum is.
+  EXPECT_TRUE(MarkParameters(t).usable);
+  // Every single one is marked. Their sum is seen, but not clearly.
   t.eta_sd[0] = 100, t.covariance(0, 0) = 1e4;
   EXPECT_FALSE(MarkParameters(t).usable);
-  t.eta_sd[0] = 0.01, t.covariance(0, 0) = 1e-4;
+  t.covariance(1, 2) = t.covariance(2, 1) = -0.9999;  // 1 +- 0.014
   EXPECT_TRUE(MarkParameters(t).usable);
+}
+
+// Viscosity that falls by exp(-dT / Tc): over few degrees only FvT / Tc shows, and each of the two is uncertain.
+TEST(Determined, ParametersThatTradeOff_AreUsableWhereTheirTorqueIsClear) {
+  Term t = TermOf("temp_viscous", {38}, {79}, {29}, {59});
+  EXPECT_FALSE(MarkParameters(t).usable);
+  t.covariance(0, 1) = t.covariance(1, 0) = 0.997 * 79 * 59;  // with Tc known, FvT is 29 +- 4.6
+  EXPECT_TRUE(MarkParameters(t).usable);
+  EXPECT_NE(MarkText(t).find("FvT"), std::string::npos) << MarkText(t);
+  t.covariance(0, 1) = t.covariance(1, 0) = 0.95 * 79 * 59;  // 29 +- 18
+  EXPECT_FALSE(MarkParameters(t).usable);
 }
 
 // An arm that does not feel gravity: the column of the load is zero in every row, and its estimate and deviation are.

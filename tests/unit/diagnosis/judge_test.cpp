@@ -110,6 +110,25 @@ TEST(HeldOutLog, RefutesATermThatTheOthersAreBetterWithout) {
   EXPECT_LT(j.Error(j.held_out.after), 1.1 * j.arm.noise_Nm(kChangedJoint));
 }
 
+// Knocks on the held-out log are most of its error. The ripple still shows in all other rows. A log that has knocks and
+// no ripple refuses it.
+TEST(HeldOutLog, WithKnocks_StillShowsATerm) {
+  const auto ripple = [](Dataset& d) {
+    for (int k = 0; k < d.samples(); ++k) d.tau(k, kChangedJoint) += 0.2 * std::cos(12 * d.s.q(k, kChangedJoint));
+  };
+  const auto knock = [](Dataset& d) {
+    for (int k = 0; k < d.samples(); k += 97) d.tau(k, kChangedJoint) += k % 2 ? 20 : -20;
+  };
+  const auto ripple_and_knocks = [&](Dataset& d) { ripple(d), knock(d); };
+  for (const bool rippled : {true, false}) {
+    const Judged j(ripple, rippled ? Judged::Change(ripple_and_knocks) : Judged::Change(knock));
+    ASSERT_EQ(j.terms().size(), 1u);
+    EXPECT_EQ(j.terms()[0].record->name, "torque_ripple");
+    EXPECT_EQ(j.terms()[0].confirmed, rippled) << j.terms()[0].unconfirmed;
+    EXPECT_GT(j.Error(j.held_out.after), 15 * j.arm.noise_Nm(kChangedJoint));
+  }
+}
+
 // Friction rises while the joint warms up, in the training log. The other one warms up alike, and there it falls: of
 // two names that training could not tell apart one is left.
 TEST(HeldOutLog, LeavesOfKindsThatFitAlike_TheOneOfTheRun) {

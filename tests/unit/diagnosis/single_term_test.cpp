@@ -112,7 +112,7 @@ TEST(Deviation, OfARipplesFrequency_IsThatOfAFitByHand) {
   EXPECT_NEAR(sd, expected, 0.2 * expected);
 }
 
-// 19.49: what one amplitude gains by chance once in exp(11.5) searches, 4.414 standard deviations to either side. The
+// 15.14: what one amplitude gains by chance once in 10 000 searches, 3.891 standard deviations to either side. The
 // second column is the declared viscous friction and a fifth of the first one: only that fifth shows.
 TEST(DetectionLimit, IsHigherWhereTheDeclaredModelTakesUpTheColumn) {
   OneLog one({{"alone", ColumnRecord("alone", "sin(40*q)")}, {"beside", ColumnRecord("beside", "qd + 0.2*sin(40*q)")}},
@@ -122,7 +122,7 @@ TEST(DetectionLimit, IsHigherWhereTheDeclaredModelTakesUpTheColumn) {
   for (const Limit& limit : limits) {
     const VectorXd shows = one.Column(limit.joint, [](double q, double) { return 0.2 * std::sin(40 * q); });
     const VectorXd all = one.Column(limit.joint, [](double q, double qd) { return qd + 0.2 * std::sin(40 * q); });
-    const double alone = one.arm.noise_Nm(limit.joint) * std::sqrt(19.49 / static_cast<double>(shows.size()));
+    const double alone = one.arm.noise_Nm(limit.joint) * std::sqrt(15.14 / static_cast<double>(shows.size()));
     const double share = limit.record->name == "alone" ? 1 : RootMeanSquare(all) / RootMeanSquare(shows);
     EXPECT_NEAR(limit.rms_Nm, share * alone, 0.08 * share * alone) << limit.record->name << limit.joint;
   }

@@ -2,13 +2,14 @@
 //
 // Motion:  C^T tau_motor = M(q) qdd + h(q, qd) + friction + undeclared torque, M with rotors (gyroscopic part
 // neglected). Friction is Coulomb + viscous with true stiction: a resting joint is a constraint until the torque needed
-// to hold it exceeds its breakaway level, and a moving joint whose speed passes zero stops first. Motor current follows
-// its command by a first-order lag (exact between ticks); commands are held over a tick, or reached at its end by a
-// ramp, and cut to the current limit, torque limit / (gear ratio x nominal torque constant). Timing: Step holds a
-// command over one tick; at the tick's END encoder, current and temperature are read at the same instant. The current
-// is not averaged over the tick, so reading and motion (q, qd, qdd) belong together exactly. Whoever averages counts
-// and current over the same ticks keeps that if commands ramp. If they are held, the current of a tick is a curve whose
-// mean leads the mean of its ends: by 0.08 ms at 1 kHz and a lag of 1 ms.
+// to hold it exceeds its breakaway level, and a moving joint whose speed passes zero stops first. Where a joint is
+// elastic or has play, motor and link are two masses: friction, rotor and encoder are the motor's, and q is the
+// motor's. Motor current follows its command by a first-order lag (exact between ticks); commands are held over a tick,
+// or reached at its end by a ramp, and cut to the current limit, torque limit / (gear ratio x nominal torque constant).
+// Timing: Step holds a command over one tick; at the tick's END encoder, current and temperature are read at the same
+// instant. The current is not averaged over the tick, so reading and motion (q, qd, qdd) belong together exactly.
+// Whoever averages counts and current over the same ticks keeps that if commands ramp. If they are held, the current of
+// a tick is a curve whose mean leads the mean of its ends: by 0.08 ms at 1 kHz and a lag of 1 ms.
 #pragma once
 
 #include <algorithm>
@@ -76,7 +77,8 @@ class Arm {
   const Truth& truth() const { return truth_; }
 
   // The truth at this instant.
-  const Eigen::VectorXd& q() const { return q_; }
+  const Eigen::VectorXd& q() const { return q_; }               // of the motors, where a joint is elastic or has play
+  const Eigen::VectorXd& link_ahead() const { return ahead_; }  // by which the link is ahead of its motor there
   const Eigen::VectorXd& qd() const { return qd_; }
   const Eigen::VectorXd& qdd() const { return qdd_; }
   const Eigen::VectorXd& temperature_degC() const { return temperature_; }
@@ -84,7 +86,7 @@ class Arm {
   // Torque that the motors really give, in joint coordinates.
   Eigen::VectorXd torque_Nm() const { return JointTorque(current_, truth_.torque_constant_NmpA); }
   // What the current sensor of this instant would read without noise and steps, as joint torque by NOMINAL constants.
-  Eigen::VectorXd measured_torque_truth_Nm() const { return JointTorque(current_, nominal_constant_); }
+  Eigen::VectorXd measured_torque_truth_Nm() const { return JointTorque(reading_, nominal_constant_); }
   // Torque that Coulomb and viscous friction and joint effects take; at rest: what friction holds plus position
   // torques.
   const Eigen::VectorXd& friction_torque_Nm() const { return friction_; }
@@ -96,14 +98,37 @@ class Arm {
   struct JointTorques {
     double dry = 0;         // level of dry friction against the direction of motion, not below 0
     double drag = 0;        // viscous friction and drag
-    double position = 0;    // torque by position
+    double position = 0;    // torque that is no friction
     double undeclared = 0;  // the share of effects, signed
   };
-  JointTorques TorquesAt(int joint, int direction, double q, double qd, bool breaking_loose) const;
-  void FormDynamics(const Eigen::VectorXd& q, const Eigen::VectorXd& qd);
+  struct ActingEffect {
+    PlacedJointEffect placed;
+    std::vector<double> memory;
+  };
+  struct ActingForce {
+    int link;
+    KDL::Vector point;
+    std::unique_ptr<LinkForce> force;
+    double from_s;
+  };
+  struct ActingReading {
+    std::unique_ptr<ReadingEffect> effect;
+    double from_s;
+  };
+
+  void PlaceEffects();
+  JointState StateOf(int joint, int direction, const Eigen::VectorXd& q, const Eigen::VectorXd& qd,
+                     const ActingEffect& effect) const;
+  JointTorques TorquesAt(int joint, int direction, const Eigen::VectorXd& q, const Eigen::VectorXd& qd,
+                         bool breaking_loose) const;
+  void FormDynamics(const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& ahead,
+                    const Eigen::VectorXd& ahead_rate);
   void Accelerate(const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& current,
                   Eigen::VectorXd& qdd);
   void Settle();
+  void Remember(bool begin = false);  // begin: nothing happened before
+  void TakeReading();
+  double HeldByConverter(std::size_t axis, double current_A) const;
   void Advance(double duration_s);
   void Warm();
   bool ChoosePayload();  // true when the load at the flange changed
@@ -116,7 +141,11 @@ class Arm {
   Random noise_;
   Dynamics bare_, laden_, declared_;  // laden: with the payload; declared: without payload and tilt
   Dynamics* links_ = &bare_;
-  std::vector<std::vector<PlacedJointEffect>> effects_;  // by joint
+  std::vector<std::vector<ActingEffect>> effects_;    // by joint
+  std::vector<std::vector<ActingReading>> channels_;  // by motor axis
+  std::vector<ActingForce> forces_;
+  std::vector<const Transmission*> gears_;  // by joint; nullptr: stiff
+  Eigen::VectorXd flywheels_;               // by joint, kg m^2
   std::vector<double> nominal_constant_;
   Eigen::MatrixXd rotors_;  // C^T diag(N^2 J) C
   Eigen::VectorXd rise_KpW_, warming_time_s_;
@@ -124,14 +153,18 @@ class Arm {
   long long ticks_ = 0;
   bool brakes_ = false;
 
-  Eigen::VectorXd q_, qd_, qdd_, current_, command_, slope_, temperature_, friction_, load_;
+  // q_ is where the motors stand, in joint units. Behind an elastic gear the link is ahead_ of it.
+  Eigen::VectorXd q_, qd_, qdd_, ahead_, ahead_rate_, current_, command_, slope_, temperature_, friction_, load_;
+  Eigen::VectorXd reading_;     // current as the reading has it, without noise
   std::vector<int> direction_;  // of a moving joint, -1 or +1; 0: the joint rests
   std::vector<int> stops_;      // of this integration step; a joint that stopped twice rests until its end
   std::vector<bool> cut_;       // command was cut in this tick
 
   // Work space of the equations of motion.
   Eigen::MatrixXd link_mass_, mass_, constrained_;
-  Eigen::VectorXd bias_, drive_, right_, middle_q_, middle_qd_, middle_qdd_;
+  Eigen::MatrixXd jacobian_;
+  Eigen::VectorXd bias_, drive_, right_, middle_q_, middle_qd_, middle_qdd_, middle_ahead_, middle_ahead_rate_;
+  Eigen::VectorXd link_q_, link_qd_, link_qdd_, passed_Nm_, outside_Nm_, motor_angle_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
 };
 

@@ -32,6 +32,9 @@ Dynamics::Dynamics(const RobotFile& robot, const std::vector<Body>& bodies, cons
     : chain_(MakeChain(robot, bodies, payload)),
       mass_solver_(chain_, gravity_mps2),
       torque_solver_(chain_, gravity_mps2),
+      place_solver_(chain_),
+      jacobian_solver_(chain_),
+      jacobian_(chain_.getNrOfJoints()),
       no_wrench_(chain_.getNrOfSegments(), KDL::Wrench::Zero()),
       q_(chain_.getNrOfJoints()),
       qd_(chain_.getNrOfJoints()),
@@ -56,6 +59,17 @@ Eigen::VectorXd Dynamics::Torque(const Eigen::VectorXd& q, const Eigen::VectorXd
   qdd_.data = qdd;
   torque_solver_.CartToJnt(q_, qd_, qdd_, no_wrench_, torque_);
   return torque_.data;
+}
+
+KDL::Vector Dynamics::Place(const Eigen::VectorXd& q, int link, const KDL::Vector& point, Eigen::MatrixXd& jacobian) {
+  q_.data = q;
+  KDL::Frame frame;
+  place_solver_.JntToCart(q_, frame, link + 1);
+  jacobian_.data.setZero();
+  jacobian_solver_.JntToJac(q_, jacobian_, link + 1);
+  jacobian_.changeRefPoint(frame.M * point);
+  jacobian = jacobian_.data.topRows(3);
+  return frame * point;
 }
 
 }  // namespace armcal::plant

@@ -7,7 +7,9 @@
 #include <Eigen/Core>
 #include <kdl/chain.hpp>
 #include <kdl/chaindynparam.hpp>
+#include <kdl/chainfksolverpos_recursive.hpp>
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
+#include <kdl/chainjnttojacsolver.hpp>
 
 #include "host_sim/machine/plant/robot_file.hpp"
 
@@ -34,10 +36,17 @@ class Dynamics {
   // Inverse dynamics, recursive Newton-Euler.
   Eigen::VectorXd Torque(const Eigen::VectorXd& q, const Eigen::VectorXd& qd, const Eigen::VectorXd& qdd);
 
+  // Where a point of a link is in the base frame, and the rows of its Jacobian: its speed is jacobian * qd, [3 x n].
+  // The point is in the axes of the link, counted from 0.
+  KDL::Vector Place(const Eigen::VectorXd& q, int link, const KDL::Vector& point, Eigen::MatrixXd& jacobian);
+
  private:
   KDL::Chain chain_;
   KDL::ChainDynParam mass_solver_;
   KDL::ChainIdSolver_RNE torque_solver_;
+  KDL::ChainFkSolverPos_recursive place_solver_;
+  KDL::ChainJntToJacSolver jacobian_solver_;
+  KDL::Jacobian jacobian_;
   KDL::Wrenches no_wrench_;
   KDL::JntArray q_, qd_, qdd_, torque_;
   KDL::JntSpaceInertiaMatrix mass_;

@@ -11,8 +11,6 @@
 namespace armcal::plant {
 namespace {
 
-constexpr int kMostJoints = 16;  // an upper bound for any robot; Arm checks the number of this robot
-
 // A factor 1 - spread must stay positive, or friction and torque constants could vanish.
 double ReadSpread(const io::TomlReader& keys, const std::string& key, double fallback) {
   const double value = keys.NotNegative(key, fallback);
@@ -48,8 +46,21 @@ PayloadStep ReadPayload(const io::TomlReader& keys) {
   return payload;
 }
 
+std::string EffectKinds() {
+  std::string kinds =
+      "payload_step, base_tilt, rotor_inertia, belt_elasticity, joint_compliance, backlash, flange_hose, "
+      "flange_contact, external_contact, torque_gain_error, torque_drift, current_ripple, torque_saturation, "
+      "time_delay, torque_filter";
+  for (const auto& [name, reader] : AllJointEffects()) kinds += ", " + name;
+  return kinds;
+}
+
+// Of which family a kind is decides what it acts on.
 void ReadEffect(const io::TomlReader& keys, Scenario& scenario) {
   const std::string kind = keys.Text("kind");
+  const auto joint = [&] { return ReadJointNumber(keys, "joint"); };
+  const auto joint_or_all = [&] { return keys.Has("joint") ? joint() : -1; };
+  const auto from_s = [&] { return keys.NotNegative("from_s", 0); };
   if (kind == "payload_step") {
     if (scenario.payload) keys.Fail("kind", "payload_step only once");
     scenario.payload = ReadPayload(keys);
@@ -57,10 +68,27 @@ void ReadEffect(const io::TomlReader& keys, Scenario& scenario) {
     if (scenario.tilted()) keys.Fail("kind", "base_tilt only once");
     scenario.tilt_roll_rad = keys.Number("roll_deg", 0) * kRadPerDeg;
     scenario.tilt_pitch_rad = keys.Number("pitch_deg", 0) * kRadPerDeg;
+  } else if (kind == "rotor_inertia") {
+    scenario.flywheels.push_back({joint(), keys.Positive("inertia_kgm2")});
+  } else if (IsTransmission(kind)) {
+    const int at = joint();
+    for (const Transmission& other : scenario.transmissions)
+      if (other.joint == at) keys.Fail("joint", "one elastic transmission or gap a joint");
+    scenario.transmissions.push_back(ReadTransmission(kind, at, keys));
+  } else if (IsLinkForce(kind)) {
+    std::shared_ptr<const LinkForce> force = ReadLinkForce(kind, keys);
+    scenario.forces.push_back({kind, force->at_flange() ? -1 : joint(), force, from_s()});
+  } else if (IsReadingEffect(kind)) {
+    const bool one_wire = kind == "time_delay" || kind == "torque_filter";
+    scenario.readings.push_back({kind, one_wire ? joint_or_all() : joint(), ReadReadingEffect(kind, keys), from_s()});
+  } else if (AllJointEffects().contains(kind)) {
+    const int at = joint();
+    std::shared_ptr<const JointEffect> effect = ReadJointEffect(kind, keys, at);
+    scenario.joint_effects.push_back({kind, at, effect, from_s()});
+    if (std::shared_ptr<const JointEffect> there = effect->AtTheOtherJoint())
+      scenario.joint_effects.push_back({kind, effect->other_joint(), there, from_s(), true});
   } else {
-    const int joint = static_cast<int>(keys.Integer("joint", 1, kMostJoints)) - 1;
-    const double from_s = keys.NotNegative("from_s", 0);
-    scenario.joint_effects.push_back({kind, joint, ReadJointEffect(kind, keys), from_s});
+    keys.Fail("kind", "one of: " + EffectKinds());
   }
   keys.Finish();
 }
@@ -69,7 +97,17 @@ void ReadEffect(const io::TomlReader& keys, Scenario& scenario) {
 
 std::vector<Undeclared> Scenario::undeclared() const {
   std::vector<Undeclared> list;
-  for (const PlacedJointEffect& placed : joint_effects) list.push_back({placed.kind, std::to_string(placed.joint + 1)});
+  const auto number = [](int joint) { return std::to_string(joint + 1); };
+  for (const PlacedJointEffect& placed : joint_effects) {
+    if (placed.reaction) continue;
+    const int other = placed.effect->other_joint(), first = std::min(placed.joint, other);
+    list.push_back(
+        {placed.kind, other < 0 ? number(placed.joint) : number(first) + "-" + number(std::max(placed.joint, other))});
+  }
+  for (const Transmission& t : transmissions) list.push_back({t.kind, number(t.joint)});
+  for (const Flywheel& wheel : flywheels) list.push_back({"rotor_inertia", number(wheel.joint)});
+  for (const PlacedReading& r : readings) list.push_back({r.kind, r.axis < 0 ? "all" : number(r.axis)});
+  for (const PlacedForce& f : forces) list.push_back({f.kind, f.link < 0 ? "flange" : number(f.link)});
   if (payload) list.push_back({"payload_step", "flange"});
   if (tilted()) list.push_back({"base_tilt", "base"});
   return list;

@@ -9,11 +9,14 @@
 
 #include "host_sim/machine/plant/dynamics.hpp"
 #include "host_sim/machine/plant/joint_effects.hpp"
+#include "host_sim/machine/plant/link_forces.hpp"
+#include "host_sim/machine/plant/reading_effects.hpp"
+#include "host_sim/machine/plant/transmission.hpp"
 #include "host_sim/machine/plant/truth.hpp"
 
 namespace armcal::plant {
 
-// One undeclared effect, for a report: kind as in the scenario, joint "3", "flange" or "base".
+// One undeclared effect, for a report: kind as in the scenario, joint "3", "5-6", "all", "flange" or "base".
 struct Undeclared {
   std::string kind;
   std::string joint;
@@ -23,7 +26,30 @@ struct PlacedJointEffect {
   std::string kind;
   int joint = 0;  // 0-based
   std::shared_ptr<const JointEffect> effect;
-  double from_s = 0;  // it is not there before
+  double from_s = 0;      // it is not there before
+  bool reaction = false;  // what an effect of another joint does here; a report leaves it out
+};
+
+// A force on a link.
+struct PlacedForce {
+  std::string kind;
+  int link = -1;  // 0-based; -1: the last one
+  std::shared_ptr<const LinkForce> force;
+  double from_s = 0;
+};
+
+// What the torque's reading undergoes.
+struct PlacedReading {
+  std::string kind;
+  int axis = -1;  // 0-based; -1: all
+  std::shared_ptr<const ReadingEffect> effect;
+  double from_s = 0;
+};
+
+// A wheel that turns with a joint's motor.
+struct Flywheel {
+  int joint = 0;
+  double inertia_kgm2 = 0;  // on the joint's side
 };
 
 // A body clamped to the flange from one time to another.
@@ -56,12 +82,16 @@ struct Scenario {
   std::vector<double> start_rad;         // empty: zero, or the limit next to it
   std::optional<KDL::Frame> flange;      // instead of the robot file's tool frame
   std::vector<PlacedJointEffect> joint_effects;
+  std::vector<Transmission> transmissions;
+  std::vector<Flywheel> flywheels;
+  std::vector<PlacedForce> forces;
+  std::vector<PlacedReading> readings;
   std::optional<PayloadStep> payload;
   double tilt_roll_rad = 0, tilt_pitch_rad = 0;  // of the true base against the declared one
 
   bool tilted() const { return tilt_roll_rad != 0 || tilt_pitch_rad != 0; }
-  // Kind and joint of everything that the robot file does not know of: joint effects in the file's order, then flange
-  // and base.
+  // Kind and joint of everything that the robot file does not know of: joint effects in the file's order, then
+  // transmissions, rotors, readings, forces, payload and base.
   std::vector<Undeclared> undeclared() const;
 };
 

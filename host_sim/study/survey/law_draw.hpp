@@ -10,7 +10,7 @@
 
 namespace armcal::survey {
 
-// The plant's own form of a law is written by hand (host_sim/machine/plant/joint_effects.cpp).
+// The plant's own form of a law is written by hand (host_sim/machine/plant/friction_effects.cpp).
 struct LawDraw {
   std::vector<choice::FrictionLaw> law;  // of each joint
   // Value of each parameter of the laws, by its name in the model.

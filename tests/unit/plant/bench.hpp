@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
+#include "codegen/src/io/input_error.hpp"
 #include "host_sim/machine/plant/arm.hpp"
 #include "tests/unit/files/temporary_folder.hpp"
 
@@ -56,6 +57,14 @@ inline Scenario MakeScenario(const std::string& more = "", const std::string& ro
                                 : "";
   return ReadScenario(WriteText(
       "scenario.toml", "title = \"t\"\nrobot = \"" + robot + "\"\ntruth_seed = 5\nnoise_seed = 6\n" + more + exact));
+}
+
+inline std::unique_ptr<const JointEffect> Make(const std::string& kind, const std::string& keys, int joint = 0) {
+  const toml::table table = toml::parse(keys);
+  const io::TomlReader reader(table, "test");
+  auto effect = ReadJointEffect(kind, reader, joint);
+  reader.Finish();
+  return effect;
 }
 
 // Kinetic plus potential energy by DH products and geometric Jacobians; shares no code with the plant's KDL chain.

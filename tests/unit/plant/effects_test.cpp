@@ -6,14 +6,6 @@ namespace {
 
 using namespace bench;
 
-std::unique_ptr<const JointEffect> Make(const std::string& kind, const std::string& keys) {
-  const toml::table table = toml::parse(keys);
-  const io::TomlReader reader(table, "test");
-  auto effect = ReadJointEffect(kind, reader);
-  reader.Finish();
-  return effect;
-}
-
 TEST(Stribeck, FadesWithSpeedAndRaisesTheBreakawayLevel) {
   const auto effect = Make("stribeck", "excess_Nm = 12.0\nspeed_radps = 0.1");
   EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = 0}), 12);
@@ -160,6 +152,85 @@ TEST(SpringBalancer, IsTheGradientOfItsSpringEnergy) {
   };
   for (const double q : {-0.7, 0.3, 1.2})
     EXPECT_NEAR(effect->Torque({.q_rad = q}), (energy(q + 1e-5) - energy(q - 1e-5)) / 2e-5, 1e-5);
+}
+
+TEST(SecondSeal, AddsCoulombAndViscousFriction) {
+  const auto effect = Make("coulomb_viscous", "level_Nm = 3.0\nviscous_Nmsprad = 2.0");
+  EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = -1}), 3);
+  EXPECT_DOUBLE_EQ(effect->Drag({.qd_radps = -1.5}), -3);
+}
+
+TEST(FilmCollapse, PeaksAtItsSpeedAndIsZeroAtRest) {
+  const auto effect = Make("stribeck_basis", "excess_Nm = 5.0\nspeed_radps = 0.2");
+  EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = 0}), 0);
+  EXPECT_DOUBLE_EQ(effect->DryLevel({.qd_radps = -0.2}), 5);
+  EXPECT_NEAR(effect->DryLevel({.qd_radps = 0.4}), 5 * 16.0 / 25.0, 1e-12);  // x = 2: 4 * 4 / 25
+  EXPECT_NEAR(effect->DryLevel({.qd_radps = 0.1}), 5 * 16.0 / 25.0, 1e-12);  // and x = 1/2 the same
+}
+
+TEST(MeasuredFriction, TakesThePlaceOfTheCoulombLevel) {
+  const auto effect = Make("friction_table", "speeds_radps = [0.0, 1.0, 2.0]\nlevels_Nm = [8.0, 4.0, 6.0]");
+  const auto level = [&](double v) { return 10 + effect->DryLevel({.qd_radps = v, .coulomb_Nm = 10}); };
+  EXPECT_DOUBLE_EQ(level(0), 8);
+  EXPECT_DOUBLE_EQ(level(-0.25), 7);
+  EXPECT_DOUBLE_EQ(level(1.5), 5);
+  EXPECT_DOUBLE_EQ(level(9), 6);
+  EXPECT_THROW(Make("friction_table", "speeds_radps = [0.0, 0.0]\nlevels_Nm = [8.0, 4.0]"), io::InputError);
+  EXPECT_THROW(Make("friction_table", "speeds_radps = [0.0, 1.0]\nlevels_Nm = [8.0]"), io::InputError);
+}
+
+TEST(Turbulence, GrowsWithTheSquareAndOpposesMotion) {
+  const auto effect = Make("viscous_quadratic", "drag_at_1radps_Nm = 0.5");
+  EXPECT_DOUBLE_EQ(effect->Drag({.qd_radps = 3}), 4.5);
+  EXPECT_DOUBLE_EQ(effect->Drag({.qd_radps = -3}), -4.5);
+}
+
+TEST(PumpingSeal, GivesEachDirectionItsOwnViscosity) {
+  const auto effect = Make("viscous_asymmetry", "forward_ratio = 1.5\nbackward_ratio = 0.75");
+  EXPECT_DOUBLE_EQ(effect->Drag({.qd_radps = 1, .viscous_Nm = 8}), 4);
+  EXPECT_DOUBLE_EQ(effect->Drag({.qd_radps = -1, .viscous_Nm = -8}), 2);
+}
+
+TEST(SofteningSeal, FallsToAnEthWithinItsTemperature) {
+  const auto effect = Make("temp_coulomb", "softening_K = 40.0\nreference_degC = 25.0");
+  EXPECT_NEAR(effect->DryLevel({.temperature_degC = 25, .coulomb_Nm = 10}), 0, 1e-12);
+  EXPECT_NEAR(10 + effect->DryLevel({.temperature_degC = 65, .coulomb_Nm = 10}), 10 * 0.36787944117144233, 1e-12);
+}
+
+TEST(ChangeInTime, TendsToItsEnd) {
+  const auto seal = Make("time_varying_coulomb", "change = 0.5\ntime_constant_s = 10.0");
+  EXPECT_DOUBLE_EQ(seal->DryLevel({.coulomb_Nm = 20, .since_s = 0}), 0);
+  EXPECT_NEAR(seal->DryLevel({.coulomb_Nm = 20, .since_s = 10}), 10 * 0.6321205588285577, 1e-12);
+  const auto oil = Make("time_varying_viscous", "change = -0.5\nhalf_time_s = 10.0");
+  EXPECT_DOUBLE_EQ(oil->Drag({.viscous_Nm = 20, .since_s = 10}), -5);
+  EXPECT_DOUBLE_EQ(oil->Drag({.viscous_Nm = 20, .since_s = 30}), -7.5);
+}
+
+TEST(EccentricMesh, ChangesTheLevelWithTheMotorsAngle) {
+  const auto effect = Make("meshing_friction", "per_motor_turn = 0.25\ndepth = 0.5\nphase_rad = 1.0");
+  const double turn = 2 * std::numbers::pi;
+  EXPECT_NEAR(effect->DryLevel({.motor_angle_rad = -4, .coulomb_Nm = 10}), 5, 1e-12);
+  EXPECT_NEAR(effect->DryLevel({.motor_angle_rad = 2 * turn - 4, .coulomb_Nm = 10}), -5, 1e-12);
+}
+
+TEST(PlacesOfARange, HaveTheirOwnFriction) {
+  const auto dent = Make("position_friction", "level_Nm = 6.0\nat_rad = 0.5\nwidth_rad = 0.2");
+  EXPECT_DOUBLE_EQ(dent->DryLevel({.q_rad = 0.5}), 6);
+  EXPECT_NEAR(dent->DryLevel({.q_rad = 0.3}), 3, 1e-12);
+  const auto film = Make("position_viscous", "eccentricity = 0.5\nat_rad = 0.5");
+  EXPECT_NEAR(film->Drag({.q_rad = 0.5, .viscous_Nm = 4}), 4, 1e-12);  // half as thick: twice the torque
+  EXPECT_NEAR(film->Drag({.q_rad = 0.5 + std::numbers::pi, .viscous_Nm = 4}), 4 / 1.5 - 4, 1e-12);
+}
+
+TEST(LoadShare, CarriesAShareOfTheLoad) {
+  EXPECT_DOUBLE_EQ(Make("load_linear", "share = -0.25")->Torque({.load_Nm = 8}), -2);
+  EXPECT_THROW(Make("load_linear", "share = 0.6"), io::InputError);
+}
+
+TEST(TightHose, PullsBeyondItsAngleOnly) {
+  const auto effect = Make("position_torque", "torque_at_1rad_Nm = 3.0\nfrom_rad = 0.2\nside = -1");
+  EXPECT_DOUBLE_EQ(effect->Torque({.q_rad = 0.3}), 0);
+  EXPECT_NEAR(effect->Torque({.q_rad = 0.2 - 4}), -3 * 8, 1e-12);
 }
 
 TEST(AnyEffect, WithAFromTime_IsNotThereBefore) {

@@ -74,6 +74,10 @@ std::string Spring(int joint, double frequency_Hz, double damping) {
   return fmt::format("stiffness_Nmprad = {}\ndamping_Nmsprad = {}\n", w * w * inertia, 2 * damping * w * inertia);
 }
 
+std::string UnequalDirections(Random&, int, double s) {
+  return fmt::format("forward_ratio = {}\nbackward_ratio = {}\n", 1 + 0.1 * s, std::max(0.0, 1 - 0.1 * s));
+}
+
 std::vector<DrawnKind> FrictionKinds() {
   return {
       {"coulomb_viscous",
@@ -115,14 +119,8 @@ std::vector<DrawnKind> FrictionKinds() {
        [](Random& r, int, double s) {
          return fmt::format("drag_at_1radps_Nm = {}\nexponent = {}\n", s, r.Uniform(2.5, 3));
        }},
-      {"viscous_asymmetry", With({"viscous_asymmetry", "viscous_quadratic"}, kOffset), kAny,
-       [](Random&, int, double s) {
-         return fmt::format("forward_ratio = {}\nbackward_ratio = {}\n", 1 + 0.1 * s, std::max(0.0, 1 - 0.1 * s));
-       }},
-      {"coulomb_asymmetry", kOffset, kAny,
-       [](Random&, int, double s) {
-         return fmt::format("forward_ratio = {}\nbackward_ratio = {}\n", 1 + 0.1 * s, std::max(0.0, 1 - 0.1 * s));
-       }},
+      {"viscous_asymmetry", With({"viscous_asymmetry", "viscous_quadratic"}, kOffset), kAny, UnequalDirections},
+      {"coulomb_asymmetry", kOffset, kAny, UnequalDirections},
       {"load_friction",
        {"load_friction", "position_friction"},
        kLoaded,

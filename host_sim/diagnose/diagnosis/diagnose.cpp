@@ -275,12 +275,8 @@ Share ShareOf(const Diagnosis::Work& w, const Chosen& c, const VectorXd& amplitu
 
 // 1.48 times the median of |e|: the standard deviation of normal noise, whatever a few large values are.
 double RobustDeviation(const VectorXd& e) {
-  std::vector<double> size(e.begin(), e.end());
-  if (size.empty()) return 0;
-  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-  for (double& v : size) v = std::abs(v);
-  std::nth_element(size.begin(), middle, size.end());
-  return 1.4826 * *middle;
+  const VectorXd size = e.cwiseAbs();
+  return 1.4826 * Median({size.begin(), size.end()});
 }
 
 // How much more likely a log is with a term than without it, twice the logarithm, over the term's joints. The largest
@@ -329,10 +325,10 @@ Chosen* WorstThanDeclared(Diagnosis::Work& w, const calibration::Dataset& log, c
   return worst->first;
 }
 
-// The term that is to go first. Else the weakest that predicts worse than the other terms do without it. A delay is not
-// compared with the other terms: they were found on logs that it had aligned. A state of a run may also be refuted by
-// the way that it takes there, another term by gaining much less than its torque on this log and its gain in training
-// promise.
+// The term that goes next: one that predicts worse than the declared model does; if there is none, the weakest that
+// predicts worse than the other terms do without it. A delay is not compared with the other terms: they were found on
+// logs that it had aligned. A state of a run may also be refuted by the way that it takes there, another term by
+// gaining much less than its torque on this log and its gain in training promise.
 Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calibration::Carried& payload,
                 const MatrixXd& before, const MatrixXd& after, std::optional<Refutation>& why) {
   const Errors error_before = ErrorsOf(w, log, before), error_after = ErrorsOf(w, log, after);
@@ -353,7 +349,6 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
     }
     if (GoesToAndFroOn(*c->candidate, amplitude.at(&*c), AtEstimate(w, others, seen), without)) {
       c->unconfirmed = "on the held-out log it goes to and fro, which a state of a run does not";
-      c->not_held_out = true;
       return &*c;
     }
     if (IsOfTheRun(*c)) continue;
@@ -366,7 +361,6 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
       c->unconfirmed =
           fmt::format("the held-out log gains {:.0f} by it, where {:.0f} was to be expected from the training logs",
                       gained, promised);
-      c->not_held_out = true;
       return &*c;
     }
   }
@@ -413,7 +407,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test, double gain_tolerance
     w.estimate = std::move(with_all);
     if (!refuted) break;
     const auto at = refuted - w.chosen.data();
-    refuted->confirmed = false;
+    refuted->confirmed = false, refuted->not_held_out = true;
     why[static_cast<std::size_t>(at)] = reason;
     w.AlignLogs();
     if (Chosen instead; !IsOfTheRun(*refuted) && OfTheRunInstead(w, *refuted, instead)) {
@@ -423,10 +417,7 @@ HeldOut Diagnosis::Judge(const calibration::Dataset& test, double gain_tolerance
   }
   if (out.payload.named) out.without_payload = Leaves(w, Confirmed(w.chosen), test, {});
   WriteTerms(w, finding_);
-  for (std::size_t k = 0; k < why.size(); ++k) {
-    finding_.terms[k].refuted = why[k];
-    if (why[k]) finding_.terms[k].not_held_out = true;
-  }
+  for (std::size_t k = 0; k < why.size(); ++k) finding_.terms[k].refuted = why[k];
   return out;
 }
 

@@ -56,7 +56,7 @@ struct Term {
   bool confirmed = true;               // false: the held-out log did not bear it out, or nobody could use it
   std::optional<Refutation> refuted;   // how the held-out log refuted it
   std::string unconfirmed;             // else why it is not confirmed
-  bool not_held_out = false;           // the held-out log refuted it, or gave that reason
+  bool not_held_out = false;           // the held-out log refuted it or gave that reason
   bool in_fit = true;                  // it is in the model that was compared; false: refuted, or not determined
 };
 

@@ -39,9 +39,7 @@ Columns Gather(const Candidate& candidate, const std::vector<Quantities>& logs, 
   }
   for (int c = 0; c < candidate.columns(eta); ++c) {
     const double width = candidate.column(c).sd;
-    const auto shows = [&](const MatrixXd& block) {
-      return block.col(c).lpNorm<Eigen::Infinity>() * width > kRounding_Nm;
-    };
+    const auto shows = [&](const MatrixXd& block) { return (block.col(c).array().abs() * width > kRounding_Nm).any(); };
     if (width > 0 && std::none_of(out.block.begin(), out.block.end(), shows))
       for (MatrixXd& block : out.block) block.col(c).setZero();
   }

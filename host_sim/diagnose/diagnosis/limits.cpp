@@ -84,9 +84,7 @@ VectorXd TypicalLimits(const std::vector<Limit>& limits, int joints) {
     std::vector<double> own;
     for (const Limit& l : limits)
       if (l.joint == j && std::isfinite(l.rms_Nm)) own.push_back(l.rms_Nm);
-    if (own.empty()) continue;
-    std::nth_element(own.begin(), own.begin() + static_cast<long>(own.size() / 2), own.end());
-    out[j] = own[own.size() / 2];
+    if (!own.empty()) out[j] = Median(std::move(own));
   }
   return out;
 }

@@ -29,7 +29,7 @@ struct Chosen {
   bool earns = true;      // its place beside the others, as last seen
   bool confirmed = true;
   std::string unconfirmed;    // why it is not, where no error of the held-out log refuted it
-  bool not_held_out = false;  // the held-out log gave that reason
+  bool not_held_out = false;  // the held-out log refuted it or gave that reason
   double delay_s = 0;         // of a term that delays the measurement: as it has been applied to the logs
 };
 

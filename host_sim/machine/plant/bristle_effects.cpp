@@ -10,26 +10,32 @@ namespace {
 
 constexpr int kCells = 24;
 
+// Elastic cells between the joint's two sides.
+class SlipsWithTheJoint : public JointEffect {
+ public:
+  std::size_t memory() const override { return cells_.count(); }
+  void Begin(const JointState& s, std::span<double> m) const override { std::fill(m.begin(), m.end(), s.q_rad); }
+  void Remember(const JointState& s, std::span<double> m) const override { cells_.Drag(s.q_rad, m); }
+
+ protected:
+  double Slip(const JointState& s) const { return cells_.At(s.q_rad, s.memory); }
+  SlippingCells cells_;
+};
+
 // Asperities of many sizes (Iwan's distribution of Jenkin elements) carry the Coulomb friction: each one is a spring
 // until it slips. Their lengths are the quantiles of an exponential distribution.
-class Asperities : public JointEffect {
+class Asperities : public SlipsWithTheJoint {
  public:
   explicit Asperities(const io::TomlReader& keys) {
     const double mean_rad = keys.Positive("length_rad");
     for (int i = 0; i < kCells; ++i) cells_.Add(1.0 / kCells, -mean_rad * std::log1p(-(i + 0.5) / kCells));
   }
   double DryLevel(const JointState& s) const override { return -s.coulomb_Nm; }
-  double Drag(const JointState& s) const override { return s.coulomb_Nm * cells_.At(s.q_rad, s.memory); }
-  std::size_t memory() const override { return cells_.count(); }
-  void Begin(const JointState& s, std::span<double> m) const override { std::fill(m.begin(), m.end(), s.q_rad); }
-  void Remember(const JointState& s, std::span<double> m) const override { cells_.Drag(s.q_rad, m); }
-
- private:
-  SlippingCells cells_;
+  double Drag(const JointState& s) const override { return s.coulomb_Nm * Slip(s); }
 };
 
 // Further friction in a few elastic parts that slip one after the other: a harmonic drive's flex spline, a cable guide.
-class SlippingParts : public JointEffect {
+class SlippingParts : public SlipsWithTheJoint {
  public:
   explicit SlippingParts(const io::TomlReader& keys) : level_Nm_(keys.Positive("level_Nm")) {
     const auto lengths = keys.Numbers("lengths_rad");
@@ -39,14 +45,10 @@ class SlippingParts : public JointEffect {
     }
     if (lengths.empty()) keys.Fail("lengths_rad", "one number or more");
   }
-  double Drag(const JointState& s) const override { return level_Nm_ * cells_.At(s.q_rad, s.memory); }
-  std::size_t memory() const override { return cells_.count(); }
-  void Begin(const JointState& s, std::span<double> m) const override { std::fill(m.begin(), m.end(), s.q_rad); }
-  void Remember(const JointState& s, std::span<double> m) const override { cells_.Drag(s.q_rad, m); }
+  double Drag(const JointState& s) const override { return level_Nm_ * Slip(s); }
 
  private:
   double level_Nm_;
-  SlippingCells cells_;
 };
 
 // LuGre: bristles of one stiffness bend by z and slip; z' = v - |v| z / g(v), torque = stiffness z + damping z'. Here

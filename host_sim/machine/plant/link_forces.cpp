@@ -99,16 +99,17 @@ class Push : public LinkForce {
   double for_s_, rise_s_;
 };
 
-}  // namespace
-
-bool IsLinkForce(const std::string& kind) {
-  return kind == "flange_hose" || kind == "flange_contact" || kind == "external_contact";
+template <class Force>
+std::unique_ptr<LinkForce> ReadForce(const io::TomlReader& keys) {
+  return std::make_unique<Force>(keys);
 }
 
-std::unique_ptr<LinkForce> ReadLinkForce(const std::string& kind, const io::TomlReader& keys) {
-  if (kind == "flange_hose") return std::make_unique<Hose>(keys);
-  if (kind == "flange_contact") return std::make_unique<Pad>(keys);
-  return std::make_unique<Push>(keys);
+}  // namespace
+
+const LinkForceReaders& AllLinkForces() {
+  static const LinkForceReaders readers{
+      {"flange_hose", ReadForce<Hose>}, {"flange_contact", ReadForce<Pad>}, {"external_contact", ReadForce<Push>}};
+  return readers;
 }
 
 }  // namespace armcal::plant

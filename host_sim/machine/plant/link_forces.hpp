@@ -3,6 +3,8 @@
 // Everything is in the base frame. A force is what the world does to the arm.
 #pragma once
 
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -25,7 +27,8 @@ class LinkForce {
   virtual bool at_flange() const { return true; }
 };
 
-bool IsLinkForce(const std::string& kind);
-std::unique_ptr<LinkForce> ReadLinkForce(const std::string& kind, const io::TomlReader& keys);
+// By kind, what makes a force of its keys.
+using LinkForceReaders = std::map<std::string, std::function<std::unique_ptr<LinkForce>(const io::TomlReader&)>>;
+const LinkForceReaders& AllLinkForces();
 
 }  // namespace armcal::plant

@@ -98,20 +98,21 @@ class Smoothing : public ReadingEffect {
   double held_[2] = {0, 0};
 };
 
-}  // namespace
-
-bool IsReadingEffect(const std::string& kind) {
-  return kind == "torque_gain_error" || kind == "torque_drift" || kind == "current_ripple" ||
-         kind == "torque_saturation" || kind == "time_delay" || kind == "torque_filter";
+template <class Effect>
+std::unique_ptr<ReadingEffect> Read(const io::TomlReader& keys) {
+  return std::make_unique<Effect>(keys);
 }
 
-std::unique_ptr<ReadingEffect> ReadReadingEffect(const std::string& kind, const io::TomlReader& keys) {
-  if (kind == "torque_gain_error") return std::make_unique<Gain>(keys);
-  if (kind == "torque_drift") return std::make_unique<ZeroDrift>(keys);
-  if (kind == "current_ripple") return std::make_unique<PhaseSensors>(keys);
-  if (kind == "torque_saturation") return std::make_unique<ConverterEnd>(keys);
-  if (kind == "time_delay") return std::make_unique<Wire>(keys);
-  return std::make_unique<Smoothing>(keys);
+}  // namespace
+
+const ReadingEffectReaders& AllReadingEffects() {
+  static const ReadingEffectReaders readers{{"torque_gain_error", Read<Gain>},
+                                            {"torque_drift", Read<ZeroDrift>},
+                                            {"current_ripple", Read<PhaseSensors>},
+                                            {"torque_saturation", Read<ConverterEnd>},
+                                            {"time_delay", Read<Wire>},
+                                            {"torque_filter", Read<Smoothing>}};
+  return readers;
 }
 
 }  // namespace armcal::plant

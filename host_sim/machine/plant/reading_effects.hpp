@@ -1,7 +1,9 @@
 // plant - computes what lies between a motor's torque and the drive's reading of it: amplifier, filter, wire.
 #pragma once
 
+#include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -20,7 +22,9 @@ class ReadingEffect {
   virtual std::unique_ptr<ReadingEffect> Copy() const = 0;
 };
 
-bool IsReadingEffect(const std::string& kind);
-std::unique_ptr<ReadingEffect> ReadReadingEffect(const std::string& kind, const io::TomlReader& keys);
+// By kind, what makes an effect of its keys.
+using ReadingEffectReaders =
+    std::map<std::string, std::function<std::unique_ptr<ReadingEffect>(const io::TomlReader&)>>;
+const ReadingEffectReaders& AllReadingEffects();
 
 }  // namespace armcal::plant

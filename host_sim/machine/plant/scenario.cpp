@@ -47,11 +47,11 @@ PayloadStep ReadPayload(const io::TomlReader& keys) {
 }
 
 std::string EffectKinds() {
-  std::string kinds =
-      "payload_step, base_tilt, rotor_inertia, belt_elasticity, joint_compliance, backlash, flange_hose, "
-      "flange_contact, external_contact, torque_gain_error, torque_drift, current_ripple, torque_saturation, "
-      "time_delay, torque_filter";
-  for (const auto& [name, reader] : AllJointEffects()) kinds += ", " + name;
+  std::string kinds = "payload_step, base_tilt, rotor_inertia, belt_elasticity, joint_compliance, backlash";
+  const auto add = [&](const auto& readers) {
+    for (const auto& [name, reader] : readers) kinds += ", " + name;
+  };
+  add(AllLinkForces()), add(AllReadingEffects()), add(AllJointEffects());
   return kinds;
 }
 
@@ -75,12 +75,12 @@ void ReadEffect(const io::TomlReader& keys, Scenario& scenario) {
     for (const Transmission& other : scenario.transmissions)
       if (other.joint == at) keys.Fail("joint", "one elastic transmission or gap a joint");
     scenario.transmissions.push_back(ReadTransmission(kind, at, keys));
-  } else if (IsLinkForce(kind)) {
-    std::shared_ptr<const LinkForce> force = ReadLinkForce(kind, keys);
+  } else if (const auto reads_force = AllLinkForces().find(kind); reads_force != AllLinkForces().end()) {
+    std::shared_ptr<const LinkForce> force = reads_force->second(keys);
     scenario.forces.push_back({kind, force->at_flange() ? -1 : joint(), force, from_s()});
-  } else if (IsReadingEffect(kind)) {
+  } else if (const auto reads = AllReadingEffects().find(kind); reads != AllReadingEffects().end()) {
     const bool one_wire = kind == "time_delay" || kind == "torque_filter";
-    scenario.readings.push_back({kind, one_wire ? joint_or_all() : joint(), ReadReadingEffect(kind, keys), from_s()});
+    scenario.readings.push_back({kind, one_wire ? joint_or_all() : joint(), reads->second(keys), from_s()});
   } else if (AllJointEffects().contains(kind)) {
     const int at = joint();
     std::shared_ptr<const JointEffect> effect = ReadJointEffect(kind, keys, at);

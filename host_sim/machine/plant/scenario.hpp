@@ -16,7 +16,8 @@
 
 namespace armcal::plant {
 
-// One undeclared effect, for a report: kind as in the scenario, joint "3", "5-6", "all", "flange" or "base".
+// One undeclared effect, for a report. kind: as in the scenario. joint: a number, or two as "5-6", or "all", "flange",
+// "base".
 struct Undeclared {
   std::string kind;
   std::string joint;

@@ -113,7 +113,7 @@ TEST(Pad, PushesAlongItsNormalAndSlipsAtTheCone) {
   const toml::table table = toml::parse(
       "at_m = [0.0, 0.0, 1.0]\nnormal = [0.0, 0.0, 2.0]\nrate_Npm = 1000.0\ndamping_Nspm = 50.0\nfriction = 0.3\n");
   const io::TomlReader keys(table, "test");
-  const auto pad = ReadLinkForce("flange_contact", keys);
+  const auto pad = AllLinkForces().at("flange_contact")(keys);
   keys.Finish();
   const KDL::Vector rest = KDL::Vector::Zero();
   EXPECT_EQ(pad->At({0, 0, 1.001}, rest, 0).Norm(), 0);

@@ -17,12 +17,15 @@ Diagnosed::Diagnosed(std::unique_ptr<codegen::Model> declared, codegen::Catalogu
   whole_ = CheckedLogs(*model, train_logs, options.cutoff_Hz, say);
   const auto start = std::chrono::steady_clock::now();
   channel_ = calibration::SeeChannel(*model, calibration::Pointers(whole_));
-  for (calibration::Dataset& log : whole_) log.channel = channel_;
+  const auto behind_channel = [this](calibration::Dataset log) {
+    log.channel = channel_;
+    calibration::UseWhatMoved(log);
+    return log;
+  };
+  for (calibration::Dataset& log : whole_) log = behind_channel(std::move(log));
   for (const calibration::Dataset& log : whole_) train.push_back(calibration::ThinToBand(log));
-  for (const calibration::Dataset& log : NarrowLogs(*model, train_logs, options.cutoff_Hz)) {
-    narrow_.push_back(calibration::ThinToBand(log));
-    narrow_.back().channel = channel_;
-  }
+  for (calibration::Dataset& log : NarrowLogs(*model, train_logs, options.cutoff_Hz))
+    narrow_.push_back(calibration::ThinToBand(behind_channel(std::move(log))));
   diagnosis = std::make_unique<diagnosis::Diagnosis>(*model, catalogue, calibration::Pointers(train),
                                                      calibration::Pointers(narrow_), options.at_turns);
   view.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -38,6 +41,7 @@ void Diagnosed::Judge(const logs::Log& log, const std::string& robot, const std:
   const diagnosis::Finding& finding = diagnosis->finding();
   test = std::move(CheckedLogs(*model, {log}, options.cutoff_Hz, say)[0]);
   test.channel = channel_;
+  calibration::UseWhatMoved(test);
   held_out = diagnosis->Judge(test, options.gain_tolerance);
   view.motion = calibration::CompareMotion(*model, finding.declared, calibration::Pointers(train), test);
   if (view.motion.repeats()) diagnosis->ConfirmNothing(verdict::MotionText(view.motion)[0]);

@@ -155,30 +155,8 @@ Gain Metric::Try(const Projection& p) const {
   return gain;
 }
 
-double Metric::CurveEvidence(const Projection& p, MatrixXd* precision) const {
-  const int k = static_cast<int>(p.g.size());
-  const MatrixXd S = p.gram - p.B.transpose() * factor_.solve(p.B);
-  double best = 0;
-  for (const double length : {0.1, 1.5}) {  // in knots: coefficients of their own, or neighbours alike
-    MatrixXd alike(k, k);
-    for (int i = 0; i < k; ++i)
-      for (int m = 0; m < k; ++m) alike(i, m) = std::exp(-0.5 * std::pow((i - m) / length, 2)) + 1e-4 * (i == m);
-    const Eigen::LLT<MatrixXd> factor(alike);
-    const MatrixXd root = factor.matrixL();
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(root.transpose() * S * root));
-    const VectorXd seen = eigen.eigenvalues().cwiseMax(0),
-                   u = eigen.eigenvectors().transpose() * (root.transpose() * p.g);
-    if (seen[k - 1] <= 0) return 0;
-    for (int doubled = 0; doubled < 34; ++doubled) {
-      const double size2 = std::ldexp(0.1 / seen[k - 1], doubled);
-      double evidence = 0;
-      for (int i = 0; i < k; ++i) evidence += u[i] * u[i] * size2 / (1 + size2 * seen[i]) - std::log1p(size2 * seen[i]);
-      if (evidence <= best) continue;
-      best = evidence;
-      if (precision) *precision = factor.solve(MatrixXd::Identity(k, k)) / size2;
-    }
-  }
-  return best;
+CurveOdds Metric::OddsOf(const Projection& p, int inner) const {
+  return {p.gram - p.B.transpose() * factor_.solve(p.B), p.g, inner};
 }
 
 VectorXd Metric::FoldGains(const Columns& c, int blocks, int folds, const MatrixXd& precision) const {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "host_sim/diagnose/diagnosis/curve_odds.hpp"
 #include "host_sim/diagnose/diagnosis/noise.hpp"
 
 namespace armcal::diagnosis {
@@ -68,10 +69,8 @@ class Metric {
   Projection Project(const Columns& c) const;
   Gain Try(const Projection& p) const;
   Gain Try(const Columns& c) const { return Try(Project(c)); }
-  // Twice the log evidence of a curve, its coefficients' size and smoothness as the data like them best: gain less what
-  // the freedom that is really used would gain by chance. precision: of the coefficients, where that evidence is
-  // largest.
-  double CurveEvidence(const Projection& p, Eigen::MatrixXd* precision = nullptr) const;
+  // Of a curve with these columns, `inner` of them in a row.
+  CurveOdds OddsOf(const Projection& p, int inner) const;
   // No bounded parameter of the joints given leaves its range at g (by more than 2 standard deviations).
   bool InBounds(const Gain& g, const std::vector<int>& joints) const;
   const Eigen::VectorXd& Residual(int j) const { return residual_[static_cast<std::size_t>(j)]; }  // whitened

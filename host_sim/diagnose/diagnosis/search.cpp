@@ -54,8 +54,10 @@ Found Searcher::Finish(const Found& rough) {
 Found Searcher::Scored() const {
   Found f = best_;
   f.penalty = PenaltyOf(f.gain.rank + f.searched, c_, e_);
-  if (f.gain.gain > 0 && c_.record().search.how == codegen::SearchWay::kSpline)
-    f.penalty = f.gain.gain - metric().CurveEvidence(seen_, &f.precision);
+  if (f.gain.gain > 0 && c_.record().search.how == codegen::SearchWay::kSpline) {
+    const int rows = c_.is_surface() ? static_cast<int>(c_.record().linear.size()) : 1;
+    f.curve = std::make_shared<CurveOdds>(metric().OddsOf(seen_, static_cast<int>(seen_.g.size()) / rows));
+  }
   Rate(f, f.gain.gain);
   return f;
 }
@@ -204,8 +206,9 @@ double PenaltyOf(int parameters, const Candidate& candidate, const Evidence& evi
 }
 
 double PriceOf(const Found& found, double gain) {
+  if (found.curve) return gain - found.curve->Evidence(gain);
   const int parameters = found.gain.rank + found.searched;
-  if (found.candidate->record().search.how == codegen::SearchWay::kSpline || parameters == 0) return found.penalty;
+  if (parameters == 0) return 0;
   return std::min(found.penalty, parameters * std::max(1.0, std::log(std::max(gain, 1e-300) / parameters)));
 }
 
@@ -230,6 +233,7 @@ double GainOfScore(const Found& found) {
 
 void Rate(Found& found, double gain) {
   found.rated = gain, found.score = Score(found, gain), found.log_chance = LogChance(found, gain);
+  if (found.curve) (void)found.curve->Evidence(gain, &found.precision);
 }
 
 double LogUpperTail(int degrees, double x) {
@@ -245,7 +249,7 @@ double LogUpperTail(int degrees, double x) {
 
 double LogChance(const Found& found, double gain) {
   const double own = found.candidate->record().generic_penalty;
-  if (found.candidate->is_curve()) return -0.5 * (Score(found, gain) + own);
+  if (found.curve) return -0.5 * (Score(found, gain) + own);
   // What was searched moves with the noise as an amplitude does.
   const int degrees = std::max(1, found.gain.rank + found.searched);
   return std::log(found.tried) + LogUpperTail(degrees, gain - own);

@@ -1,6 +1,7 @@
 // diagnosis - finds the best nonlinear parameters of a candidate, in the way that its record asks for.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "host_sim/diagnose/diagnosis/candidate.hpp"
@@ -21,19 +22,21 @@ struct Found {
   Candidate* candidate = nullptr;
   std::vector<double> eta;
   Gain gain;
-  double tried = 1;           // members of the grid: many tries find something by chance
-  int searched = 0;           // unknowns that were searched; they count as parameters
-  bool rough = false;         // the gain of all rows is estimated from the thinned ones
-  Eigen::MatrixXd precision;  // of a curve's coefficients; empty for others
-  double penalty = 0;         // what its parameters cost; at most, if it is no curve
-  double rated = 0;           // the gain that score and chance stand for
+  double tried = 1;                        // members of the grid: many tries find something by chance
+  int searched = 0;                        // unknowns that were searched; they count as parameters
+  bool rough = false;                      // the gain of all rows is estimated from the thinned ones
+  std::shared_ptr<const CurveOdds> curve;  // null for others
+  Eigen::MatrixXd precision;               // of a curve's coefficients; empty for others
+  double penalty = 0;                      // what its parameters cost at most; not of a curve
+  double rated = 0;                        // the gain that score and chance stand for
   double score = 0;
   double log_chance = 0;
 };
 
 // What its parameters cost. Of k parameters each costs ln(gain / k), as under a prior whose width makes the gain the
 // likeliest (local empirical Bayes), at least 1, and at most ln(rows). With ln(rows) alone a true term of three
-// parameters that gains 40 loses to an untrue one of one parameter that gains 23.
+// parameters that gains 40 loses to an untrue one of one parameter that gains 23. A curve costs its gain less its
+// evidence.
 double PriceOf(const Found& found, double gain);
 // gain - price - 2 ln(tried) - the record's own penalty.
 double Score(const Found& found, double gain);

@@ -33,6 +33,7 @@ constexpr double kNear = 0.05;             // of a score: the logs do not tell w
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr double kLogSurely = -11.5;       // of a chance, for what imitates much else or loses more than that
 constexpr double kAsLarge = 0.5;           // of what it would gain there if it was as large as it seemed
+constexpr double kMoreLag = 0.02, kMoreDelay_s = 5e-4;  // of a channel's lag; so little that the torque follows it
 constexpr int kSharpenings = 3;
 constexpr double kNothing = 6;            // a gain that chance often has
 constexpr double kCauseExplains = 0.9;    // of what a curve explains: forms differ a little from any record
@@ -277,7 +278,7 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
     if (!simpler.empty() && before == something.end()) continue;
     const Found f = SearchCandidate(*c, grounds.ground(), simpler.empty() ? nullptr : &before->second);
     gain_[c] = std::max(gain_[c], f.gain.gain);
-    if (whitened && f.gain.gain > kNothing && !c->is_curve() && !c->is_event()) {
+    if (whitened && f.gain.gain > kNothing && !c->is_event()) {
       const double gain = whitened->Try(GatherColumns(*c, w_.evidence, f.eta)).gain;
       if (LogChance(f, gain) < kLogLikely) screened.emplace_back(Score(f, gain), f);
     }
@@ -353,29 +354,70 @@ bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& t
 // gains about as much when they are derived with a lower bandwidth. A term of high frequencies loses more: it must then
 // be acceptable there, too, and as large as before.
 bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
-                                     const std::vector<NoiseModel>& noise) {
+                                     const Metric& wide) {
   if (!w_.narrow) return true;
   Diagnosis::Work& narrow = *w_.narrow;
   narrow.estimate = w_.estimate;
   narrow.FollowEstimate(w_.Reads(terms, f.candidate));
   narrow.Prepare(terms);
-  const Metric metric(narrow.rows, noise);
+  const Metric metric(narrow.rows, wide.noise());
   const Columns c = GatherColumns(*f.candidate, narrow.evidence, f.eta);
   const double left = metric.Try(c).gain;
   if (left > kStays * gain.gain) return true;
   return LogChance(f, left) < kLogSurely && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second &&
-         MotionIsClean(f.candidate->rows());
+         IsOfTheMotion(f, wide);
 }
 
-// The noise of the derivation is in the logs at every bandwidth, and what smooths it looks like elasticity. If it
-// biases the rows of these joints, a term cannot be told from it.
-bool Selector::MotionIsClean(const std::vector<int>& joints) const {
+// The noise of the derivation is in the logs at every bandwidth, and what smooths it looks like elasticity. Far below
+// the bandwidth hardly any of it is left: a term must show along that motion, too. And if the noise biases the rows of
+// these joints, a term cannot be told from it.
+bool Selector::IsOfTheMotion(const Found& f, const Metric& wide) const {
+  const std::vector<calibration::Dataset> smooth = calibration::SmoothedInstruments(w_.train);
+  Evidence along{&w_.model, {}, w_.evidence.index};
+  const std::set<codegen::InputId> reads = w_.Reads({}, f.candidate);
+  for (const calibration::Dataset& log : smooth) {
+    along.logs.push_back(MakeQuantities(w_.model, log, reads));
+    Follow(w_.model, w_.arm, w_.estimate.x, w_.declared.eta, reads, along.logs.back());
+  }
+  if (LogChance(f, wide.Try(GatherColumns(*f.candidate, along, f.eta)).gain) > kLogSurely) return false;
   VectorXd z(w_.model.columns() + w_.model.nonlinear());
   z << w_.estimate.x.head(w_.model.columns()), VectorXd::Map(w_.declared.eta.data(), w_.model.nonlinear());
-  const calibration::Exogeneity e =
-      calibration::TestExogeneity(w_.model, w_.train, calibration::SmoothedInstruments(w_.train), z);
+  const calibration::Exogeneity e = calibration::TestExogeneity(w_.model, w_.train, smooth, z);
+  const std::vector<int>& joints = f.candidate->rows();
   return std::all_of(joints.begin(), joints.end(),
                      [&](int j) { return e.joint[static_cast<std::size_t>(j)].exogenous; });
+}
+
+// Lag and delay of a torque channel are estimates. Where they are a little wrong, every step of the torque leaves an
+// error, and that looks like friction at turns. So a term must show beside what a little more of each changes.
+bool Selector::ShowsBesideChannel(const Found& f, const Columns& columns, const Metric& metric) const {
+  if (w_.train[0]->channel.empty()) return true;
+  const auto joints = static_cast<Eigen::Index>(columns.joints.size());
+  Columns all{columns.joints, {}};
+  for (const int j : columns.joints)
+    all.block.emplace_back(MatrixXd::Zero(w_.evidence.index[static_cast<std::size_t>(j)].size(), 2 * joints));
+  const auto torque = [this](calibration::Dataset log, double more_lag, double more_delay_s) {
+    for (calibration::JointChannel& c : log.channel)
+      if (!c.empty()) c.lag_s *= 1 + more_lag, c.late_s += more_delay_s;
+    return MatrixXd(calibration::Predict(w_.model, log, w_.estimate.x, w_.declared.eta));
+  };
+  for (std::size_t log = 0; log < w_.train.size(); ++log) {
+    const MatrixXd as_told = torque(*w_.train[log], 0, 0);
+    const MatrixXd by[] = {(torque(*w_.train[log], kMoreLag, 0) - as_told) / kMoreLag,
+                           (torque(*w_.train[log], 0, kMoreDelay_s) - as_told) / kMoreDelay_s};
+    for (Eigen::Index r = 0; r < joints; ++r)
+      for (Eigen::Index c = 0; c < 2; ++c) {
+        const auto j = static_cast<std::size_t>(columns.joints[static_cast<std::size_t>(r)]);
+        w_.evidence.index[j].Take(static_cast<int>(log), by[c].col(static_cast<Eigen::Index>(j)),
+                                  all.block[static_cast<std::size_t>(r)].col(2 * r + c));
+      }
+  }
+  const double alone = metric.Try(all).gain;
+  for (std::size_t r = 0; r < all.block.size(); ++r) {
+    all.block[r].conservativeResize(Eigen::NoChange, 2 * joints + columns.count());
+    all.block[r].rightCols(columns.count()) = columns.block[r];
+  }
+  return LogChance(f, metric.Try(all).gain - alone) < kLogSurely;
 }
 
 // Near turns and at rest least is known of friction, and much that is not there fits what is left of it. So what is not
@@ -412,7 +454,9 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   const Metric metric(w_.rows, noise);
   const Gain gain = metric.Try(c);
   const VectorXd folds = metric.FoldGains(c, kBlocks, kFolds, f.precision);
-  const double kept = folds.sum() / gain.gain, without_best = kept - folds.maxCoeff() / gain.gain;
+  // What a curve's freedom gains by chance is not kept.
+  const double gained = f.curve ? f.curve->Evidence(gain.gain) : gain.gain;
+  const double kept = folds.sum() / gained, without_best = kept - folds.maxCoeff() / gained;
   const bool holds = kept > kKeepsOutOfFold && without_best > kKeepsWithoutBest;
   const bool once = std::find(bursts_.begin(), bursts_.end(), f.candidate) != bursts_.end();
   if (!holds && !f.candidate->is_event() && !once) {
@@ -428,12 +472,16 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     refused_[f.candidate] = why;
     return false;
   }
-  if (!StaysAtLowerBandwidth(f, terms, gain, noise)) {
+  if (!StaysAtLowerBandwidth(f, terms, gain, metric)) {
     refused_[f.candidate] = "it does not keep its gain where speed and acceleration are derived with a lower bandwidth";
     return false;
   }
   if (!ShowsInSliding(f, c, noise)) {
     refused_[f.candidate] = "it shows near turns and at rest only";
+    return false;
+  }
+  if (!ShowsBesideChannel(f, c, metric)) {
+    refused_[f.candidate] = "a torque channel that is a little later or earlier explains it";
     return false;
   }
   bool on_bound = false;

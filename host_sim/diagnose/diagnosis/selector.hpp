@@ -39,8 +39,9 @@ class Selector {
   // Best first: by score, but a named cause before a curve that explains little more.
   void Sort(std::vector<Found>& ranked);
   bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
-                             const std::vector<NoiseModel>& noise);
-  bool MotionIsClean(const std::vector<int>& joints) const;
+                             const Metric& wide);
+  bool IsOfTheMotion(const Found& f, const Metric& wide) const;
+  bool ShowsBesideChannel(const Found& f, const Columns& columns, const Metric& metric) const;
   bool ShowsInSliding(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const;
   bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
               std::size_t k, Chosen& out);

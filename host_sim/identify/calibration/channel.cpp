@@ -33,6 +33,7 @@ constexpr double kDelayStep_s = 0.005;
 constexpr int kHalvings = 6;
 constexpr int kMostLags = 2;
 constexpr double kDelaysDiffer = 0.2;  // of the mean: delays that differ by less are one
+constexpr double kBesideStep = 1.5;    // samples: a step between two samples leaves an error in both
 
 // One joint's row of the declared model over all logs.
 struct Row {
@@ -198,6 +199,22 @@ MatrixXd ThroughChannel(const Dataset& data, MatrixXd torque) {
 void PassThroughChannel(const Dataset& data, std::vector<MatrixXd>& regressor) {
   for (std::size_t j = 0; j < regressor.size() && !data.channel.empty(); ++j)
     for (auto column : regressor[j].colwise()) column = ThroughChannel(data, static_cast<int>(j), column);
+}
+
+void UseWhatMoved(Dataset& data) {
+  const double step_s = 1 / data.rate_Hz(), beside_s = kBesideStep * step_s;
+  for (std::size_t j = 0; j < data.channel.size(); ++j) {
+    const double late_s = data.channel[j].late_s;
+    const auto column = static_cast<Index>(j);
+    if (late_s == 0 || data.averaged(static_cast<int>(j))) continue;
+    Index first = 0;
+    for (Index k = 0; k < data.samples(); ++k) {
+      const double at_s = data.s.t[k] - late_s;
+      while (first < k && data.s.t[first] < at_s - beside_s) ++first;
+      for (Index i = first; i <= k && data.s.t[i] <= at_s + beside_s; ++i)
+        if (!data.moving(i, column)) data.used(k, column) = 0;
+    }
+  }
 }
 
 TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Dataset*>& logs) {

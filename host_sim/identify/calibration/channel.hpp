@@ -19,6 +19,9 @@ Eigen::MatrixXd ThroughChannel(const Dataset& data, Eigen::MatrixXd torque);
 // The columns [N x columns] of each joint's row of the regressor, in place.
 void PassThroughChannel(const Dataset& data, std::vector<Eigen::MatrixXd>& regressor);
 
+// A row shows what its joint did late_s before. Does not use it if the joint was at rest or turned at about that time.
+void UseWhatMoved(Dataset& data);
+
 // The channel of all joints that leaves least where each joint's row of the regressor is fitted by itself, with
 // parameters of its own: only motion and torque of that joint decide. Empty unless most of the joints that move show a
 // low-pass, or delays that differ. One joint alone may have another cause, and a delay that all share is an effect

@@ -114,5 +114,22 @@ TEST(Channel, AFitThroughTheChannel_GivesTheParametersOfTheTorqueBeforeIt) {
   EXPECT_EQ(viscous, 6);
 }
 
+// Rows from 0.18 s on show what the joint did from 0.15 s on, when it rested. The step is 8 ms.
+TEST(Channel, ARowThatShowsARest_IsNotUsed) {
+  Arm a;
+  a.log.used.setOnes(), a.log.moving.setOnes();
+  const auto rests = [](double t) { return t > 0.15 && t < 0.25; };
+  for (Index k = 0; k < a.log.samples(); ++k) a.log.moving(k, 2) = !rests(a.log.s.t[k]);
+  a.log.channel.assign(6, {});
+  a.log.channel[2].late_s = 0.03;
+  UseWhatMoved(a.log);
+  for (Index k = 0; k < a.log.samples(); ++k) {
+    const double t = a.log.s.t[k];
+    if (t > 0.18 && t < 0.28) EXPECT_EQ(a.log.used(k, 2), 0) << t;
+    if (t < 0.16 || t > 0.30) EXPECT_EQ(a.log.used(k, 2), 1) << t;
+  }
+  EXPECT_EQ(a.log.used.sum() + a.log.samples() - a.log.used.col(2).sum(), 6 * a.log.samples());  // no other joint's
+}
+
 }  // namespace
 }  // namespace armcal::calibration

@@ -172,6 +172,14 @@ std::string WrongUse(const CLI::App& app, int argc, const char* const* argv, con
   return program + ": " + what + "; see " + program + " --help";
 }
 
+void CheckOutputs(const CLI::App& app) {
+  for (const CLI::App* verb : app.get_subcommands())
+    for (const char* name : {"--json", "--report", "--model-out", "--table-out", "--payload-out", "--ros-out"})
+      if (const CLI::Option* option = verb->get_option_no_throw(name); option != nullptr && option->count() > 0)
+        for (const std::string& path : option->results())
+          if (!path.empty()) io::CheckWritable(path);
+}
+
 CLI::Validator OneOf(const std::vector<std::string>& words) {
   std::string expected;
   for (std::size_t k = 0; k < words.size(); ++k)

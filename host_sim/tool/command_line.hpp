@@ -33,6 +33,9 @@ CLI::Validator Between(Number low, Number high) {
   return check;
 }
 
+// The files that this command line asks for can be written: some verbs work for minutes first. InputError: one cannot.
+void CheckOutputs(const CLI::App& app);
+
 // armcal pages: manual pages and the words that bash completes, written from the definition of `app`.
 void AddPages(CLI::App& app, std::function<int()>& action);
 

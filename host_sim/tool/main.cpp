@@ -45,6 +45,7 @@ int Main(int argc, char** argv) {
   AddPages(app, action);
   try {
     app.parse(argc, argv);
+    CheckOutputs(app);
     return action();
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e), kOk;  // --help, --version

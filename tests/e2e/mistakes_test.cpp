@@ -346,6 +346,8 @@ TEST_F(Mistakes, WhereToWrite) {
   const std::string convert = "convert {}/good.csv --channels {}/map.toml --out ";
   MakeAll({
       {convert + "{}/folder", {"{}/folder: cannot be written"}, {"choose another place"}},
+      {"survey --report {}/folder", {"{}/folder: cannot be written: Is a directory"}, {"choose another place"}},
+      {"bench --robot er20_like --json {}/good.csv/x.json", {"x.json: cannot be written: Not a directory"}, {"choose"}},
       {convert + "{}/good.csv/x.csv", {"x.csv: cannot be written: Not a directory"}, {"choose another place"}},
       {convert + "/proc/armcal.csv", {"/proc/armcal.csv: cannot be written"}, {"choose another place"}},
       {"generate --robot er20_like --out {}/good.csv", {"good.csv: this folder cannot be made"}, {"another place"}},

@@ -18,6 +18,26 @@ void MakeFolder(const std::filesystem::path& folder) {
     throw InputError(folder.string() + ": this folder cannot be made: " + error.message() + "; choose another place");
 }
 
+namespace {
+InputError CannotBeWritten(const std::filesystem::path& path, const std::error_code& error) {
+  const std::string why = error ? ": " + error.message() : "";
+  return InputError(path.string() + ": cannot be written" + why + "; choose another place");
+}
+}  // namespace
+
+void CheckWritable(const std::filesystem::path& path) {
+  std::error_code none;
+  if (std::filesystem::is_directory(path, none))
+    throw CannotBeWritten(path, std::make_error_code(std::errc::is_a_directory));
+  // Of the folders above it the nearest that is there decides; the others can be made in it.
+  std::filesystem::path above = std::filesystem::absolute(path).parent_path();
+  while (!std::filesystem::exists(std::filesystem::symlink_status(above, none)) && above.has_relative_path())
+    above = above.parent_path();
+  if (!std::filesystem::is_directory(above, none))
+    throw CannotBeWritten(path, std::make_error_code(std::errc::not_a_directory));
+  if (access(above.c_str(), W_OK) != 0) throw CannotBeWritten(path, {errno, std::generic_category()});
+}
+
 void AtomicWrite(const std::filesystem::path& path, std::string_view bytes) {
   std::error_code error;
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), error);
@@ -29,9 +49,9 @@ void AtomicWrite(const std::filesystem::path& path, std::string_view bytes) {
   error = out ? std::error_code() : std::error_code(errno, std::generic_category());
   if (out) std::filesystem::rename(part, path, error);
   if (out && !error) return;
-  const std::string why = error ? ": " + error.message() : "";
+  const InputError cannot = CannotBeWritten(path, error);
   std::filesystem::remove(part, error);
-  throw InputError(path.string() + ": cannot be written" + why + "; choose another place");
+  throw cannot;
 }
 
 }  // namespace armcal::io

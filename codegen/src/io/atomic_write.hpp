@@ -9,6 +9,10 @@ namespace armcal::io {
 // With its parents, if they are missing. InputError: cannot be made.
 void MakeFolder(const std::filesystem::path& folder);
 
+// What AtomicWrite would say of this path, before the work that makes the bytes. InputError: the path is a folder, or
+// what it lies in is no folder or cannot be written to. Nothing is made.
+void CheckWritable(const std::filesystem::path& path);
+
 // Writes the bytes beside the target and renames the file, so that no reader sees a part of it. Missing parent folders
 // are made. InputError: cannot be written; the old file is still there.
 void AtomicWrite(const std::filesystem::path& path, std::string_view bytes);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "codegen/src/io/atomic_write.hpp"
 #include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::files {
@@ -62,6 +63,21 @@ TEST(Files, AtomicWrite_WhereItCannot_LeavesNoPartAndKeepsTheOld) {
   WriteWholeFile(folder / "file", "text");
   EXPECT_EQ(ErrorOf([&] { WriteWholeFile(folder / "file/below.csv", "text"); }),
             (folder / "file/below.csv").string() + ": cannot be written: Not a directory; choose another place");
+}
+
+TEST(Files, CheckWritable_SaysBeforeWhatAWriteSaysAfter_AndMakesNothing) {
+  const TemporaryFolder folder;
+  WriteWholeFile(folder / "file", "text");
+  std::filesystem::create_directories(folder / "target/inside");
+  for (const char* bad : {"target", "file/below.csv", "file/far/below.csv"}) {
+    const std::string before = ErrorOf([&] { io::CheckWritable(folder / bad); });
+    EXPECT_NE(before, "") << bad;
+    EXPECT_EQ(before, ErrorOf([&] { io::AtomicWrite(folder / bad, "text"); }));
+  }
+  for (const char* good : {"file", "new.csv", "new/folder/new.csv"})
+    EXPECT_EQ(ErrorOf([&] { io::CheckWritable(folder / good); }), "") << good;
+  EXPECT_FALSE(std::filesystem::exists(folder / "new"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "new.csv"));
 }
 
 TEST(Files, ReadWholeFile_GzipCutShort_IsRefused) {

@@ -103,7 +103,10 @@ fi
 
 say "building build/host"
 programs=(all)
-[[ $scope == long ]] && programs+=(long_tests)
+if [[ $scope == long ]]; then
+  programs+=(long_tests)
+  step "fleet packages" toolchains/install.sh fleet
+fi
 step "build host" configure_and_build host --target "${programs[@]}" || finish
 run_ctest "tests ($scope)" build/host "$labels"
 

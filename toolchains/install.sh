@@ -3,6 +3,7 @@
 #   toolchains/install.sh host    compiler, libraries and tests of the PC side
 #   toolchains/install.sh cross   compiler of the Cortex-M images
 #   toolchains/install.sh fuzz    clang with libFuzzer, for the long tests
+#   toolchains/install.sh fleet   Slurm and GNU parallel, for the long tests
 #   toolchains/install.sh peers   Python, its headers, pip, a browser, colcon and stunnel, for tests/run.sh peers
 #   toolchains/install.sh docs    Sphinx and Doxygen, for the target docs_site
 # Does nothing when all is there. Needs root or sudo only when something is missing.
@@ -15,6 +16,7 @@ host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
 cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   qemu-system-arm python3)
 fuzz_packages=(clang libclang-rt-dev)
+fleet_packages=(slurmctld slurmd slurm-client munge parallel)
 peers_packages=(python3 python3-dev python3-venv python3-pip chromium colcon python3-colcon-cmake python3-colcon-ros
   stunnel4 openssl)
 docs_packages=(python3 python3-sphinx python3-myst-parser doxygen)
@@ -23,9 +25,10 @@ case "${1:-}" in
   host) wanted=("${host_packages[@]}") ;;
   cross) wanted=("${cross_packages[@]}") ;;
   fuzz) wanted=("${fuzz_packages[@]}") ;;
+  fleet) wanted=("${fleet_packages[@]}") ;;
   peers) wanted=("${peers_packages[@]}") ;;
   docs) wanted=("${docs_packages[@]}") ;;
-  *) sed -n '2,8p' "$0" >&2; exit 2 ;;
+  *) sed -n '2,9p' "$0" >&2; exit 2 ;;
 esac
 
 missing=()

@@ -1,6 +1,7 @@
 // tool - armcal diagnose: finds in the training logs what the model lacks, and judges it on the test log.
 #include <fmt/core.h>
 #include <algorithm>
+#include <cstdio>
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
@@ -90,6 +91,11 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
           "joint {}: the friction that was found would push beyond the logs; in {} it starts from zero, and armcal "
           "identify fits it within what a drive takes\n",
           j + 1, o.model_out);
+  if (!o.report.empty()) {
+    verdict::WriteDiagnosisPage(o.report, json);
+    fmt::print("report: {}\n", o.report);
+  }
+  std::fflush(stdout);
   WriteJson(o.json, json);
   return run;
 }
@@ -101,10 +107,6 @@ int RunOneDiagnosis(const DiagnoseOptions& o) {
     throw io::InputError("expected --robot, --train and --test, or --batch, or --splits, or --summary");
   const auto run = RunDiagnosis(o);
   KeepVerdicts(o.fleet, {{o.arm.empty() ? run->model->robot().name : o.arm, run->json}});
-  if (!o.report.empty()) {
-    verdict::WriteDiagnosisPage(o.report, run->json);
-    fmt::print("report: {}\n", o.report);
-  }
   return kOk;
 }
 

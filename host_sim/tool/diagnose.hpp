@@ -20,7 +20,8 @@ struct DiagnoseOptions {
   analysis::DiagnoseOptions how = {};
 };
 
-// Train, decide, write the model file and take its hash; only then open the held-out log. Prints the verdict.
+// Train, decide, write the model file and take its hash; only then open the held-out log. Prints the verdict. The JSON
+// is written last: who finds it finds the other files and the whole output, too.
 std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& options);
 
 // --batch: the logs of many arms. --splits: every run of one arm held out once. (diagnose_batch.cpp)
@@ -28,6 +29,7 @@ struct BatchOptions {
   std::string folder, out, part;
   std::vector<std::string> summary, splits;
   int jobs = 0;
+  bool resume = false;
   bool asked() const { return !folder.empty() || !summary.empty() || !splits.empty(); }
 };
 

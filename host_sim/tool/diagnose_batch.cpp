@@ -40,8 +40,10 @@ std::string Reason(const fs::path& log, int code) {
   return last.starts_with(mark) ? last.substr(mark.size()) : fmt::format("ended with code {}", code);
 }
 
-nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& one, const fs::path& out) {
-  const auto file = [&](const char* end) { return (out / (c.name + end)).string(); };
+nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& one, const BatchOptions& batch) {
+  const auto file = [&](const char* end) { return (fs::path(batch.out) / (c.name + end)).string(); };
+  if (batch.resume && fs::is_regular_file(file(".json")))
+    if (const auto kept = verdict::ReadVerdict(file(".json")); kept["verdict"] != "failed") return kept;
   for (const char* end : {".json", ".html", ".toml", ".log"}) fs::remove(file(end));
   std::string why = c.train.empty()   ? "no train log"
                     : c.test.empty()  ? "no test log"
@@ -69,16 +71,16 @@ nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& o
   return verdict::FailedVerdict(why);
 }
 
-// NAME.json, .html, .toml and .log of each case go to `out`. one: how each log is read. jobs: at a time; 0: one a core.
-verdict::Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const DiagnoseOptions& one, const fs::path& out,
-                              int jobs) {
-  io::MakeFolder(out);
+// NAME.json, .html, .toml and .log of each case go to the batch's folder. one: how each log is read.
+verdict::Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const DiagnoseOptions& one,
+                              const BatchOptions& batch) {
+  io::MakeFolder(batch.out);
   verdict::Verdicts verdicts;
   report::Progress progress(fmt::format("{} logs", cases.size()));
   std::mutex mutex;
-  search::InParallel(static_cast<int>(cases.size()), jobs, [&](int k) {
+  search::InParallel(static_cast<int>(cases.size()), batch.jobs, [&](int k) {
     const DiagnosisCase& c = cases[static_cast<std::size_t>(k)];
-    const nlohmann::ordered_json verdict = Diagnose(c, one, out);
+    const nlohmann::ordered_json verdict = Diagnose(c, one, batch);
     const std::lock_guard lock(mutex);
     verdicts[c.name] = verdict;
     if (!c.test.empty()) KeepVerdicts(one.fleet, {{c.name, verdict}}, {{c.name, c.test[0]}});
@@ -229,7 +231,7 @@ verdict::Comparison CompareSplits(const DiagnoseOptions& one, const std::vector<
 // one name.
 int RunSplits(const DiagnoseOptions& one, const BatchOptions& options) {
   const std::vector<DiagnosisCase> cases = MakeSplits(options.splits, one.robot);
-  const verdict::Verdicts verdicts = DiagnoseAll(cases, one, options.out, options.jobs);
+  const verdict::Verdicts verdicts = DiagnoseAll(cases, one, options);
   const verdict::Agreed agreed = verdict::Agree(verdicts, CompareSplits(one, cases, verdicts));
   fmt::print("{}", verdict::SplitsText(verdicts, agreed));
   nlohmann::ordered_json json = verdict::SplitsJson(verdicts, agreed);
@@ -249,13 +251,18 @@ int RunSplits(const DiagnoseOptions& one, const BatchOptions& options) {
 }  // namespace
 
 void AddBatchOptions(CLI::App& verb, BatchOptions& b) {
-  verb.add_option("--batch", b.folder,
-                  std::string("diagnose a folder of logs: ") + kLayout +
-                      "; the robot is the folder's robot.toml, or --robot, or the batch's robot.toml");
+  auto* folder =
+      verb.add_option("--batch", b.folder,
+                      std::string("diagnose a folder of logs: ") + kLayout +
+                          "; the robot is the folder's robot.toml, or --robot, or the batch's robot.toml");
   verb.add_option("--out", b.out,
                   "with --batch, --splits: NAME.json, .html, .toml and .log of each log go to this folder");
   verb.add_option("--jobs", b.jobs, "with --batch, --splits: logs at a time; 0: one a core");
   verb.add_option("--part", b.part, "with --batch: K/N, every N-th log beginning with the K-th, for independent jobs");
+  verb.add_flag("--resume", b.resume,
+                "with --batch: a log whose verdict is in --out keeps it, so a job that was killed goes on where it "
+                "stopped; a log that failed is diagnosed again")
+      ->needs(folder);
   verb.add_option("--summary", b.summary,
                   "merge verdicts (files, or folders of them) that were written before; with --batch, logs of that "
                   "folder without a verdict are named");
@@ -270,7 +277,7 @@ int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch) {
   if (!batch.splits.empty()) return RunSplits(one, batch);
   const verdict::Verdicts verdicts =
       batch.summary.empty()
-          ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part), one, batch.out, batch.jobs)
+          ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part), one, batch)
           : Collect(batch, one);
   if (!batch.summary.empty()) KeepVerdicts(one.fleet, verdict::ReadVerdicts(batch.summary));  // without missing ones
   const nlohmann::ordered_json summary = verdict::SummaryJson(verdicts);

@@ -103,6 +103,23 @@ TEST_F(Batch, GivesEveryLogALine_AndABadOneStopsNoOther) {
   part("2/2");
   EXPECT_EQ(Run(merge).code, kPartial);
   EXPECT_EQ(ReadText(Path("merged.json")), ReadText(Path("all.json")));
+
+  // A job that goes on: a verdict stays as it is, even one that no diagnosis gives. A failed or a broken one does not.
+  nlohmann::ordered_json planted = nlohmann::ordered_json::parse(ReadText(Path("jobs/folder.json")));
+  planted["verdict"] = "effect";
+  std::ofstream(Path("jobs/folder.json")) << planted.dump();
+  std::ofstream(Path("jobs/offset.json")) << R"({"verdict": "failed", "error": "ended with code 137"})";
+  std::ofstream(Path("jobs/plain.json")) << "{";
+  std::vector<std::string> words = job;
+  words.insert(words.end(), {"--resume", "--json", Path("resumed.json"), "--db", Path("resumed.sqlite")});
+  EXPECT_EQ(Run(words).code, kPartial);  // two logs are bad
+  EXPECT_EQ(ReadText(Path("jobs/folder.json")), planted.dump());
+  for (const char* name : {"jobs/offset.json", "jobs/plain.json"}) {
+    nlohmann::json anew = ReadJson(Path(name)), first = ReadJson(Path("verdicts") + std::string(name).substr(4));
+    for (const char* key : {"terms", "verdict"}) EXPECT_EQ(anew.at(key), first.at(key)) << name;
+  }
+  EXPECT_EQ(ReadJson(Path("resumed.json")).at("verdicts")[1].at("verdict"), "effect");
+  EXPECT_EQ(Tool({"history", "folder", "--db", Path("resumed.sqlite")}).code, 0);  // kept ones are in the database
 }
 
 TEST_F(Batch, OptionsThatMakeNoSense_AreRefused) {
@@ -114,6 +131,7 @@ TEST_F(Batch, OptionsThatMakeNoSense_AreRefused) {
   ExpectOneLine(Run({"--batch", logs().string(), "--out", empty, "--part", "3/2"}), kBadInput, "--part 3/2");
   ExpectOneLine(Run({"--batch", logs().string(), "--out", empty, "--test", "x.csv"}), kBadInput, "--test");
   ExpectOneLine(Run({"--summary", empty}), kBadInput, "--summary");
+  ExpectOneLine(Run({"--resume", "--summary", empty}), kBadInput, "--resume");
 }
 
 // Runs of one arm that lacks an offset on joint 2; the last one lacks one on joint 1, too.

@@ -41,7 +41,10 @@ void CheckWritable(const std::filesystem::path& path) {
 void AtomicWrite(const std::filesystem::path& path, std::string_view bytes) {
   std::error_code error;
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), error);
-  const std::filesystem::path part = path.string() + ".part" + std::to_string(getpid());
+  // Hosts that share a folder may have processes of one number.
+  char host[65] = {};
+  gethostname(host, sizeof host - 1);
+  const std::filesystem::path part = path.string() + ".part." + host + "." + std::to_string(getpid());
   errno = 0;
   std::ofstream out(part, std::ios::binary);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));

@@ -106,7 +106,7 @@ int RunOneDiagnosis(const DiagnoseOptions& o) {
   if (o.robot.empty() || o.train.empty() || o.test.empty())
     throw io::InputError("expected --robot, --train and --test, or --batch, or --splits, or --summary");
   const auto run = RunDiagnosis(o);
-  KeepVerdicts(o.fleet, {{o.arm.empty() ? run->model->robot().name : o.arm, run->json}});
+  KeepVerdicts(o.fleet, {{o.fleet.arm.empty() ? run->model->robot().name : o.fleet.arm, run->json}});
   return kOk;
 }
 
@@ -125,8 +125,8 @@ void AddDiagnose(CLI::App& app, Action& action) {
   verb->add_option("--train", o->train, "log(s) on which everything is decided");
   verb->add_option("--test", o->test, "held-out log: read once, after the model is written");
   AddLogFormat(*verb, o->format);
-  AddFleetOptions(*verb, o->fleet);
-  verb->add_option("--arm", o->arm, "with --db: name of the arm (default: the robot's)");
+  AddFleetOptions(*verb, o->fleet, "verdicts", "when the held-out log was made (default: the file's time)",
+                  " (default: the robot's)");
   AddCutoff(*verb, o->how.cutoff_Hz);
   auto* never = verb->add_flag_callback(
       "--no-turns", [o] { o->how.at_turns = diagnosis::AtTurns::kNever; }, "leave out rows near turns and at rest");

@@ -13,7 +13,7 @@
 namespace armcal::tool {
 
 struct DiagnoseOptions {
-  std::string robot, test, json, report, model_out, arm;
+  std::string robot, test, json, report, model_out;
   LogFormat format;
   FleetOptions fleet;
   std::vector<std::string> train;

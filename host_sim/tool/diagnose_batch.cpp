@@ -167,7 +167,8 @@ verdict::Verdicts Collect(const BatchOptions& batch, const DiagnoseOptions& one)
 void Check(const DiagnoseOptions& one, const BatchOptions& batch) {
   if (!one.train.empty() || !one.test.empty() || !one.model_out.empty())
     throw io::InputError("--batch, --summary, --splits: expected no --train, --test or --model-out beside them");
-  if (!one.arm.empty()) throw io::InputError("--arm: expected --train and --test; in a batch the logs name the arms");
+  if (!one.fleet.arm.empty())
+    throw io::InputError("--arm: expected --train and --test; in a batch the logs name the arms");
   if (!batch.splits.empty() && !one.fleet.database.empty())
     throw io::InputError("--splits: expected no --db beside it; each run is a part of one result");
   if (!batch.splits.empty() && !(batch.folder.empty() && batch.summary.empty() && batch.part.empty()))
@@ -251,10 +252,9 @@ int RunSplits(const DiagnoseOptions& one, const BatchOptions& options) {
 }  // namespace
 
 void AddBatchOptions(CLI::App& verb, BatchOptions& b) {
-  auto* folder =
-      verb.add_option("--batch", b.folder,
-                      std::string("diagnose a folder of logs: ") + kLayout +
-                          "; the robot is the folder's robot.toml, or --robot, or the batch's robot.toml");
+  auto* folder = verb.add_option("--batch", b.folder,
+                                 std::string("diagnose a folder of logs: ") + kLayout +
+                                     "; the robot is the folder's robot.toml, or --robot, or the batch's robot.toml");
   verb.add_option("--out", b.out,
                   "with --batch, --splits: NAME.json, .html, .toml and .log of each log go to this folder");
   verb.add_option("--jobs", b.jobs, "with --batch, --splits: logs at a time; 0: one a core");
@@ -275,10 +275,9 @@ void AddBatchOptions(CLI::App& verb, BatchOptions& b) {
 int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch) {
   Check(one, batch);
   if (!batch.splits.empty()) return RunSplits(one, batch);
-  const verdict::Verdicts verdicts =
-      batch.summary.empty()
-          ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part), one, batch)
-          : Collect(batch, one);
+  const verdict::Verdicts verdicts = batch.summary.empty()
+                                         ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part), one, batch)
+                                         : Collect(batch, one);
   if (!batch.summary.empty()) KeepVerdicts(one.fleet, verdict::ReadVerdicts(batch.summary));  // without missing ones
   const nlohmann::ordered_json summary = verdict::SummaryJson(verdicts);
   fmt::print("{}", verdict::SummaryText(summary));

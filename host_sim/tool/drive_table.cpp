@@ -10,6 +10,7 @@
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/client/table_seal.hpp"
 #include "host_sim/tool/connect.hpp"
+#include "host_sim/tool/fleet.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -20,6 +21,7 @@ using nlohmann::ordered_json;
 
 struct TableOptions {
   std::string connect, json, file, key;
+  FleetOptions fleet;
   bool confirm = false, end = false;
 };
 
@@ -81,11 +83,15 @@ int RunBackup(const TableOptions& o) {
 int RunRestore(const TableOptions& o) {
   const std::vector<std::uint16_t> words = client::UnsealTable(ReadBackup(o.file));
   const std::optional<client::Key> key = ReadKeyOption(o.key);
+  TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   const client::FlashReport report = client::FlashTable(drive, words, {}, KeyOf(key));
   fmt::print("{}: {} registers stored, adopted and read back: CRC {}, generation {}, store sequence {}\n", drive.name(),
              words.size(), CrcText(report.crc), report.generation, report.store_sequence);
   WriteJson(o.json, Told(report));
+  ordered_json told = Told(report);
+  told["file"] = o.file, told["sha256"] = files::FileHash(o.file);
+  KeepTable(o.fleet, drive, "restore", told);
   return kOk;
 }
 
@@ -112,21 +118,25 @@ int RunDiff(const TableOptions& o) {
 
 int RunRollback(const TableOptions& o) {
   const std::optional<client::Key> key = ReadKeyOption(o.key);
+  TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   const client::FlashReport report = client::Rollback(drive, KeyOf(key));
   fmt::print("{}: the older table is stored, adopted and read back: CRC {}, generation {}, store sequence {}\n",
              drive.name(), CrcText(report.crc), report.generation, report.store_sequence);
   WriteJson(o.json, Told(report));
+  KeepTable(o.fleet, drive, "rollback", Told(report));
   return kOk;
 }
 
 int RunTrial(const TableOptions& o) {
+  TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   if (o.confirm) {
     const client::FlashReport report = client::ConfirmTrial(drive);
     fmt::print("{}: the table on trial is stored: CRC {}, store sequence {}\n", drive.name(), CrcText(report.crc),
                report.store_sequence);
     WriteJson(o.json, Told(report));
+    KeepTable(o.fleet, drive, "trial --confirm", Told(report));
     return kOk;
   }
   if (o.end) client::EndTrial(drive);
@@ -223,6 +233,7 @@ void AddDriveTable(CLI::App& app, Action& action) {
                  o, RunRestore);
   verb->add_option("file", o->file, "file of armcal backup")->required();
   AddKeyOption(*verb, o->key);
+  AddDriveFleetOptions(*verb, o->fleet, "the table");
   o = std::make_shared<TableOptions>();
   verb = AddVerb(app, action, "diff",
                  "compare the table in force with a backup\nexit code 5: they differ\nexample: armcal diff drive.json "
@@ -236,6 +247,7 @@ void AddDriveTable(CLI::App& app, Action& action) {
               "127.0.0.1:1502",
               o, RunRollback);
   AddKeyOption(*verb, o->key);
+  AddDriveFleetOptions(*verb, o->fleet, "the table");
   o = std::make_shared<TableOptions>();
   verb = AddVerb(app, action, "trial",
                  "show, store or end the trial that armcal flash --trial began\nexample: armcal trial --confirm "
@@ -243,6 +255,7 @@ void AddDriveTable(CLI::App& app, Action& action) {
                  o, RunTrial);
   auto* confirm = verb->add_flag("--confirm", o->confirm, "store the table on trial");
   verb->add_flag("--end", o->end, "put the stored table in force again")->excludes(confirm);
+  AddDriveFleetOptions(*verb, o->fleet, "the table that --confirm stores");
   AddVerb(app, action, "log",
           "show what became of the drive's tables since power-up: the last 32 events\nexample: armcal log --connect "
           "127.0.0.1:1502",

@@ -10,6 +10,7 @@
 #include "host_sim/identify/calibration/table_ceilings.hpp"
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/connect.hpp"
+#include "host_sim/tool/fleet.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -17,6 +18,7 @@ namespace {
 
 struct FlashOptions {
   std::string connect, robot, table, json, key;
+  FleetOptions fleet;
   bool force = false, dry_run = false, trial = false;
   int limit_s = link::reg::kUsualTrial_s;  // of a trial
 };
@@ -60,6 +62,7 @@ std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptio
 int Flash(const FlashOptions& o) {
   const std::optional<client::Key> key = ReadKeyOption(o.key);
   const ToFlash read(o);
+  TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   calibration::TableFile sent;
   std::vector<std::string> missing;
@@ -89,13 +92,16 @@ int Flash(const FlashOptions& o) {
   else
     fmt::print("{}: {} registers stored, adopted and read back: CRC {:08X}, generation {}, store sequence {}\n",
                drive.name(), words.size(), report.crc, report.generation, report.store_sequence);
-  WriteJson(o.json, {{"table_crc", fmt::format("{:08X}", report.crc)},
-                     {"readback_ok", true},
-                     {"generation", report.generation},
-                     {"store_sequence", report.store_sequence},
-                     {"registers", words.size()},
-                     {"trial_s", o.trial ? o.limit_s : 0},
-                     {"from_prior", kept}});
+  nlohmann::ordered_json json{{"table_crc", fmt::format("{:08X}", report.crc)},
+                              {"readback_ok", true},
+                              {"generation", report.generation},
+                              {"store_sequence", report.store_sequence},
+                              {"registers", words.size()},
+                              {"trial_s", o.trial ? o.limit_s : 0},
+                              {"from_prior", kept}};
+  WriteJson(o.json, json);
+  json["file"] = o.table, json["sha256"] = files::FileHash(o.table);
+  KeepTable(o.fleet, drive, o.trial ? "flash --trial" : "flash", json);
   return kOk;
 }
 
@@ -143,6 +149,7 @@ void AddFlash(CLI::App& app, Action& action) {
                          o);
   verb->add_flag("--dry-run", o->dry_run, "check and say what would be sent");
   AddKeyOption(*verb, o->key);
+  AddDriveFleetOptions(*verb, o->fleet, "the table");
   auto* trial = verb->add_flag("--trial", o->trial,
                                "put it on trial: it is in force, and not stored until armcal trial --confirm");
   verb->add_option("--limit", o->limit_s, "seconds after which a trial ends by itself")

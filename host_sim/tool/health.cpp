@@ -6,6 +6,7 @@
 #include "host_sim/diagnose/health/joint_health.hpp"
 #include "host_sim/diagnose/health/shapes.hpp"
 #include "host_sim/tool/connect.hpp"
+#include "host_sim/tool/fleet.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -16,6 +17,7 @@ using nlohmann::ordered_json;
 
 struct HealthOptions {
   std::string connect, json;
+  FleetOptions fleet;
 };
 
 const char* VerdictText(health::Verdict v) {
@@ -93,6 +95,7 @@ ordered_json JointJson(const JointHealth& h) {
 }
 
 int RunHealth(const HealthOptions& o) {
+  TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   ordered_json json{{"verdict", ""}, {"elapsed_s", 0}, {"joints", ordered_json::array()}};
   bool misfit = false, early = false, unnamed = false;
@@ -115,6 +118,7 @@ int RunHealth(const HealthOptions& o) {
   json["changed_together"] = together;
   json["verdict"] = misfit ? "misfit" : early ? "too_early" : "fits";
   WriteJson(o.json, json);
+  KeepHealth(o.fleet, drive, json);
   return misfit ? kMismatch : early ? kPartial : kOk;
 }
 
@@ -129,6 +133,7 @@ void AddHealth(CLI::App& app, Action& action) {
   auto o = std::make_shared<HealthOptions>();
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--json", o->json, "write the verdicts here");
+  AddDriveFleetOptions(*verb, o->fleet, "the verdicts");
   verb->callback([o, &action] { action = [o] { return RunHealth(*o); }; });
 }
 

@@ -58,7 +58,7 @@ TEST_F(Batch, GivesEveryLogALine_AndABadOneStopsNoOther) {
   EXPECT_EQ(history.code, 0) << history.err;
   EXPECT_EQ(ReadJson(Path("history.json")).at("logs").size(), 1U);
   EXPECT_EQ(ReadJson(Path("history.json")).at("logs")[0].at("found"), "torque_offset 2");
-  ExpectOneLine(Tool({"history", "alone", "--db", Path("fleet.sqlite")}), kBadInput, "no verdict of the arm alone");
+  ExpectOneLine(Tool({"history", "alone", "--db", Path("fleet.sqlite")}), kBadInput, "nothing of the arm alone");
   const nlohmann::json s = ReadJson(Path("all.json"));
   EXPECT_EQ(s.at("failed"), 2);
   EXPECT_EQ(s.at("effect").get<int>() + s.at("none").get<int>(), 3);

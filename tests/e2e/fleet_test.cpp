@@ -1,4 +1,5 @@
-// end-to-end tests - a database that many write to and that some do not survive, and the history that it gives.
+// end-to-end tests - a database that many write to and that some do not survive, what it keeps, and the history that it
+// gives.
 #include <fcntl.h>
 #include <signal.h>
 #include <sqlite3.h>
@@ -8,6 +9,8 @@
 #include <map>
 #include <random>
 
+#include "codegen/src/generator/load.hpp"
+#include "host_sim/identify/calibration/table_file.hpp"
 #include "tests/e2e/tool.hpp"
 
 namespace armcal::tests {
@@ -131,6 +134,45 @@ TEST(Fleet, HistoryNamesAPlantedChange_AtItsLog) {
   ExpectOneLine(Tool({"history", "lefd", "--db", database}), 2, "the nearest is left");
   ExpectOneLine(Tool({"history", "left", "--db", (folder / "none.sqlite").string()}), 2, "no such file");
   ExpectOneLine(Tool({"history", "left", "--db", json}), 2, "is not a database");
+}
+
+TEST(Fleet, TablesAndHealthOfADrive_AreKeptWordForWord) {
+  const fs::path folder = FreshFolder("fleet_drive");
+  const RunningDrive drive(folder);
+  const std::string database = (folder / "fleet.sqlite").string(), table = (folder / "table.toml").string(),
+                    backup = (folder / "backup.json").string(), json = (folder / "history.json").string();
+  const auto ask = [&](std::vector<std::string> words, const std::string& date) {
+    words.insert(words.end(), {"--connect", drive.address()});
+    if (!date.empty()) words.insert(words.end(), {"--db", database, "--arm", "left", "--date", date});
+    return Tool(words);
+  };
+  calibration::TableFile made = calibration::DefaultTable(codegen::LoadModel("er20_like"));
+  calibration::WriteTable(table, made);
+  EXPECT_EQ(ask({"flash", "--robot", "er20_like", "--table", table}, "2026-01").code, 0);
+  EXPECT_EQ(ask({"backup", backup}, "").code, 0);
+  made.blend_ms += 100;
+  calibration::WriteTable(table, made);
+  EXPECT_EQ(ask({"flash", "--robot", "er20_like", "--table", table}, "2026-02").code, 0);
+  EXPECT_EQ(ask({"health"}, "2026-03").code, 6);  // nothing has moved
+  EXPECT_EQ(ask({"rollback"}, "2026-04").code, 0);
+  EXPECT_EQ(ask({"restore", backup}, "2026-05").code, 0);
+  const Outcome history = Tool({"history", "left", "--db", database, "--json", json});
+  EXPECT_NE(history.out.find("2026-03: health"), std::string::npos) << history.out << history.err;
+  const nlohmann::json events = ReadJson(json).at("drive"), first = ReadJson(backup);
+  ASSERT_EQ(events.size(), 5U) << events;
+  const char* const by[] = {"flash", "flash", "", "rollback", "restore"};
+  for (const std::size_t k : {0, 1, 3, 4}) {
+    EXPECT_EQ(events[k].at("by"), by[k]);
+    EXPECT_EQ(events[k].at("words") == first.at("words"), k != 1) << k;
+    EXPECT_EQ(events[k].at("table_crc") == first.at("table_crc"), k != 1) << k;
+    EXPECT_EQ(events[k].at("serial_number"), first.at("serial_number"));
+  }
+  EXPECT_EQ(events[2].at("joints").size(), 6U);
+  // A database that cannot be written leaves the drive as it is.
+  ExpectOneLine(Tool({"rollback", "--connect", drive.address(), "--db", backup, "--arm", "left"}), 2,
+                "is not a database");
+  EXPECT_EQ(ask({"diff", backup}, "").code, 0);
+  EXPECT_EQ(Tool({"health", "--connect", drive.address(), "--db", database}).code, 2);  // of which arm?
 }
 
 }  // namespace

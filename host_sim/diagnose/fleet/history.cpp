@@ -74,6 +74,30 @@ void FindChanges(const Course& course, std::vector<Change>& changes) {
   }
 }
 
+[[noreturn]] void RefuseEntry(const Entry& e, const std::string& expected) {
+  throw io::InputError(e.arm + ", " + e.date + ": expected " + expected + " of this version");
+}
+
+Event EventOf(const Entry& e, Kind kind) {
+  try {
+    const ordered_json json = ordered_json::parse(e.json);
+    if (kind == Kind::kTable)
+      return {e.date, fmt::format("table {} by armcal {}", e.hash, json.at("by").get<std::string>()), json};
+    std::vector<std::string> joints;
+    for (const ordered_json& j : json.at("joints"))
+      if (const auto verdict = j.at("verdict").get<std::string>();
+          verdict == "no_longer_fits" || verdict == "never_fitted")
+        joints.push_back(std::to_string(j.at("joint").get<int>()));
+    const auto verdict = json.at("verdict").get<std::string>();
+    const std::string what = verdict == "fits"     ? "all joints fit"
+                             : verdict == "misfit" ? fmt::format("joints that do not fit: {}", fmt::join(joints, ", "))
+                                                   : "too early to tell";
+    return {e.date, fmt::format("health under table {}: {}", e.hash, what), json};
+  } catch (const nlohmann::json::exception&) {
+    RefuseEntry(e, kind == Kind::kTable ? "a table" : "a health reading");
+  }
+}
+
 std::string OrNothing(const std::string& terms) { return terms.empty() ? "nothing" : terms; }
 
 std::string Words(const History& history, const Change& c) {
@@ -82,70 +106,7 @@ std::string Words(const History& history, const Change& c) {
   return when + fmt::format("{} from {:.4g} to {:.4g} {}", c.name, c.before, c.after, c.unit);
 }
 
-}  // namespace
-
-History HistoryOf(const std::vector<Entry>& entries) {
-  History history;
-  Courses courses;
-  for (const Entry& e : entries) {
-    try {
-      const ordered_json verdict = ordered_json::parse(e.json);
-      if (verdict.at("verdict") == "failed") continue;
-      const std::size_t log = history.entry.size();
-      history.terms.push_back(TermsOf(verdict));
-      history.entry.push_back(e);
-      AddNumbers(verdict, log, courses);
-      if (log > 0 && history.terms[log] != history.terms[log - 1])
-        history.change.push_back(
-            {log, "found: " + OrNothing(history.terms[log]) + "; before: " + OrNothing(history.terms[log - 1]), "", NAN,
-             NAN});
-    } catch (const nlohmann::json::exception&) {
-      throw io::InputError(e.arm + ", " + e.date + ": expected a verdict of this version: diagnose anew");
-    }
-  }
-  history.course = std::move(courses.course_);
-  for (const Course& course : history.course) FindChanges(course, history.change);
-  std::stable_sort(history.change.begin(), history.change.end(),
-                   [](const Change& a, const Change& b) { return a.log < b.log; });
-  return history;
-}
-
-std::string HistoryText(const History& history) {
-  report::Table t{{"date", "payload kg", "found"}, {}};
-  std::vector<double> payload_kg(history.entry.size(), 0);
-  for (const Course& c : history.course)
-    if (c.name == "payload")
-      for (const Point& p : c.point) payload_kg[p.log] = p.value;
-  for (std::size_t log = 0; log < history.entry.size(); ++log)
-    t.rows.push_back({history.entry[log].date, payload_kg[log] == 0 ? "-" : fmt::format("{:.3g}", payload_kg[log]),
-                      OrNothing(history.terms[log])});
-  std::string text = report::Text(t);
-  text += history.change.empty() ? "nothing changed\n" : "changed:\n";
-  for (const Change& c : history.change) text += "  " + Words(history, c) + "\n";
-  return text;
-}
-
-ordered_json HistoryJson(const History& history) {
-  ordered_json json{
-      {"logs", ordered_json::array()}, {"courses", ordered_json::array()}, {"changes", ordered_json::array()}};
-  for (std::size_t log = 0; log < history.entry.size(); ++log)
-    json["logs"].push_back(
-        {{"date", history.entry[log].date}, {"log", history.entry[log].log}, {"found", history.terms[log]}});
-  for (const Course& c : history.course) {
-    ordered_json& course = json["courses"].emplace_back(ordered_json{{"name", c.name}, {"unit", c.unit}});
-    for (const Point& p : c.point) course["points"].push_back({{"log", p.log}, {"value", p.value}, {"sd", p.sd}});
-  }
-  for (const Change& c : history.change) {
-    ordered_json& change = json["changes"].emplace_back(
-        ordered_json{{"log", c.log}, {"date", history.entry[c.log].date}, {"what", c.name}});
-    if (!std::isnan(c.before)) change["unit"] = c.unit, change["before"] = c.before, change["after"] = c.after;
-  }
-  return json;
-}
-
-void WriteHistoryPage(const std::filesystem::path& path, const std::string& arm, const History& history) {
-  report::Page page("History of " + arm, fmt::format("{} logs, {} to {}.", history.entry.size(),
-                                                     history.entry.front().date, history.entry.back().date));
+void AddLogs(report::Page& page, const History& history) {
   std::vector<std::string> lines;
   for (const Change& c : history.change) lines.push_back(Words(history, c));
   if (lines.empty()) page.Box(report::Tone::kGood, "Nothing changed");
@@ -165,6 +126,94 @@ void WriteHistoryPage(const std::filesystem::path& path, const std::string& arm,
     t.rows.push_back({std::to_string(log + 1), history.entry[log].date, OrNothing(history.terms[log])});
   page.Section("Logs");
   page.Add(t);
+}
+
+}  // namespace
+
+History HistoryOf(const std::vector<Entry>& verdicts, const std::vector<Entry>& tables,
+                  const std::vector<Entry>& readings) {
+  History history;
+  Courses courses;
+  for (const Entry& e : verdicts) {
+    try {
+      const ordered_json verdict = ordered_json::parse(e.json);
+      if (verdict.at("verdict") == "failed") continue;
+      const std::size_t log = history.entry.size();
+      history.terms.push_back(TermsOf(verdict));
+      history.entry.push_back(e);
+      AddNumbers(verdict, log, courses);
+      if (log > 0 && history.terms[log] != history.terms[log - 1])
+        history.change.push_back(
+            {log, "found: " + OrNothing(history.terms[log]) + "; before: " + OrNothing(history.terms[log - 1]), "", NAN,
+             NAN});
+    } catch (const nlohmann::json::exception&) {
+      RefuseEntry(e, "a verdict");
+    }
+  }
+  history.course = std::move(courses.course_);
+  for (const Course& course : history.course) FindChanges(course, history.change);
+  std::stable_sort(history.change.begin(), history.change.end(),
+                   [](const Change& a, const Change& b) { return a.log < b.log; });
+  for (const Entry& e : tables) history.event.push_back(EventOf(e, Kind::kTable));
+  for (const Entry& e : readings) history.event.push_back(EventOf(e, Kind::kHealth));
+  std::stable_sort(history.event.begin(), history.event.end(),
+                   [](const Event& a, const Event& b) { return a.date < b.date; });
+  return history;
+}
+
+std::string HistoryText(const History& history) {
+  report::Table t{{"date", "payload kg", "found"}, {}};
+  std::vector<double> payload_kg(history.entry.size(), 0);
+  for (const Course& c : history.course)
+    if (c.name == "payload")
+      for (const Point& p : c.point) payload_kg[p.log] = p.value;
+  for (std::size_t log = 0; log < history.entry.size(); ++log)
+    t.rows.push_back({history.entry[log].date, payload_kg[log] == 0 ? "-" : fmt::format("{:.3g}", payload_kg[log]),
+                      OrNothing(history.terms[log])});
+  std::string text;
+  if (!history.entry.empty()) text = report::Text(t) + (history.change.empty() ? "nothing changed\n" : "changed:\n");
+  for (const Change& c : history.change) text += "  " + Words(history, c) + "\n";
+  if (!history.event.empty()) text += "the drive:\n";
+  for (const Event& e : history.event) text += "  " + e.date + ": " + e.what + "\n";
+  return text;
+}
+
+ordered_json HistoryJson(const History& history) {
+  ordered_json json{{"logs", ordered_json::array()},
+                    {"courses", ordered_json::array()},
+                    {"changes", ordered_json::array()},
+                    {"drive", ordered_json::array()}};
+  for (std::size_t log = 0; log < history.entry.size(); ++log)
+    json["logs"].push_back(
+        {{"date", history.entry[log].date}, {"log", history.entry[log].hash}, {"found", history.terms[log]}});
+  for (const Course& c : history.course) {
+    ordered_json& course = json["courses"].emplace_back(ordered_json{{"name", c.name}, {"unit", c.unit}});
+    for (const Point& p : c.point) course["points"].push_back({{"log", p.log}, {"value", p.value}, {"sd", p.sd}});
+  }
+  for (const Change& c : history.change) {
+    ordered_json& change = json["changes"].emplace_back(
+        ordered_json{{"log", c.log}, {"date", history.entry[c.log].date}, {"what", c.name}});
+    if (!std::isnan(c.before)) change["unit"] = c.unit, change["before"] = c.before, change["after"] = c.after;
+  }
+  for (const Event& e : history.event) {
+    ordered_json& event = json["drive"].emplace_back(ordered_json{{"date", e.date}, {"what", e.what}});
+    event.update(e.json);
+  }
+  return json;
+}
+
+void WriteHistoryPage(const std::filesystem::path& path, const std::string& arm, const History& history) {
+  const bool logs = !history.entry.empty();
+  report::Page page("History of " + arm, logs ? fmt::format("{} logs, {} to {}.", history.entry.size(),
+                                                            history.entry.front().date, history.entry.back().date)
+                                              : "No log.");
+  if (logs) AddLogs(page, history);
+  report::Table events{{"date", "what"}, {}};
+  for (const Event& e : history.event) events.rows.push_back({e.date, e.what});
+  if (!events.rows.empty()) {
+    page.Section("Tables and health of the drive");
+    page.Add(events);
+  }
   page.Write(path);
 }
 

@@ -12,8 +12,8 @@ namespace {
 
 }  // namespace
 
-void Keep(const std::filesystem::path& database, const std::vector<Entry>&) { Refuse(database); }
-std::vector<Entry> EntriesOf(const std::filesystem::path& database, const std::string&) { Refuse(database); }
+void Keep(const std::filesystem::path& database, Kind, const std::vector<Entry>&) { Refuse(database); }
+std::vector<Entry> EntriesOf(const std::filesystem::path& database, Kind, const std::string&) { Refuse(database); }
 std::vector<std::string> ArmsOf(const std::filesystem::path& database) { Refuse(database); }
 
 }  // namespace armcal::fleet

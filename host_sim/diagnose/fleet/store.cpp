@@ -2,6 +2,8 @@
 // log: it does not work over a network's file system, where a cluster's jobs meet.
 #include "host_sim/diagnose/fleet/store.hpp"
 
+#include <set>
+
 #include "codegen/src/io/require_file.hpp"
 #include "host_sim/data/files/sqlite.hpp"
 
@@ -13,6 +15,23 @@ namespace fs = std::filesystem;
 constexpr int kPatience_ms = 60000;       // for other writers
 constexpr int kApplication = 0x61726D63;  // "armc": says whose database it is
 constexpr int kLayout = 1;
+
+// Where the entries of a kind are. A database may lack a sheet to which nobody wrote.
+struct Sheet {
+  std::string name, hash, key;
+};
+
+Sheet SheetOf(Kind kind) {
+  switch (kind) {
+    case Kind::kVerdict:
+      return {"verdict", "log", "arm, log"};
+    case Kind::kTable:
+      return {"drive_table", "crc", "arm, date, crc"};
+    case Kind::kHealth:
+      break;
+  }
+  return {"health", "crc", "arm, date, crc"};
+}
 
 class Store {
  public:
@@ -36,6 +55,9 @@ class Store {
     int number = 0;
     Ask(question, {}, [&](sqlite3_stmt* row) { number = sqlite3_column_int(row, 0); });
     return number;
+  }
+  bool Has(const Sheet& sheet) {
+    return Number("SELECT count(*) FROM sqlite_master WHERE name = '" + sheet.name + "'") > 0;
   }
   // Ours, or still empty.
   void Check() {
@@ -68,36 +90,41 @@ std::string TextOf(sqlite3_stmt* row, int column) {
 
 }  // namespace
 
-void Keep(const fs::path& database, const std::vector<Entry>& entries) {
+void Keep(const fs::path& database, Kind kind, const std::vector<Entry>& entries) {
+  const Sheet sheet = SheetOf(kind);
   Store store(database, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   store.Do("BEGIN IMMEDIATE");
   store.Check();
   store.Do("PRAGMA application_id = " + std::to_string(kApplication));
   store.Do("PRAGMA user_version = " + std::to_string(kLayout));
-  store.Do(
-      "CREATE TABLE IF NOT EXISTS verdict (arm TEXT NOT NULL, date TEXT NOT NULL, log TEXT NOT NULL, json TEXT NOT "
-      "NULL, "
-      "PRIMARY KEY (arm, log))");
+  store.Do("CREATE TABLE IF NOT EXISTS " + sheet.name + " (arm TEXT NOT NULL, date TEXT NOT NULL, " + sheet.hash +
+           " TEXT NOT NULL, json TEXT NOT NULL, PRIMARY KEY (" + sheet.key + "))");
   for (const Entry& e : entries)
-    store.Do("INSERT OR REPLACE INTO verdict (arm, date, log, json) VALUES (?, ?, ?, ?)",
-             {e.arm, e.date, e.log, e.json});
+    store.Do("INSERT OR REPLACE INTO " + sheet.name + " (arm, date, " + sheet.hash + ", json) VALUES (?, ?, ?, ?)",
+             {e.arm, e.date, e.hash, e.json});
   store.Do("COMMIT");
 }
 
-std::vector<Entry> EntriesOf(const fs::path& database, const std::string& arm) {
+std::vector<Entry> EntriesOf(const fs::path& database, Kind kind, const std::string& arm) {
+  const Sheet sheet = SheetOf(kind);
   std::vector<Entry> entries;
-  Opened(database).Ask("SELECT arm, date, log, json FROM verdict WHERE arm = ? ORDER BY date, log", {arm},
-                       [&](sqlite3_stmt* row) {
-                         entries.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), TextOf(row, 3)});
-                       });
+  Store store = Opened(database);
+  if (store.Has(sheet))
+    store.Ask(
+        "SELECT arm, date, " + sheet.hash + ", json FROM " + sheet.name + " WHERE arm = ? ORDER BY date, " + sheet.hash,
+        {arm}, [&](sqlite3_stmt* row) {
+          entries.push_back({TextOf(row, 0), TextOf(row, 1), TextOf(row, 2), TextOf(row, 3)});
+        });
   return entries;
 }
 
 std::vector<std::string> ArmsOf(const fs::path& database) {
-  std::vector<std::string> arms;
-  Opened(database).Ask("SELECT DISTINCT arm FROM verdict ORDER BY arm", {},
-                       [&](sqlite3_stmt* row) { arms.push_back(TextOf(row, 0)); });
-  return arms;
+  std::set<std::string> arms;
+  Store store = Opened(database);
+  for (const Kind kind : {Kind::kVerdict, Kind::kTable, Kind::kHealth})
+    if (const Sheet sheet = SheetOf(kind); store.Has(sheet))
+      store.Ask("SELECT DISTINCT arm FROM " + sheet.name, {}, [&](sqlite3_stmt* row) { arms.insert(TextOf(row, 0)); });
+  return {arms.begin(), arms.end()};
 }
 
 }  // namespace armcal::fleet

@@ -88,10 +88,27 @@ TEST(History, OfAFailedVerdict_LeavesItOut_AndOfAnotherTextSaysSo) {
   EXPECT_NE(ErrorOf([&] { HistoryOf(entries); }).find(Date(5)), std::string::npos);
 }
 
+TEST(History, OfTablesAndReadings_NamesThemByDate_AlsoWithoutALog) {
+  const std::string ill = R"({"verdict": "misfit", "joints": [{"joint": 1, "verdict": "fits"},
+                              {"joint": 2, "verdict": "no_longer_fits"}, {"joint": 6, "verdict": "never_fitted"}]})";
+  const History history =
+      HistoryOf({}, {{"arm", Date(1), "00C0FFEE", R"({"by": "flash", "words": [1, 2]})"}},
+                {{"arm", Date(2), "00C0FFEE", ill}, {"arm", Date(0), "0", R"({"verdict": "fits", "joints": []})"}});
+  ASSERT_EQ(history.event.size(), 3U);
+  EXPECT_EQ(history.event[0].what, "health under table 0: all joints fit");
+  EXPECT_EQ(history.event[1].what, "table 00C0FFEE by armcal flash");
+  EXPECT_EQ(history.event[2].what, "health under table 00C0FFEE: joints that do not fit: 2, 6");
+  EXPECT_EQ(HistoryJson(history).at("drive")[1].at("words"), ordered_json({1, 2}));
+  const TemporaryFolder folder;
+  WriteHistoryPage(folder / "page.html", "arm", history);
+  EXPECT_NE(files::test::ReadBytes(folder / "page.html").find("00C0FFEE"), std::string::npos);
+  EXPECT_NE(ErrorOf([&] { HistoryOf({}, {{"arm", Date(3), "0", "{}"}}); }).find(Date(3)), std::string::npos);
+}
+
 class StoreTest : public testing::Test {
  protected:
   void SetUp() override {
-    if (ErrorOf([&] { Keep(file_, {}); }).find("without SQLite") != std::string::npos)
+    if (ErrorOf([&] { Keep(file_, Kind::kTable, {}); }).find("without SQLite") != std::string::npos)
       GTEST_SKIP() << "built without SQLite";
   }
   const TemporaryFolder folder_;
@@ -99,23 +116,37 @@ class StoreTest : public testing::Test {
 };
 
 TEST_F(StoreTest, KeepsEntriesByArmAndDate_AndReplacesThoseOfTheSameLog) {
-  Keep(file_,
+  Keep(file_, Kind::kVerdict,
        {{"b", "2026-03", "h3", "{3}"}, {"a", "2026-02", "h2", "{2}"}, {"b", "2026-01", "h1", std::string("{\0}", 3)}});
-  Keep(file_, {{"b", "2026-03", "h3", "{33}"}, {"b", "2026-02", "h4", "{4}"}});
-  const std::vector<Entry> entries = EntriesOf(file_, "b");
+  Keep(file_, Kind::kVerdict, {{"b", "2026-03", "h3", "{33}"}, {"b", "2026-02", "h4", "{4}"}});
+  const std::vector<Entry> entries = EntriesOf(file_, Kind::kVerdict, "b");
   ASSERT_EQ(entries.size(), 3U);
-  EXPECT_EQ(entries[0].log, "h1");
+  EXPECT_EQ(entries[0].hash, "h1");
   EXPECT_EQ(entries[0].json, std::string("{\0}", 3));
   EXPECT_EQ(entries[1].json, "{4}");
   EXPECT_EQ(entries[2].json, "{33}");
   EXPECT_EQ(ArmsOf(file_), (std::vector<std::string>{"a", "b"}));
-  EXPECT_TRUE(EntriesOf(file_, "c").empty());
+  EXPECT_TRUE(EntriesOf(file_, Kind::kVerdict, "c").empty());
+}
+
+TEST_F(StoreTest, KindsAreApart_AndAnArmThatHasOneIsListed) {
+  Keep(file_, Kind::kVerdict, {{"a", "2026-01", "h1", "{1}"}});
+  EXPECT_TRUE(EntriesOf(file_, Kind::kTable, "a").empty());  // nobody wrote one
+  Keep(file_, Kind::kTable, {{"a", "2026-02", "crc", "{2}"}, {"a", "2026-03", "crc", "{3}"}});
+  Keep(file_, Kind::kHealth, {{"c", "2026-02", "crc", "{4}"}});
+  Keep(file_, Kind::kTable, {{"a", "2026-03", "crc", "{33}"}});
+  ASSERT_EQ(EntriesOf(file_, Kind::kTable, "a").size(), 2U);  // a table that came back is another entry
+  EXPECT_EQ(EntriesOf(file_, Kind::kTable, "a")[1].json, "{33}");
+  EXPECT_EQ(EntriesOf(file_, Kind::kVerdict, "a").size(), 1U);
+  EXPECT_EQ(EntriesOf(file_, Kind::kHealth, "c").size(), 1U);
+  EXPECT_EQ(ArmsOf(file_), (std::vector<std::string>{"a", "c"}));
 }
 
 TEST_F(StoreTest, AnotherFile_IsRefusedInOneLine) {
   const auto text = folder_.Write("text.txt", std::string(5000, 'x'));
-  for (const std::string& error : {ErrorOf([&] { Keep(text, {}); }), ErrorOf([&] { EntriesOf(text, "a"); }),
-                                   ErrorOf([&] { ArmsOf(folder_ / "none.sqlite"); })}) {
+  for (const std::string& error :
+       {ErrorOf([&] { Keep(text, Kind::kTable, {}); }), ErrorOf([&] { EntriesOf(text, Kind::kHealth, "a"); }),
+        ErrorOf([&] { ArmsOf(folder_ / "none.sqlite"); })}) {
     EXPECT_NE(error, "");
     EXPECT_EQ(error.find('\n'), std::string::npos) << error;
   }

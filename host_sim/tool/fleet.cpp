@@ -1,0 +1,89 @@
+// tool - keeps verdicts, tables and health readings in a database.
+#include "host_sim/tool/fleet.hpp"
+
+#include <fmt/core.h>
+#include <sys/stat.h>
+
+#include <cstdio>
+#include <ctime>
+
+#include "host_sim/client/table_flash.hpp"
+#include "host_sim/diagnose/fleet/store.hpp"
+
+namespace armcal::tool {
+namespace {
+
+std::string Utc(std::time_t time) {
+  std::tm parts{};
+  gmtime_r(&time, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+std::time_t ChangeTime(const std::string& path) {
+  struct stat file {};
+  return stat(path.c_str(), &file) == 0 ? file.st_mtime : std::time(nullptr);
+}
+
+void KeepOfDrive(const FleetOptions& o, client::DriveClient& drive, fleet::Kind kind, nlohmann::ordered_json json) {
+  const client::Identity id = drive.ReadIdentity();
+  json["serial_number"] = id.serial_number, json["schema"] = fmt::format("{:08X}", id.schema);
+  const std::string date = o.date.empty() ? Utc(std::time(nullptr)) : o.date,
+                    crc = fmt::format("{:08X}", drive.ReadStatus().active_crc);
+  fleet::Keep(o.database, kind, {{o.arm, date, crc, json.dump()}});
+  fmt::print("kept in {}: {}\n", o.database, kind == fleet::Kind::kTable ? "a table" : "a health reading");
+}
+
+}  // namespace
+
+void KeepVerdicts(const FleetOptions& o, const verdict::Verdicts& verdicts,
+                  const std::map<std::string, std::string>& log) {
+  if (o.database.empty()) return;
+  std::vector<fleet::Entry> entries;
+  for (const auto& [arm, verdict] : verdicts) {
+    fleet::Entry e{arm, o.date, arm, verdict.dump()};
+    const auto named = log.find(arm);
+    const std::string path = named != log.end() ? named->second : verdict.value("test", std::string());
+    if (std::filesystem::is_regular_file(path)) {
+      e.hash = files::FileHash(path);
+      if (e.date.empty()) e.date = Utc(ChangeTime(path));
+    }
+    if (e.date.empty()) e.date = Utc(std::time(nullptr));
+    entries.push_back(e);
+  }
+  fleet::Keep(o.database, fleet::Kind::kVerdict, entries);
+  fmt::print("kept in {}: {} verdicts\n", o.database, entries.size());
+  std::fflush(stdout);  // who kills this process may rely on the line
+}
+
+void TryFleet(const FleetOptions& o) {
+  if (!o.database.empty()) fleet::Keep(o.database, fleet::Kind::kTable, {});
+}
+
+void KeepTable(const FleetOptions& o, client::DriveClient& drive, const std::string& by,
+               const nlohmann::ordered_json& told) {
+  if (o.database.empty()) return;
+  nlohmann::ordered_json json{{"by", by}};
+  json.update(told);
+  json["words"] = client::ReadActiveTable(drive);
+  KeepOfDrive(o, drive, fleet::Kind::kTable, json);
+}
+
+void KeepHealth(const FleetOptions& o, client::DriveClient& drive, const nlohmann::ordered_json& told) {
+  if (!o.database.empty()) KeepOfDrive(o, drive, fleet::Kind::kHealth, told);
+}
+
+void AddFleetOptions(CLI::App& verb, FleetOptions& o, const std::string& what, const std::string& when,
+                     const std::string& usual) {
+  auto* database = verb.add_option("--db", o.database, "keep " + what + " in this SQLite file, for armcal history");
+  verb.add_option("--date", o.date, "with --db: " + when)->needs(database);
+  auto* arm = verb.add_option("--arm", o.arm, "with --db: name of the arm" + usual);
+  if (usual.empty()) database->needs(arm), arm->needs(database);
+}
+
+void AddDriveFleetOptions(CLI::App& verb, FleetOptions& o, const std::string& what) {
+  AddFleetOptions(verb, o, what, "when this was (default: now)");
+}
+
+}  // namespace armcal::tool

@@ -183,7 +183,7 @@ std::map<std::string, FileIdentity> KillInTheMiddle(const fs::path& folder, cons
   return kept;
 }
 
-// Slurm on this host, in a folder, of the user who runs the test, on ports of its own. It ends with the object.
+// Slurm on this host alone, in a folder, of the user who runs the test, on ports of its own. It ends with the object.
 class Slurm {
  public:
   explicit Slurm(const fs::path& folder) : folder_(folder) {
@@ -202,11 +202,15 @@ class Slurm {
         << "/slurmctld.pid\nSlurmdPidFile=" << f << "/slurmd.pid\nProctrackType=proctrack/linuxproc\n"
         << "TaskPlugin=task/none\nJobAcctGatherType=jobacct_gather/none\nMpiDefault=none\nReturnToService=2\n"
         << "SelectType=select/cons_tres\nSelectTypeParameters=CR_CPU\nSlurmdParameters=config_overrides\n"
+        << "CommunicationParameters=NoCtldInAddrAny,NoInAddrAny\n"  // on the loopback address alone
         << "SlurmdTimeout=15\nMinJobAge=3600\n"  // a silent node is down after 15 s; all jobs are told of at the end
         << "NodeName=" << host << " NodeAddr=127.0.0.1 CPUs=2\nPartitionName=all Nodes=ALL Default=YES\n";
     fs::create_symlink("slurm.conf", folder / "node.conf");
-    std::ofstream(folder / "key") << std::string(1024, 'k');
-    chmod((folder / "key").c_str(), 0600);
+    // Who has the key may run jobs.
+    close(open((folder / "key").c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600));
+    std::string key(1024, '\0');
+    std::ifstream("/dev/urandom", std::ios::binary).read(key.data(), static_cast<std::streamsize>(key.size()));
+    std::ofstream(folder / "key", std::ios::binary) << key;
     Launch(
         "munged --foreground --force --key-file=key --socket=munge --pid-file=munged.pid --log-file=munged.log "
         "--seed-file=seed");

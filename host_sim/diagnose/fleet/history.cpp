@@ -75,7 +75,7 @@ void FindChanges(const Course& course, std::vector<Change>& changes) {
 }
 
 [[noreturn]] void RefuseEntry(const Entry& e, const std::string& expected) {
-  throw io::InputError(e.arm + ", " + e.date + ": expected " + expected + " of this version");
+  throw io::InputError(e.arm + ", " + e.date + ": expected " + expected);
 }
 
 Event EventOf(const Entry& e, Kind kind) {
@@ -94,7 +94,7 @@ Event EventOf(const Entry& e, Kind kind) {
                                                    : "too early to tell";
     return {e.date, fmt::format("health under table {}: {}", e.hash, what), json};
   } catch (const nlohmann::json::exception&) {
-    RefuseEntry(e, kind == Kind::kTable ? "a table" : "a health reading");
+    RefuseEntry(e, kind == Kind::kTable ? "a table of this version" : "a health reading of this version");
   }
 }
 
@@ -147,7 +147,7 @@ History HistoryOf(const std::vector<Entry>& verdicts, const std::vector<Entry>& 
             {log, "found: " + OrNothing(history.terms[log]) + "; before: " + OrNothing(history.terms[log - 1]), "", NAN,
              NAN});
     } catch (const nlohmann::json::exception&) {
-      RefuseEntry(e, "a verdict");
+      RefuseEntry(e, "a verdict of this version: diagnose anew");
     }
   }
   history.course = std::move(courses.course_);

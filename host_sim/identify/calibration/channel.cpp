@@ -30,7 +30,7 @@ constexpr double kLongest_s = 0.25;
 constexpr std::array<double, 6> kLags_s{0.004, 0.008, 0.016, 0.032, 0.064, 0.128};
 constexpr std::array<double, 5> kDelays_s{0, 0.005, 0.01, 0.015, 0.02};
 constexpr double kDelayStep_s = 0.005;
-constexpr int kHalvings = 6;
+constexpr int kHalvings = 6, kSweeps = 4;
 constexpr int kMostLags = 2;
 constexpr double kDelaysDiffer = 0.2;  // of the mean: delays that differ by less are one
 constexpr double kBesideStep = 1.5;    // samples: a step between two samples leaves an error in both
@@ -123,7 +123,10 @@ struct Late {
 Late Search(const Row& row) {
   Late out;
   const auto better = [&](const JointChannel& next, JointChannel& best, double& least) {
-    if (const double left = row.Left(next, out.rows); left < least) least = left, best = next;
+    const double left = row.Left(next, out.rows);
+    if (left >= least) return false;
+    least = left, best = next;
+    return true;
   };
   out.left_delayed = out.left_without = row.Left({}, out.rows);
   for (const double late_s : kDelays_s) better({0, late_s, 1}, out.delayed, out.left_delayed);
@@ -137,19 +140,19 @@ Late Search(const Row& row) {
     for (const double lag_s : kLags_s)
       for (const double late_s : {kDelays_s[0], kDelays_s[2], kDelays_s[4]})
         better({lag_s / lags, late_s, lags}, best, least);
+    // Slow motion shows the sum of lags and delay. How the sum is shared shows far less, so the steps go along it, too.
     double factor = 1.4;
     step_s = kDelayStep_s;
-    for (int k = 0; k < kHalvings; ++k, factor = std::sqrt(factor), step_s /= 2) {
-      const JointChannel at = best;
-      // A longer lag and a shorter delay look much alike: the two move apart and together.
-      for (const auto& [by, by_s] : {std::pair{1.0, -step_s},
-                                     {1.0, step_s},
-                                     {factor, 0.0},
-                                     {1 / factor, 0.0},
-                                     {factor, -step_s},
-                                     {1 / factor, step_s}})
-        better({std::min(kLongest_s, at.lag_s * by), std::max(0.0, at.late_s + by_s), lags}, best, least);
-    }
+    for (int k = 0; k < kHalvings; ++k, factor = std::sqrt(factor), step_s /= 2)
+      for (int sweep = 0, moved = 1; moved && sweep < kSweeps; ++sweep) {
+        moved = 0;
+        const auto step = [&](double by, double by_s) {
+          const double lag_s = std::min(kLongest_s, best.lag_s * by);
+          moved |= better({lag_s, std::max(0.0, best.late_s + by_s), lags}, best, least);
+        };
+        for (const double by : {factor, 1 / factor}) step(by, 0), step(by, lags * best.lag_s * (1 - by));
+        for (const double by_s : {-step_s, step_s}) step(1, by_s);
+      }
   }
   return out;
 }

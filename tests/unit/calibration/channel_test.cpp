@@ -83,6 +83,19 @@ TEST(Channel, TwoEqualLowPasses_AreToldFromOneWithADelay) {
   }
 }
 
+// The sum of lags and delay is near that of 0.032 s twice without delay, where a search begins.
+TEST(Channel, ALongDelayBehindTwoLowPasses_IsFound) {
+  Arm a;
+  for (int j = 0; j < 6; ++j) a.Measure(j, 0.0215, 0.02, 2);
+  const TorqueChannel seen = a.Seen();
+  ASSERT_FALSE(seen.empty());
+  for (const JointChannel& own : seen) {
+    EXPECT_EQ(own.lags, 2);
+    EXPECT_NEAR(own.lag_s, 0.0215, 0.002);
+    EXPECT_NEAR(own.late_s, 0.02, 0.004);
+  }
+}
+
 TEST(Channel, TorqueAsItIs_HasNone) { EXPECT_TRUE(Arm().Seen().empty()); }
 
 TEST(Channel, OneJointAlone_MayHaveAnotherCause) {
@@ -125,8 +138,11 @@ TEST(Channel, ARowThatShowsARest_IsNotUsed) {
   UseWhatMoved(a.log);
   for (Index k = 0; k < a.log.samples(); ++k) {
     const double t = a.log.s.t[k];
-    if (t > 0.18 && t < 0.28) EXPECT_EQ(a.log.used(k, 2), 0) << t;
-    if (t < 0.16 || t > 0.30) EXPECT_EQ(a.log.used(k, 2), 1) << t;
+    if (t > 0.18 && t < 0.28) {
+      EXPECT_EQ(a.log.used(k, 2), 0) << t;
+    } else if (t < 0.16 || t > 0.30) {
+      EXPECT_EQ(a.log.used(k, 2), 1) << t;
+    }
   }
   EXPECT_EQ(a.log.used.sum() + a.log.samples() - a.log.used.col(2).sum(), 6 * a.log.samples());  // no other joint's
 }

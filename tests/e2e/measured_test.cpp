@@ -195,8 +195,20 @@ TEST(Measured, Kr300_DiagnosisWritesTheWholeVerdict) {
     std::printf("%s, joint %s, confirmed %s\n", term.at("kind").get<std::string>().c_str(),
                 term.at("joint").dump().c_str(), term.at("confirmed").dump().c_str());
   }
-  for (int j = 0; j < 6; ++j)  // what worsens a joint is not confirmed, so nothing left in may
-    EXPECT_LE(v.at("after_moving")[j].get<double>(), 1.005 * v.at("before_moving")[j].get<double>()) << j + 1;
+  // What worsens a joint of its own, or all joints together, is not confirmed.
+  std::set<int> own;
+  for (const auto& term : v.at("terms"))
+    if (term.at("confirmed").get<bool>())
+      for (const auto& j : term.at("joints")) own.insert(j.get<int>());
+  double product = 1;
+  for (int j = 0; j < 6; ++j) {
+    const double change = v.at("after_moving")[j].get<double>() / v.at("before_moving")[j].get<double>();
+    if (own.contains(j + 1)) {
+      EXPECT_LE(change, 1.005) << j + 1;
+    }
+    product *= change;
+  }
+  EXPECT_LE(product, 1.005);
   std::ifstream page(folder / "out.html");
   const std::string report(std::istreambuf_iterator<char>(page), {});
   EXPECT_NE(report.find("</html>"), std::string::npos);
@@ -215,15 +227,18 @@ TEST(Measured, Findings_AreWhatThePageSays) {
   ASSERT_EQ(o.code, 0) << o.err << o.out;
   for (const char* model : {"emps", "kuka_kr300"})
     EXPECT_TRUE(ReadJson(out / (std::string(model) + ".json")).at("holds").empty()) << model;
-  // Joint 6's torque over posture holds with link data and with free bodies; joint 7's with free bodies alone.
+  // Joint 6's torque over posture holds with link data and with free bodies. With free bodies alone each side finds a
+  // torque of joint 7 over q7, by one name or by two.
   const nlohmann::json found = ReadJson(out / "kuka_lwr4.json"), free = ReadJson(out / "kuka_lwr4_free.json");
   for (const nlohmann::json* model : {&found, &free}) {
-    ASSERT_EQ(model->at("holds").size(), model == &free ? 2u : 1u);
+    for (const auto& term : model->at("holds")) {
+      const auto joint = term.at("joint").get<std::string>();
+      EXPECT_TRUE(joint == "1-6" || (joint == "7" && model == &free)) << joint;
+    }
     const auto at = [&](const char* joint) {
       return std::find_if(model->at("holds").begin(), model->at("holds").end(),
                           [&](const nlohmann::json& term) { return term.at("joint") == joint; });
     };
-    EXPECT_EQ(at("7") != model->at("holds").end(), model == &free);
     ASSERT_NE(at("1-6"), model->at("holds").end());
     const nlohmann::json& term = *at("1-6");
     EXPECT_EQ(term.at("kinds"), nlohmann::json({"cross_ripple"}));

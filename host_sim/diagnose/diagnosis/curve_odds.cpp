@@ -12,9 +12,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kOfTheirOwn = 0.1, kAlike = 1.5, kSmooth = 4;  // lengths, in knots
-constexpr double kUnseen = 1e-9;                                // of the largest
-constexpr int kSizes = 34;                                      // squares, each twice the one before
+constexpr double kOfTheirOwn = 0.1, kAlike = 1.5;  // lengths, in knots
+constexpr double kUnseen = 1e-9;                   // of the largest
+constexpr int kSizes = 34;                         // squares, each twice the one before
 
 // How much alike `count` knots in a row are.
 MatrixXd Alike(int count, double length) {
@@ -40,10 +40,8 @@ CurveOdds::CurveOdds(const MatrixXd& S, const VectorXd& g, int inner) {
   if (outer == 1) {
     for (const double length : {kOfTheirOwn, kAlike}) kinds.push_back(Alike(inner, length));
   } else {
-    const double lengths[][2] = {
-        {kOfTheirOwn, kOfTheirOwn}, {kAlike, kAlike}, {kSmooth, kSmooth}, {kAlike, kSmooth}, {kSmooth, kAlike}};
-    for (const auto& [across, along] : lengths)
-      kinds.push_back(AlikeOnSurface(Alike(outer, across), Alike(inner, along)));
+    for (const double length : {kOfTheirOwn, kAlike})
+      kinds.push_back(AlikeOnSurface(Alike(outer, length), Alike(inner, length)));
   }
   for (const MatrixXd& alike : kinds) {
     const Eigen::LLT<MatrixXd> factor(alike);

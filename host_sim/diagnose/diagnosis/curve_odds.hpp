@@ -7,7 +7,7 @@
 namespace armcal::diagnosis {
 
 // Coefficients have a normal prior: neighbours are alike over some length, and all have one size. Length and size are
-// those that the data like best. A surface has neighbours in two directions, each with a length of its own.
+// those that the data like best. A surface has neighbours in two directions.
 class CurveOdds {
  public:
   // seen: S = C'C less what the base explains, and g = C'r. inner: coefficients in a row of a surface; those of a

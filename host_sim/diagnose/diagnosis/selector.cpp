@@ -454,8 +454,8 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   const Metric metric(w_.rows, noise);
   const Gain gain = metric.Try(c);
   const VectorXd folds = metric.FoldGains(c, kBlocks, kFolds, f.precision);
-  // What a curve's freedom gains by chance is not kept.
-  const double gained = f.curve ? f.curve->Evidence(gain.gain) : gain.gain;
+  // What a curve's freedom gains by chance is not kept. A surface has so much freedom that it must keep all the same.
+  const double gained = f.curve && !f.candidate->is_surface() ? f.curve->Evidence(gain.gain) : gain.gain;
   const double kept = folds.sum() / gained, without_best = kept - folds.maxCoeff() / gained;
   const bool holds = kept > kKeepsOutOfFold && without_best > kKeepsWithoutBest;
   const bool once = std::find(bursts_.begin(), bursts_.end(), f.candidate) != bursts_.end();

@@ -89,9 +89,7 @@ int RunRestore(const TableOptions& o) {
   fmt::print("{}: {} registers stored, adopted and read back: CRC {}, generation {}, store sequence {}\n", drive.name(),
              words.size(), CrcText(report.crc), report.generation, report.store_sequence);
   WriteJson(o.json, Told(report));
-  ordered_json told = Told(report);
-  told["file"] = o.file, told["sha256"] = files::FileHash(o.file);
-  KeepTable(o.fleet, drive, "restore", told);
+  KeepTable(o.fleet, drive, "restore", Told(report), o.file);
   return kOk;
 }
 

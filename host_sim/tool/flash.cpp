@@ -92,16 +92,15 @@ int Flash(const FlashOptions& o) {
   else
     fmt::print("{}: {} registers stored, adopted and read back: CRC {:08X}, generation {}, store sequence {}\n",
                drive.name(), words.size(), report.crc, report.generation, report.store_sequence);
-  nlohmann::ordered_json json{{"table_crc", fmt::format("{:08X}", report.crc)},
-                              {"readback_ok", true},
-                              {"generation", report.generation},
-                              {"store_sequence", report.store_sequence},
-                              {"registers", words.size()},
-                              {"trial_s", o.trial ? o.limit_s : 0},
-                              {"from_prior", kept}};
+  const nlohmann::ordered_json json{{"table_crc", fmt::format("{:08X}", report.crc)},
+                                    {"readback_ok", true},
+                                    {"generation", report.generation},
+                                    {"store_sequence", report.store_sequence},
+                                    {"registers", words.size()},
+                                    {"trial_s", o.trial ? o.limit_s : 0},
+                                    {"from_prior", kept}};
   WriteJson(o.json, json);
-  json["file"] = o.table, json["sha256"] = files::FileHash(o.table);
-  KeepTable(o.fleet, drive, o.trial ? "flash --trial" : "flash", json);
+  KeepTable(o.fleet, drive, o.trial ? "flash --trial" : "flash", json, o.table);
   return kOk;
 }
 

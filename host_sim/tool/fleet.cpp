@@ -62,10 +62,11 @@ void TryFleet(const FleetOptions& o) {
 }
 
 void KeepTable(const FleetOptions& o, client::DriveClient& drive, const std::string& by,
-               const nlohmann::ordered_json& told) {
+               const nlohmann::ordered_json& told, const std::string& file) {
   if (o.database.empty()) return;
   nlohmann::ordered_json json{{"by", by}};
   json.update(told);
+  if (!file.empty()) json["file"] = file, json["sha256"] = files::FileHash(file);
   json["words"] = client::ReadActiveTable(drive);
   KeepOfDrive(o, drive, fleet::Kind::kTable, json);
 }

@@ -30,9 +30,9 @@ void KeepVerdicts(const FleetOptions& o, const verdict::Verdicts& verdicts,
                   const std::map<std::string, std::string>& log = {});
 
 // Nothing without --db. The table that the drive has in force now, word for word. by: the verb that brought it; told:
-// what the verb's JSON says.
+// what the verb's JSON says; file: where it was read from, which is kept with its SHA-256.
 void KeepTable(const FleetOptions& o, client::DriveClient& drive, const std::string& by,
-               const nlohmann::ordered_json& told);
+               const nlohmann::ordered_json& told, const std::string& file = "");
 // Nothing without --db. A health reading, as the verb's JSON says it, of the table in force.
 void KeepHealth(const FleetOptions& o, client::DriveClient& drive, const nlohmann::ordered_json& told);
 

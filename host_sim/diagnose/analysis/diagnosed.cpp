@@ -17,15 +17,12 @@ Diagnosed::Diagnosed(std::unique_ptr<codegen::Model> declared, codegen::Catalogu
   whole_ = CheckedLogs(*model, train_logs, options.cutoff_Hz, say);
   const auto start = std::chrono::steady_clock::now();
   channel_ = calibration::SeeChannel(*model, calibration::Pointers(whole_));
-  const auto behind_channel = [this](calibration::Dataset log) {
-    log.channel = channel_;
-    calibration::UseWhatMoved(log);
-    return log;
-  };
-  for (calibration::Dataset& log : whole_) log = behind_channel(std::move(log));
+  for (calibration::Dataset& log : whole_) PutBehindChannel(log);
   for (const calibration::Dataset& log : whole_) train.push_back(calibration::ThinToBand(log));
-  for (calibration::Dataset& log : NarrowLogs(*model, train_logs, options.cutoff_Hz))
-    narrow_.push_back(calibration::ThinToBand(behind_channel(std::move(log))));
+  for (calibration::Dataset& log : NarrowLogs(*model, train_logs, options.cutoff_Hz)) {
+    PutBehindChannel(log);
+    narrow_.push_back(calibration::ThinToBand(log));
+  }
   diagnosis = std::make_unique<diagnosis::Diagnosis>(*model, catalogue, calibration::Pointers(train),
                                                      calibration::Pointers(narrow_), options.at_turns);
   view.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -37,11 +34,15 @@ Diagnosed::Diagnosed(std::unique_ptr<codegen::Model> declared, codegen::Catalogu
       calibration::CheckExogeneity(*model, diagnosis->WithoutTerms(), z, calibration::Instruments::kCommanded);
 }
 
+void Diagnosed::PutBehindChannel(calibration::Dataset& log) const {
+  log.channel = channel_;
+  calibration::UseWhatMoved(log);
+}
+
 void Diagnosed::Judge(const logs::Log& log, const std::string& robot, const std::string& file, const Say& say) {
   const diagnosis::Finding& finding = diagnosis->finding();
   test = std::move(CheckedLogs(*model, {log}, options.cutoff_Hz, say)[0]);
-  test.channel = channel_;
-  calibration::UseWhatMoved(test);
+  PutBehindChannel(test);
   held_out = diagnosis->Judge(test, options.gain_tolerance);
   view.motion = calibration::CompareMotion(*model, finding.declared, calibration::Pointers(train), test);
   if (view.motion.repeats()) diagnosis->ConfirmNothing(verdict::MotionText(view.motion)[0]);

@@ -39,6 +39,8 @@ struct Diagnosed {
   nlohmann::ordered_json json;
 
  private:
+  // The log as its torque channel shows it.
+  void PutBehindChannel(calibration::Dataset& log) const;
   Eigen::VectorXd LeftAtSamples() const;
   void WriteJson();
 

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <unsupported/Eigen/KroneckerProduct>
 
 namespace armcal::diagnosis {
 
@@ -24,26 +25,13 @@ MatrixXd Alike(int count, double length) {
   return out;
 }
 
-MatrixXd AlikeOnSurface(const MatrixXd& outer, const MatrixXd& inner) {
-  MatrixXd out(outer.rows() * inner.rows(), outer.cols() * inner.cols());
-  for (Eigen::Index i = 0; i < outer.rows(); ++i)
-    for (Eigen::Index m = 0; m < outer.cols(); ++m)
-      out.block(i * inner.rows(), m * inner.cols(), inner.rows(), inner.cols()) = outer(i, m) * inner;
-  return out;
-}
-
 }  // namespace
 
 CurveOdds::CurveOdds(const MatrixXd& S, const VectorXd& g, int inner) {
   const int outer = static_cast<int>(g.size()) / inner;
-  std::vector<MatrixXd> kinds;
-  if (outer == 1) {
-    for (const double length : {kOfTheirOwn, kAlike}) kinds.push_back(Alike(inner, length));
-  } else {
-    for (const double length : {kOfTheirOwn, kAlike})
-      kinds.push_back(AlikeOnSurface(Alike(outer, length), Alike(inner, length)));
-  }
-  for (const MatrixXd& alike : kinds) {
+  for (const double length : {kOfTheirOwn, kAlike}) {
+    MatrixXd alike = Alike(inner, length);
+    if (outer > 1) alike = Eigen::kroneckerProduct(Alike(outer, length), alike).eval();
     const Eigen::LLT<MatrixXd> factor(alike);
     const MatrixXd root = factor.matrixL();
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(root.transpose() * S * root));

@@ -10,7 +10,7 @@ namespace armcal::diagnosis {
 // those that the data like best. A surface has neighbours in two directions.
 class CurveOdds {
  public:
-  // seen: S = C'C less what the base explains, and g = C'r. inner: coefficients in a row of a surface; those of a
+  // S = C'C less what the base explains, and g = C'r. inner: coefficients in a row of a surface; those of a
   // curve are one row.
   CurveOdds(const Eigen::MatrixXd& S, const Eigen::VectorXd& g, int inner);
 

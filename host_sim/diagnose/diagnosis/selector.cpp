@@ -10,6 +10,7 @@
 
 #include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/diagnosis/run_state.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/methods/exogeneity.hpp"
 
 namespace armcal::diagnosis {
@@ -396,21 +397,23 @@ bool Selector::ShowsBesideChannel(const Found& f, const Columns& columns, const 
   Columns all{columns.joints, {}};
   for (const int j : columns.joints)
     all.block.emplace_back(MatrixXd::Zero(w_.evidence.index[static_cast<std::size_t>(j)].size(), 2 * joints));
-  const auto torque = [this](calibration::Dataset log, double more_lag, double more_delay_s) {
-    for (calibration::JointChannel& c : log.channel)
-      if (!c.empty()) c.lag_s *= 1 + more_lag, c.late_s += more_delay_s;
-    return MatrixXd(calibration::Predict(w_.model, log, w_.estimate.x, w_.declared.eta));
-  };
   for (std::size_t log = 0; log < w_.train.size(); ++log) {
-    const MatrixXd as_told = torque(*w_.train[log], 0, 0);
-    const MatrixXd by[] = {(torque(*w_.train[log], kMoreLag, 0) - as_told) / kMoreLag,
-                           (torque(*w_.train[log], 0, kMoreDelay_s) - as_told) / kMoreDelay_s};
-    for (Eigen::Index r = 0; r < joints; ++r)
-      for (Eigen::Index c = 0; c < 2; ++c) {
-        const auto j = static_cast<std::size_t>(columns.joints[static_cast<std::size_t>(r)]);
-        w_.evidence.index[j].Take(static_cast<int>(log), by[c].col(static_cast<Eigen::Index>(j)),
-                                  all.block[static_cast<std::size_t>(r)].col(2 * r + c));
-      }
+    const calibration::Dataset& d = *w_.train[log];
+    const MatrixXd made = calibration::ModelTorque(w_.model, d, w_.estimate.x, w_.declared.eta);
+    for (Eigen::Index r = 0; r < joints; ++r) {
+      const int j = columns.joints[static_cast<std::size_t>(r)];
+      const calibration::JointChannel& told = d.channel[static_cast<std::size_t>(j)];
+      if (told.empty()) continue;
+      const auto seen = [&](double more_lag, double more_delay_s) {
+        return calibration::ThroughChannel(d.s.t, made.col(j),
+                                           {told.lag_s * (1 + more_lag), told.late_s + more_delay_s, told.lags});
+      };
+      const VectorXd as_told = seen(0, 0);
+      const RowIndex& index = w_.evidence.index[static_cast<std::size_t>(j)];
+      MatrixXd& block = all.block[static_cast<std::size_t>(r)];
+      index.Take(static_cast<int>(log), (seen(kMoreLag, 0) - as_told) / kMoreLag, block.col(2 * r));
+      index.Take(static_cast<int>(log), (seen(0, kMoreDelay_s) - as_told) / kMoreDelay_s, block.col(2 * r + 1));
+    }
   }
   const double alone = metric.Try(all).gain;
   for (std::size_t r = 0; r < all.block.size(); ++r) {

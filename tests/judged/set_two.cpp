@@ -23,7 +23,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kTrain_s = 40, kTest_s = 30, kIgnored_s = 0.5, kFine_Hz = 500;
+constexpr double kTrain_s = 40, kTest_s = 30, kIgnored_s = 0.5;
+// The torque is linear between these samples. A filter or a sample off the even times sees how friction turns over
+// within a few milliseconds.
+constexpr double kFine_Hz = 500, kFinest_Hz = 4000;
 constexpr int kTestDraws = 40, kStrengths = 12;
 constexpr double kSmallest = 0.1, kLargest = 2;  // sizes over the noise in the band
 constexpr double kSizeError = 0.08;
@@ -115,7 +118,10 @@ Setup DrawSetup(const std::string& group, int number, const Arm& arm, Random& r)
   return s;
 }
 
-double FineRate(const Setup& s) { return s.rate_Hz * std::ceil(kFine_Hz / s.rate_Hz); }
+double FineRate(const Setup& s) {
+  const double least_Hz = s.channel.late() || s.channel.sample_jitter > 0 ? kFinest_Hz : kFine_Hz;
+  return s.rate_Hz * std::ceil(least_Hz / s.rate_Hz);
+}
 
 // Of many, the motion that stays nearest to what training shows; chosen on a coarse grid, then drawn anew.
 Motion DrawTest(const Arm& arm, const Motion& train, double fine_Hz, Random& random) {

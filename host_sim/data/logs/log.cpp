@@ -10,6 +10,7 @@
 #include "host_sim/data/files/csv.hpp"
 #include "host_sim/data/logs/channels.hpp"
 #include "host_sim/data/logs/rows.hpp"
+#include "host_sim/data/logs/steps.hpp"
 #include "host_sim/data/logs/table.hpp"
 
 namespace armcal::logs {
@@ -106,20 +107,6 @@ Eigen::MatrixXd& Block(Log& log, const std::string& quantity) {
   return log.temp;
 }
 
-double MedianStep(const Eigen::VectorXd& t) {
-  Eigen::VectorXd step = t.tail(t.size() - 1) - t.head(t.size() - 1);
-  std::nth_element(step.begin(), step.begin() + step.size() / 2, step.end());
-  return step[step.size() / 2];
-}
-
-void ListGaps(Log& log) {
-  if (log.samples() < 2) return;
-  const double median = MedianStep(log.t);
-  for (Eigen::Index k = 0; k + 1 < log.samples(); ++k) {
-    if (log.t[k + 1] - log.t[k] > 1.5 * median) log.gaps.push_back(static_cast<int>(k));
-  }
-}
-
 // The file's rows as they stand.
 RawLog Raw(const std::string& file, Table table, const ChannelMap& map) {
   const Columns columns(
@@ -169,7 +156,7 @@ Log MakeLog(RawLog raw, int min_samples) {
                          (rows > log.samples() ? " in " + std::to_string(rows) + " rows" : "") +
                          ", expected at least " + std::to_string(min_samples));
   }
-  ListGaps(log);
+  log.gaps = LostBehind(log.t);
   return std::move(raw.log);
 }
 

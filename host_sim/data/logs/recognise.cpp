@@ -9,6 +9,8 @@
 #include <set>
 #include <utility>
 
+#include "host_sim/data/logs/steps.hpp"
+
 namespace armcal::logs {
 
 namespace {
@@ -156,11 +158,7 @@ std::string TimeLines(const Sight& sight) {
     if (words.contains(known)) unit = known;
   if (name == "__time") unit = "s";
   if (unit.empty()) {
-    std::vector<double> steps;
-    for (Eigen::Index k = 1; k < table.values.rows(); ++k)
-      if (const double step = table.values(k, best) - table.values(k - 1, best); step > 0) steps.push_back(step);
-    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-    const double step = steps.empty() ? 0 : steps[steps.size() / 2];
+    const double step = MedianStep(table.values.col(best));
     constexpr double kSlowest_Hz = 10, kFastest_Hz = 2e4;  // of nearly all logs
     unit = "s", why = "no unit in the name";
     for (const auto& [other, si] :

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <map>
 
+#include "host_sim/data/logs/steps.hpp"
+
 namespace armcal::logs {
 
 namespace {
@@ -18,16 +20,6 @@ bool Holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-double UsualStep(const Eigen::VectorXd& t) {
-  std::vector<double> step;
-  for (Eigen::Index k = 1; k < t.size(); ++k)
-    if (t[k] > t[k - 1]) step.push_back(t[k] - t[k - 1]);
-  if (step.empty()) return 0;
-  const auto middle = step.begin() + static_cast<std::ptrdiff_t>(step.size() / 2);
-  std::nth_element(step.begin(), middle, step.end());
-  return *middle;
-}
-
 std::size_t ChooseGrid(const std::vector<Series>& series, const std::vector<std::string>& main) {
   std::size_t grid = series.size();
   double slowest = 0;
@@ -35,7 +27,7 @@ std::size_t ChooseGrid(const std::vector<Series>& series, const std::vector<std:
     const auto& names = series[s].numbers.names;
     if (std::none_of(names.begin(), names.end(), [&main](const std::string& name) { return Holds(main, name); }))
       continue;
-    const double step = UsualStep(series[s].t);
+    const double step = MedianStep(series[s].t);
     if (grid == series.size() || step > kAsSlow * slowest) grid = s, slowest = step;
   }
   return grid == series.size() ? 0 : grid;
@@ -125,7 +117,7 @@ Common OnCommonTimes(const std::vector<Series>& series, const std::vector<std::s
   out.numbers.values.resize(grid.t.size(), columns);
   Eigen::Index at = 0;
   for (const Series& one : series) {
-    const double step_s = UsualStep(one.t);
+    const double step_s = MedianStep(one.t);
     out.numbers.names.insert(out.numbers.names.end(), one.numbers.names.begin(), one.numbers.names.end());
     auto block = out.numbers.values.middleCols(at, one.numbers.values.cols());
     at += one.numbers.values.cols();
@@ -134,7 +126,7 @@ Common OnCommonTimes(const std::vector<Series>& series, const std::vector<std::s
     else if (Interpolate(one, step_s, grid.t, held, block)) continue;
     else
       out.notes.push_back(fmt::format("{} ({}): interpolated at the times of {} ({})", one.name, Rate(step_s),
-                                      grid.name, Rate(UsualStep(grid.t))));
+                                      grid.name, Rate(MedianStep(grid.t))));
     NoteGaps(one, step_s, out.notes);
   }
   return out;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/logs/steps.hpp"
 
 namespace armcal::logs {
 namespace {
@@ -30,13 +31,6 @@ constexpr double kJitter = 0.02;  // of a step: below this stamps are even enoug
 
 [[noreturn]] void Fail(const RawRows& rows, const std::string& what) {
   throw io::InputError(rows.source + ": " + what);
-}
-
-double MedianOf(std::vector<double> x) {
-  if (x.empty()) return 0;
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
 }
 
 std::string Rows(Index count) { return count == 1 ? "1 row" : fmt::format("{} rows", count); }
@@ -120,13 +114,6 @@ class Chooser {
     Drop(twin, "they stand in the file twice, first line");
   }
 
-  double MedianStep() const {
-    std::vector<double> step;
-    for (Index i = 1; i < size(); ++i)
-      if (time(i) > time(i - 1)) step.push_back(time(i) - time(i - 1));
-    return MedianOf(std::move(step));
-  }
-
   struct Run {
     Index begin, end;  // rows [begin, end) with rising times and no jump
     Index length() const { return end - begin; }
@@ -149,7 +136,7 @@ class Chooser {
   void LeaveOutUnordered() {
     if (size() < 2) return;
     Index unordered = 0, first = -1;
-    const double jump_s = kJump * MedianStep();
+    const double jump_s = kJump * MedianStep(rows_.t(out_.row));
     const std::vector<Run> run = RisingRuns(jump_s, unordered, first);
     const Index allowed = std::max(kFewUnordered, static_cast<Index>(kUnorderedShare * static_cast<double>(size())));
     if (unordered == 0 && run.size() == 1) return;
@@ -241,7 +228,7 @@ class Chooser {
     }
     constexpr std::size_t kEnough = 50;
     if (distance.size() < kEnough) return {};
-    const double median = MedianOf(distance);
+    const double median = Median(distance);
     const auto share = [&distance](auto is) {
       return static_cast<double>(std::count_if(distance.begin(), distance.end(), is)) /
              static_cast<double>(distance.size());
@@ -263,7 +250,7 @@ class Chooser {
 
   void LeaveOutRepeats() {
     if (size() < 3) return;
-    const double step_s = MedianStep();
+    const double step_s = MedianStep(rows_.t(out_.row));
     const Holding q = FindHolding(rows_.q), tau = FindHolding(rows_.tau);
     std::vector<char> stale = Unmarked();
     if (q.regular || tau.regular) {
@@ -299,7 +286,7 @@ class Chooser {
 
   void CheckRate() const {
     if (size() < 3) return;
-    const double step_s = MedianStep(), rate_Hz = 1 / step_s;
+    const double step_s = MedianStep(rows_.t(out_.row)), rate_Hz = 1 / step_s;
     if (rate_Hz > 1.001 * kSlowest_Hz && rate_Hz <= kFastest_Hz) return;
     std::string looks;
     for (const auto& [unit, factor] : {std::pair{"ms", 1e3}, std::pair{"us", 1e6}, std::pair{"ns", 1e9}}) {
@@ -321,13 +308,12 @@ class Chooser {
   void MakeEven() {
     const Index count = size();
     if (count < 8) return;
-    std::vector<double> steps;
-    for (Index i = 1; i < count; ++i) steps.push_back(out_.t[i] - out_.t[i - 1]);
-    const double step_s = MedianOf(steps);
+    std::vector<char> cut = Unmarked();  // before these rows
+    for (const int lost : LostBehind(out_.t)) cut[static_cast<std::size_t>(lost) + 1] = 1;
     std::vector<Run> stretch;
     Index begin = 0;
     for (Index i = 1; i <= count; ++i) {
-      if (i < count && steps[static_cast<std::size_t>(i - 1)] < 1.8 * step_s && row(i) == row(i - 1) + 1) continue;
+      if (i < count && !cut[static_cast<std::size_t>(i)] && row(i) == row(i - 1) + 1) continue;
       stretch.push_back({begin, i});
       begin = i;
     }
@@ -335,7 +321,7 @@ class Chooser {
     for (const Run& run : stretch)
       for (Index i = run.begin + 2; i + 2 < run.end; ++i) AddReading(i, by_stamp, by_number);
     if (by_stamp.size() < 50) return;
-    const double stamp = MedianOf(std::move(by_stamp)), number = MedianOf(std::move(by_number));
+    const double stamp = Median(std::move(by_stamp)), number = Median(std::move(by_number));
     if (number >= kEvener * stamp) return;
     VectorXd even = out_.t;
     for (const Run& run : stretch) {
@@ -347,7 +333,8 @@ class Chooser {
     }
     for (Index i = 1; i < count; ++i)
       if (even[i] <= even[i - 1]) return;
-    const double jitter_s = std::sqrt((even - out_.t).squaredNorm() / static_cast<double>(count));
+    const double step_s = MedianStep(out_.t),
+                 jitter_s = std::sqrt((even - out_.t).squaredNorm() / static_cast<double>(count));
     if (jitter_s < kJitter * step_s) return;
     out_.notes.push_back(
         fmt::format("stamps jitter by {:.2g} s where the joints are sampled evenly; the mean step of {:.4g} "

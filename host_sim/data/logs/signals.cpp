@@ -15,6 +15,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/butterworth.hpp"
 #include "host_sim/data/logs/quintic_spline.hpp"
+#include "host_sim/data/logs/steps.hpp"
 
 namespace armcal::logs {
 
@@ -42,13 +43,6 @@ constexpr double kIrregular = 1e-4;      // time jitter over sample time below w
 constexpr double kNormalMad = 0.674490;  // median of |x| for a unit normal
 
 VectorXd Difference(const VectorXd& x) { return x.tail(x.size() - 1) - x.head(x.size() - 1); }
-
-double Median(std::vector<double> x) {
-  if (x.empty()) return 0;
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
 
 // Standard deviation of white noise under a smooth signal, from its difference of some order: robust against the few
 // samples where the signal itself jumps. Samples at rest (no difference at all) say nothing and are left out.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/data/logs/steps.hpp"
 
 namespace armcal::calibration {
 
@@ -214,9 +215,8 @@ void CheckTorque(const codegen::Robot& robot, const logs::Log& log, int j) {
     Fail(log, Joint(j) + (largest == 0 ? "torque is zero throughout, expected a measured torque"
                                        : "torque never changes, expected a measured torque"));
   // The median is no peak: a limit may be passed now and then, not most of the time.
-  VectorXd size = log.tau.col(j).cwiseAbs();
-  std::nth_element(size.begin(), size.begin() + size.size() / 2, size.end());
-  const double median = size[size.size() / 2];
+  const VectorXd size = log.tau.col(j).cwiseAbs();
+  const double median = logs::Median({size.begin(), size.end()});
   if (median > kOverTorque * joint.torque_limit_Nm)
     Fail(log, Joint(j) + fmt::format("torque {:.4g} most of the time{}, expected at most {:.4g} {}", median,
                                      largest / 1000 > kOverTorque * joint.torque_limit_Nm ? ""

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_sim/data/logs/steps.hpp"
 #include "host_sim/identify/methods/method_list.hpp"
 #include "host_sim/identify/methods/shared_steps.hpp"
 
@@ -35,9 +36,7 @@ VectorXd RobustScale(const Linearised& rows, int joints) {
   VectorXd scale = VectorXd::Ones(joints);
   for (int j = 0; j < joints; ++j) {
     if (size[j].empty()) continue;
-    const auto middle = size[j].begin() + static_cast<std::ptrdiff_t>(size[j].size() / 2);
-    std::nth_element(size[j].begin(), middle, size[j].end());
-    scale[j] = std::max(1.0, *middle / 0.6745);
+    scale[j] = std::max(1.0, logs::Median(std::move(size[j])) / 0.6745);
   }
   return scale;
 }

@@ -3,10 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "host_sim/data/logs/signals.hpp"
+#include "host_sim/data/logs/steps.hpp"
 #include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::logs {
@@ -200,6 +202,37 @@ TEST(Rows, EvenlySampledWithJitteringStamps_AreMadeEven) {
   for (Index k = 0; k < 2000; ++k)  // the same stamps, and the joints sampled at them
     for (Index j = 0; j < 2; ++j) rows.q(k, j) = Position(rows.t[k], j);
   EXPECT_EQ(ChooseSamples(rows).t, rows.t);
+}
+
+// Two stamps that jitter may be nearly two steps apart, and nothing is lost between them.
+TEST(Steps, StampsThatJitter_LoseNothing_AndEachLostSampleIsFound) {
+  std::mt19937_64 random(9);
+  const auto stamps = [&](double jitter, Index every) {
+    std::normal_distribution<double> normal(0, jitter);
+    Eigen::VectorXd t(21000);
+    double clock = 0;
+    for (Index k = 0; k < t.size(); ++k, clock += k % every == 0 && k > 0 ? 2 : 1)
+      t[k] = kStep_s * (clock + std::clamp(normal(random), -0.45, 0.45));
+    return t;
+  };
+  EXPECT_TRUE(LostBehind(stamps(0.2, 1000000)).empty());
+  const std::vector<int> lost = LostBehind(stamps(0.12, 700));
+  ASSERT_EQ(lost.size(), 29u);
+  for (int each = 1; each < 30; ++each) EXPECT_NEAR(lost[static_cast<std::size_t>(each) - 1], 700 * each, 2);
+  Eigen::VectorXd every_second = stamps(0, 1000000)(Eigen::seq(0, 400));
+  every_second.tail(101) += kStep_s * Eigen::VectorXd::LinSpaced(101, 0, 100);  // of the last part, every step is two
+  EXPECT_EQ(LostBehind(every_second).size(), 100u);
+}
+
+TEST(Rows, EvenlySampledWithStampsNearlyTwoStepsApart_AreMadeEven) {
+  std::mt19937_64 random(10);
+  std::normal_distribution<double> normal(0, 0.3);
+  RawRows rows = Good(2000);
+  const Eigen::VectorXd truth = rows.t;
+  for (double& t : rows.t) t += kStep_s * std::clamp(normal(random), -0.45, 0.45);
+  const Samples samples = ChooseSamples(rows);
+  const Eigen::VectorXd error = samples.t - truth;
+  EXPECT_LT((error.array() - error.mean()).abs().maxCoeff(), 0.03 * kStep_s);
 }
 
 TEST(Signals, NoRateOrFewSamples_HaveNoSpectrumAndDoNotCrash) {

@@ -24,11 +24,12 @@ constexpr double kLeastPivot = 1e-10;  // of a column's own square: directions t
 constexpr double kProbe_s = 0.005;     // lag whose column asks whether there is any
 constexpr double kTakesAway = 0.04;    // of a joint's squared error: what a lag must take away
 constexpr double kSureOfLag = 40;      // of chi^2
+constexpr double kShowsLag = 10;       // of chi^2, at one joint, where all joints together are sure
 constexpr double kMostJoints = 0.6;    // of those that move
 constexpr double kFewRowsForLag = 200;
 constexpr double kLongest_s = 0.25;
 constexpr std::array<double, 6> kLags_s{0.004, 0.008, 0.016, 0.032, 0.064, 0.128};
-constexpr std::array<double, 5> kDelays_s{0, 0.005, 0.01, 0.015, 0.02};
+constexpr std::array<double, 6> kDelays_s{0, 0.005, 0.01, 0.015, 0.02, 0.03};
 constexpr double kDelayStep_s = 0.005;
 constexpr int kHalvings = 6, kSweeps = 4;
 constexpr int kMostLags = 2;
@@ -89,9 +90,12 @@ double Row::Left(const JointChannel& channel, Index& rows, VectorXd* best, const
   return std::max(1e-300, square - 2 * right.dot(x) + x.dot(gram * x));
 }
 
-// Whether `with` leaves clearly less than `without`.
+// Whether `with` leaves clearly less than `without`: by chi^2, which is enough and takes away enough of the error.
+bool Clearly(double chi2, Index rows) {
+  return chi2 > kSureOfLag && chi2 > -std::log(1 - kTakesAway) * static_cast<double>(rows);
+}
 bool Clearly(double with, double without, Index rows) {
-  return with<(1 - kTakesAway) * without&& static_cast<double>(rows) * std::log(without / with)> kSureOfLag;
+  return Clearly(static_cast<double>(rows) * std::log(without / with), rows);
 }
 
 // A column of a little lag on the prediction takes away a clear share of the error.
@@ -114,9 +118,10 @@ struct Late {
   double left_delayed = 0, left_without = 0;
   Index rows = 0;
 
-  bool is_filtered(int lags) const {
-    return filtered[lags - 1].lag_s > 0 && Clearly(left[lags - 1], left_delayed, rows);
+  double gain(int lags) const {  // chi^2 by which low-passes explain the torque better than a delay
+    return static_cast<double>(rows) * std::log(left_delayed / left[lags - 1]);
   }
+  bool is_filtered(int lags) const { return filtered[lags - 1].lag_s > 0 && gain(lags) > kShowsLag; }
   bool is_delayed() const { return Clearly(left_delayed, left_without, rows); }
 };
 
@@ -260,7 +265,10 @@ TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Da
   int lags = 1;
   for (int more = 2; more <= kMostLags; ++more)
     if (left(more) < left(lags)) lags = more;
-  if (most(filtered(lags))) {
+  double gain = 0;
+  Index used = 0;
+  for (const Late& l : late) gain += l.gain(lags), used += l.rows;
+  if (most(filtered(lags)) && Clearly(gain, used)) {
     for (std::size_t k = 0; k < rows.size(); ++k)
       if (late[k].is_filtered(lags)) out[static_cast<std::size_t>(rows[k].joint)] = late[k].filtered[lags - 1];
       else if (late[k].is_delayed()) out[static_cast<std::size_t>(rows[k].joint)] = late[k].delayed;

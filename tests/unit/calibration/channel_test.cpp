@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <random>
 
 #include "host_sim/identify/calibration/channel.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
@@ -93,6 +94,24 @@ TEST(Channel, ALongDelayBehindTwoLowPasses_IsFound) {
     EXPECT_EQ(own.lags, 2);
     EXPECT_NEAR(own.lag_s, 0.0215, 0.002);
     EXPECT_NEAR(own.late_s, 0.02, 0.004);
+  }
+}
+
+// In noise no joint is sure of a short low-pass; all together are.
+TEST(Channel, AShortLowPassThatEachJointShowsALittle_IsFoundOnEach) {
+  Arm a;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  for (int j = 0; j < 6; ++j) {
+    a.Measure(j, 0.008, 0.01, 2);
+    const double sd = 0.1 * std::sqrt(a.log.tau.col(j).squaredNorm() / static_cast<double>(a.log.samples()));
+    for (double& y : a.log.tau.col(j)) y += sd * normal(random);
+  }
+  const TorqueChannel seen = a.Seen();
+  ASSERT_FALSE(seen.empty());
+  for (const JointChannel& own : seen) {
+    EXPECT_GT(own.lag_s, 0.004);
+    EXPECT_NEAR(own.lags * own.lag_s + own.late_s, 0.026, 0.005);
   }
 }
 

@@ -24,7 +24,7 @@ constexpr double kLeastPivot = 1e-10;  // of a column's own square: directions t
 constexpr double kProbe_s = 0.005;     // lag whose column asks whether there is any
 constexpr double kTakesAway = 0.04;    // of a joint's squared error: what a lag must take away
 constexpr double kSureOfLag = 40;      // of chi^2
-constexpr double kShowsLag = 10;       // of chi^2, at one joint, where all joints together are sure
+constexpr double kShowsLag = 10;       // of chi^2, at one joint, where the others are sure
 constexpr double kMostJoints = 0.6;    // of those that move
 constexpr double kFewRowsForLag = 200;
 constexpr double kLongest_s = 0.25;
@@ -123,6 +123,7 @@ struct Late {
   }
   bool is_filtered(int lags) const { return filtered[lags - 1].lag_s > 0 && gain(lags) > kShowsLag; }
   bool is_delayed() const { return Clearly(left_delayed, left_without, rows); }
+  bool may_be_delayed() const { return static_cast<double>(rows) * std::log(left_without / left_delayed) > kShowsLag; }
 };
 
 Late Search(const Row& row) {
@@ -271,7 +272,7 @@ TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Da
   if (most(filtered(lags)) && Clearly(gain, used)) {
     for (std::size_t k = 0; k < rows.size(); ++k)
       if (late[k].is_filtered(lags)) out[static_cast<std::size_t>(rows[k].joint)] = late[k].filtered[lags - 1];
-      else if (late[k].is_delayed()) out[static_cast<std::size_t>(rows[k].joint)] = late[k].delayed;
+      else if (late[k].may_be_delayed()) out[static_cast<std::size_t>(rows[k].joint)] = late[k].delayed;
     return out;
   }
   if (!most(std::count_if(late.begin(), late.end(), [](const Late& l) { return l.is_delayed(); }))) return {};
@@ -280,7 +281,7 @@ TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Da
   for (const Late& l : late) apart_s = std::max(apart_s, std::abs(l.delayed.late_s - mean_s));
   if (apart_s < kDelaysDiffer * mean_s) return {};
   for (std::size_t k = 0; k < rows.size(); ++k)
-    if (late[k].is_delayed()) out[static_cast<std::size_t>(rows[k].joint)] = late[k].delayed;
+    if (late[k].may_be_delayed()) out[static_cast<std::size_t>(rows[k].joint)] = late[k].delayed;
   return out;
 }
 

@@ -115,6 +115,19 @@ TEST(Channel, AShortLowPassThatEachJointShowsALittle_IsFoundOnEach) {
   }
 }
 
+// Where most joints are late, a joint that shows its delay less clearly is late, too.
+TEST(Channel, ADelayOfOneNoisyJointAmongLateOnes_IsFound) {
+  Arm a;
+  for (int j = 0; j < 6; ++j) a.Measure(j, 1e-6, 0.012 + 0.004 * j);
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  const double sd = 0.3 * std::sqrt(a.log.tau.col(2).squaredNorm() / static_cast<double>(a.log.samples()));
+  for (double& y : a.log.tau.col(2)) y += sd * normal(random);
+  const TorqueChannel seen = a.Seen();
+  ASSERT_FALSE(seen.empty());
+  EXPECT_NEAR(seen[2].late_s, 0.02, 0.006);
+}
+
 TEST(Channel, TorqueAsItIs_HasNone) { EXPECT_TRUE(Arm().Seen().empty()); }
 
 TEST(Channel, OneJointAlone_MayHaveAnotherCause) {

@@ -216,9 +216,17 @@ TEST(Steps, StampsThatJitter_LoseNothing_AndEachLostSampleIsFound) {
     return t;
   };
   EXPECT_TRUE(LostBehind(stamps(0.2, 1000000)).empty());
-  const std::vector<int> lost = LostBehind(stamps(0.12, 700));
-  ASSERT_EQ(lost.size(), 29u);
-  for (int each = 1; each < 30; ++each) EXPECT_NEAR(lost[static_cast<std::size_t>(each) - 1], 700 * each, 2);
+  // At a jitter of 0.18 of a step one loss in forty is hidden: its step is shorter than 1.5.
+  int found = 0, false_ones = 0;
+  for (int log = 0; log < 20; ++log) {
+    const std::vector<int> lost = LostBehind(stamps(0.18, 700));
+    int hits = 0;
+    for (int each = 1; each < 30; ++each)
+      hits += std::any_of(lost.begin(), lost.end(), [&](int k) { return std::abs(k - 700 * each) <= 2; });
+    found += hits, false_ones += static_cast<int>(lost.size()) - hits;
+  }
+  EXPECT_GE(found, 20 * 29 - 20);
+  EXPECT_LE(false_ones, 6);
   Eigen::VectorXd every_second = stamps(0, 1000000)(Eigen::seq(0, 400));
   every_second.tail(101) += kStep_s * Eigen::VectorXd::LinSpaced(101, 0, 100);  // of the last part, every step is two
   EXPECT_EQ(LostBehind(every_second).size(), 100u);

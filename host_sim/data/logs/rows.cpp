@@ -286,7 +286,7 @@ class Chooser {
 
   void CheckRate() const {
     if (size() < 3) return;
-    const double step_s = MedianStep(rows_.t(out_.row)), rate_Hz = 1 / step_s;
+    const double step_s = MedianStep(out_.t), rate_Hz = 1 / step_s;
     if (rate_Hz > 1.001 * kSlowest_Hz && rate_Hz <= kFastest_Hz) return;
     std::string looks;
     for (const auto& [unit, factor] : {std::pair{"ms", 1e3}, std::pair{"us", 1e6}, std::pair{"ns", 1e9}}) {

@@ -2,6 +2,7 @@
 #include "host_sim/data/logs/steps.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 
 namespace armcal::logs {

@@ -1,6 +1,5 @@
 // logs - the time between samples: the usual step, and where samples are lost.
-#ifndef ARMCAL_HOST_SIM_DATA_LOGS_STEPS_HPP_
-#define ARMCAL_HOST_SIM_DATA_LOGS_STEPS_HPP_
+#pragma once
 
 #include <Eigen/Core>
 #include <vector>
@@ -18,5 +17,3 @@ double MedianStep(const Eigen::VectorXd& t);
 std::vector<int> LostBehind(const Eigen::VectorXd& t);
 
 }  // namespace armcal::logs
-
-#endif  // ARMCAL_HOST_SIM_DATA_LOGS_STEPS_HPP_

@@ -104,10 +104,9 @@ struct CurveOdds::Product {
 
 CurveOdds::CurveOdds(const MatrixXd& S, const VectorXd& g, int inner)
     : inner_(inner), outer_(static_cast<int>(g.size()) / inner) {
-  const int outer = outer_;
   for (const double length : {kOfTheirOwn, kAlike}) {
     MatrixXd alike = Alike(inner, length);
-    if (outer > 1) alike = Eigen::kroneckerProduct(Alike(outer, length), alike).eval();
+    if (outer_ > 1) alike = Eigen::kroneckerProduct(Alike(outer_, length), alike).eval();
     const Eigen::LLT<MatrixXd> factor(alike);
     const MatrixXd root = factor.matrixL();
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(root.transpose() * S * root));
@@ -115,7 +114,7 @@ CurveOdds::CurveOdds(const MatrixXd& S, const VectorXd& g, int inner)
     priors_.push_back(
         {factor.solve(MatrixXd::Identity(g.size(), g.size())), eigen.eigenvalues().cwiseMax(0), u.cwiseAbs2()});
   }
-  if (outer > 1) FormProducts(S, g);
+  if (outer_ > 1) FormProducts(S, g);
   const Prior& any = priors_[0];
   for (Eigen::Index i = 0; i < any.seen.size(); ++i)
     if (any.seen[i] > kUnseen * any.seen.maxCoeff()) free_gain_ += any.u2[i] / any.seen[i];

@@ -10,7 +10,6 @@
 #include <map>
 #include <numbers>
 
-#include "host_sim/data/logs/steps.hpp"
 #include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/diagnosis/limits.hpp"
 #include "host_sim/diagnose/diagnosis/run_state.hpp"
@@ -277,7 +276,7 @@ Share ShareOf(const Diagnosis::Work& w, const Chosen& c, const VectorXd& amplitu
 // 1.48 times the median of |e|: the standard deviation of normal noise, whatever a few large values are.
 double RobustDeviation(const VectorXd& e) {
   const VectorXd size = e.cwiseAbs();
-  return 1.4826 * logs::Median({size.begin(), size.end()});
+  return 1.4826 * Median({size.begin(), size.end()});
 }
 
 // How much more likely a log is with a term than without it, twice the logarithm, over the term's joints. The largest

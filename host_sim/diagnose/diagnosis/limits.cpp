@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "host_sim/data/logs/steps.hpp"
 #include "host_sim/diagnose/diagnosis/search.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 
@@ -85,7 +84,7 @@ VectorXd TypicalLimits(const std::vector<Limit>& limits, int joints) {
     std::vector<double> own;
     for (const Limit& l : limits)
       if (l.joint == j && std::isfinite(l.rms_Nm)) own.push_back(l.rms_Nm);
-    if (!own.empty()) out[j] = logs::Median(std::move(own));
+    if (!own.empty()) out[j] = Median(std::move(own));
   }
   return out;
 }

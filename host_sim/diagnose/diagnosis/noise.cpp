@@ -67,6 +67,13 @@ void RowIndex::Take(int log, const Eigen::Ref<const VectorXd>& column, Eigen::Re
   if (weight.size()) rows.segment(first, last - first).array() *= weight.segment(first, last - first).array();
 }
 
+double Median(std::vector<double> x) {
+  if (x.empty()) return 0;
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  std::nth_element(x.begin(), middle, x.end());
+  return *middle;
+}
+
 bool IsWhite(const NoiseModel& noise) { return noise.order() == 0; }
 
 double SlowNoise(const NoiseModel& noise) { return noise.innovation / (1 - noise.a.sum()); }

@@ -36,6 +36,9 @@ struct NoiseModel {
   int order() const { return static_cast<int>(a.size()); }
 };
 
+// The upper one of the two in the middle, if their number is even; 0 of none.
+double Median(std::vector<double> x);
+
 bool IsWhite(const NoiseModel& noise);
 
 // The deviation of white noise that would be as large as this one for what is slow.

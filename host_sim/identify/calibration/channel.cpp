@@ -90,12 +90,12 @@ double Row::Left(const JointChannel& channel, Index& rows, VectorXd* best, const
   return std::max(1e-300, square - 2 * right.dot(x) + x.dot(gram * x));
 }
 
-// Whether `with` leaves clearly less than `without`: by chi^2, which is enough and takes away enough of the error.
+// By how much squared error `with` explains the rows better than `without`.
+double Chi2(double with, double without, Index rows) { return static_cast<double>(rows) * std::log(without / with); }
+
+// Whether that is enough, and takes away enough of the error.
 bool Clearly(double chi2, Index rows) {
   return chi2 > kSureOfLag && chi2 > -std::log(1 - kTakesAway) * static_cast<double>(rows);
-}
-bool Clearly(double with, double without, Index rows) {
-  return Clearly(static_cast<double>(rows) * std::log(without / with), rows);
 }
 
 // A column of a little lag on the prediction takes away a clear share of the error.
@@ -108,7 +108,8 @@ bool LooksLate(const Row& row) {
     const VectorXd torque = row.columns[l] * x;
     lag.push_back(ThroughChannel(row.logs[l]->s.t, torque, {kProbe_s, 0, 1}) - torque);
   }
-  return static_cast<double>(rows) > kFewRowsForLag && Clearly(row.Left({}, rows, nullptr, &lag), without, rows);
+  return static_cast<double>(rows) > kFewRowsForLag &&
+         Clearly(Chi2(row.Left({}, rows, nullptr, &lag), without, rows), rows);
 }
 
 struct Late {
@@ -118,12 +119,11 @@ struct Late {
   double left_delayed = 0, left_without = 0;
   Index rows = 0;
 
-  double gain(int lags) const {  // chi^2 by which low-passes explain the torque better than a delay
-    return static_cast<double>(rows) * std::log(left_delayed / left[lags - 1]);
-  }
-  bool is_filtered(int lags) const { return filtered[lags - 1].lag_s > 0 && gain(lags) > kShowsLag; }
-  bool is_delayed() const { return Clearly(left_delayed, left_without, rows); }
-  bool may_be_delayed() const { return static_cast<double>(rows) * std::log(left_without / left_delayed) > kShowsLag; }
+  double of_delay() const { return Chi2(left_delayed, left_without, rows); }
+  double of_lags(int lags) const { return Chi2(left[lags - 1], left_delayed, rows); }  // beyond that of a delay
+  bool is_filtered(int lags) const { return filtered[lags - 1].lag_s > 0 && of_lags(lags) > kShowsLag; }
+  bool is_delayed() const { return Clearly(of_delay(), rows); }
+  bool may_be_delayed() const { return of_delay() > kShowsLag; }
 };
 
 Late Search(const Row& row) {
@@ -268,7 +268,7 @@ TorqueChannel SeeChannel(const codegen::Model& model, const std::vector<const Da
     if (left(more) < left(lags)) lags = more;
   double gain = 0;
   Index used = 0;
-  for (const Late& l : late) gain += l.gain(lags), used += l.rows;
+  for (const Late& l : late) gain += l.of_lags(lags), used += l.rows;
   if (most(filtered(lags)) && Clearly(gain, used)) {
     for (std::size_t k = 0; k < rows.size(); ++k)
       if (late[k].is_filtered(lags)) out[static_cast<std::size_t>(rows[k].joint)] = late[k].filtered[lags - 1];

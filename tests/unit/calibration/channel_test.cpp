@@ -38,11 +38,17 @@ VectorXd Integrated(const VectorXd& t, const VectorXd& u, double lag_s, double l
 }
 
 struct Arm {
+  std::mt19937_64 random{3};
+  std::normal_distribution<double> normal;
   tests::SyntheticArm arm{tests::Er20(), 5};
   Dataset log = arm.Run(40, 6);
   void Measure(int j, double lag_s, double late_s, int lags = 1) {
     for (int pass = 0; pass < lags; ++pass)
       log.tau.col(j) = Integrated(log.s.t, log.tau.col(j), lag_s, pass == 0 ? late_s : 0);
+  }
+  void Disturb(int j, double share) {  // by white noise of this share of the torque
+    const double sd = share * std::sqrt(log.tau.col(j).squaredNorm() / static_cast<double>(log.samples()));
+    for (double& y : log.tau.col(j)) y += sd * normal(random);
   }
   TorqueChannel Seen() const { return SeeChannel(arm.model(), {&log}); }
 };
@@ -100,13 +106,7 @@ TEST(Channel, ALongDelayBehindTwoLowPasses_IsFound) {
 // In noise no joint is sure of a short low-pass; all together are.
 TEST(Channel, AShortLowPassThatEachJointShowsALittle_IsFoundOnEach) {
   Arm a;
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> normal;
-  for (int j = 0; j < 6; ++j) {
-    a.Measure(j, 0.008, 0.01, 2);
-    const double sd = 0.1 * std::sqrt(a.log.tau.col(j).squaredNorm() / static_cast<double>(a.log.samples()));
-    for (double& y : a.log.tau.col(j)) y += sd * normal(random);
-  }
+  for (int j = 0; j < 6; ++j) a.Measure(j, 0.008, 0.01, 2), a.Disturb(j, 0.1);
   const TorqueChannel seen = a.Seen();
   ASSERT_FALSE(seen.empty());
   for (const JointChannel& own : seen) {
@@ -119,10 +119,7 @@ TEST(Channel, AShortLowPassThatEachJointShowsALittle_IsFoundOnEach) {
 TEST(Channel, ADelayOfOneNoisyJointAmongLateOnes_IsFound) {
   Arm a;
   for (int j = 0; j < 6; ++j) a.Measure(j, 1e-6, 0.012 + 0.004 * j);
-  std::mt19937_64 random(4);
-  std::normal_distribution<double> normal;
-  const double sd = 0.3 * std::sqrt(a.log.tau.col(2).squaredNorm() / static_cast<double>(a.log.samples()));
-  for (double& y : a.log.tau.col(2)) y += sd * normal(random);
+  a.Disturb(2, 0.3);
   const TorqueChannel seen = a.Seen();
   ASSERT_FALSE(seen.empty());
   EXPECT_NEAR(seen[2].late_s, 0.02, 0.006);

@@ -139,7 +139,7 @@ class FactorWork {
 
   static constexpr int SumCost(const Shape& shape, int last) {  // of BeginUnitSum
     const int columns = last + 1 - shape.Begin(last);
-    return columns * FoldCost(0) + columns * (columns - 1) * 27 / 64;
+    return columns * FoldCost(0) + columns * (columns - 1) * kFoldCost / 64;
   }
   // P + c e e' with c >= 0, where e is the unit vector of position p <= last. In the block form p and last lie in the
   // front of one joint. The instructions depend on `last` alone.
@@ -204,15 +204,17 @@ class FactorWork {
   // How many of `count` columns are processed together, from number j on.
   static constexpr int Width(int count, int j) { return (count - j) % kBlock == 0 ? kBlock : 1; }
 
-  static constexpr int kRestCost = 6, kLeastRest = 8;  // of an element of a block; so many elements are worth a call
+  // Of an element of a block, in quarters, with its share of the call; so many elements are worth a call.
+  static constexpr int kRestCost = math::kMovesGroups ? 21 : 24, kLeastRest = 8;
+  static constexpr int kFoldCost = math::kMovesGroups ? 17 : 27;  // of an element of a rank-one sum, in 32nds
   // BeginCost covers the caller's work on the last row, too.
   static constexpr int BeginCost(const Shape& shape) { return 70 + 3 * shape.size / 2; }
   static constexpr int ApplyCost(const Shape& shape) { return 15 + shape.size; }
   static constexpr int ProjectCost(int width, int length) { return width == 1 ? 5 + 3 * length / 4 : 24 + 3 * length; }
   static constexpr int MeasureCost(int width, int length) {
-    return width == 1 ? 14 + 2 * length : 40 + kRestCost * length;
+    return width == 1 ? 14 + 2 * length : 40 + kRestCost * length / 4;
   }
-  static constexpr int FoldCost(int length) { return 13 + 27 * length / 32; }
+  static constexpr int FoldCost(int length) { return 13 + kFoldCost * length / 32; }
 
   enum class Stage : std::uint8_t { kIdle, kBegun, kProject, kMeasure, kSum };
 
@@ -323,9 +325,9 @@ class FactorWork {
         MeasureCorner(f, p);
         left -= MeasureCost(kBlock, 0);
       }
-      const int most = measured_ + math::Max(left / kRestCost & ~1, kLeastRest), end = math::Min(p, most);
+      const int most = measured_ + math::Max(left / kRestCost * 4, kLeastRest), end = math::Min(p, most);
       MeasureRest(f, p, measured_, end);
-      left -= kRestCost * (end - measured_);
+      left -= kRestCost * (end - measured_) / 4;
       measured_ = end < p ? end : 0;
       j += end < p ? 0 : kBlock;
     }

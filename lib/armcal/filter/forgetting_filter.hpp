@@ -258,7 +258,7 @@ class ForgettingFilter : public WholeRows<ForgettingFilter<Layout>> {
         pass.first = static_cast<std::uint8_t>(first);
         pass.rows = static_cast<std::uint8_t>(rows);
         pass.length = static_cast<std::uint8_t>(length);
-        pass.cost = static_cast<std::uint16_t>(16 + area * 3 + area * length * (rows == 1 ? 15 : 12) / 16);
+        pass.cost = static_cast<std::uint16_t>(12 + area * 3 + area * length * math::kPairCost / 8);
       }
       ++count;
     }

@@ -12,12 +12,12 @@
 
 namespace armcal::filter {
 
-inline constexpr int kSliceCredit = 2400;  // some 20 000 instructions: 0.2 ms on a Cortex-M4F at 168 MHz
+inline constexpr int kSliceCredit = 2600;  // at most: some 21 000 instructions, 0.2 ms on a Cortex-M4F at 168 MHz
 inline constexpr int kNoSlices = 1 << 30;  // enough for anything in one call
 
 // Credit of each slice if work of this cost is divided into equal slices.
 constexpr int EqualSlices(int cost) {
-  const int slices = (cost + kSliceCredit / 2) / kSliceCredit;
+  const int slices = (cost + kSliceCredit - 1) / kSliceCredit;
   return slices > 1 ? (cost + slices - 1) / slices : cost;
 }
 

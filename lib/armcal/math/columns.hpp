@@ -1,27 +1,29 @@
 // math - inner loops of the filters: products of columns, Bierman's update, Givens rotations.
 //
 // A loop works on several rows of a sample and several columns of a factor at once. It loads and stores each element
-// once for all of them: two rows and four columns take six instructions for an element where one row and one column
-// take ten. Each element sees the same operations in the same order as if the rows and the columns came one after the
-// other, so the bits are the same. A multiplication and an addition are never fused. So the bits are the same on all
-// machines, and on a Cortex-M4F the pair takes two cycles instead of three. Context: any.
+// once for all of them: two rows and four columns take five or six instructions for an element (kPairCost) where one
+// row and one column take ten. Each element sees the same operations in the same order as if the rows and the columns
+// came one after the other, so the bits are the same. A multiplication and an addition are never fused. So the bits are
+// the same on all machines, and on a Cortex-M4F the pair takes two cycles instead of three. Context: any.
 #pragma once
 
 #include <cstdint>
 #include <utility>
 
 #include "armcal/math/elementary.hpp"  // refuses -ffast-math, which would reorder the sums
+#include "armcal/math/groups.hpp"
 
 namespace armcal::math {
 
-// Inlined even at -Os, which would otherwise call a loop's body four times.
-#define ARMCAL_INLINE __attribute__((always_inline))
 // Never inlined: one copy serves all callers of a firmware, and the callers keep their registers.
 #ifdef __clang__
 #define ARMCAL_NOINLINE __attribute__((noinline))
 #else
 #define ARMCAL_NOINLINE __attribute__((noinline, noclone))
 #endif
+
+// Instructions for one element of one row and one column, where a loop takes several of each. Four are arithmetic.
+inline constexpr int kPairCost = kMovesGroups ? 5 : 6;
 
 namespace internal {
 struct BiermanElement {
@@ -55,12 +57,6 @@ ARMCAL_INLINE inline void ByFours(int length, Turn turn) {
 }
 }  // namespace internal
 
-// sum + the sum of a[k] b[k] for k < length.
-template <class T>
-ARMCAL_NOINLINE T Dot(const T* __restrict a, const T* __restrict b, int length, T sum = T(0)) {
-  internal::ByFours(length, [&](int k) ARMCAL_INLINE { sum += a[k] * b[k]; });
-  return sum;
-}
 // Subtracts x0 times r from x, then adds s times what is left of x to r. Shapes: x, r [length]. This is a Givens
 // rotation without square roots, and also a column of a rank-one sum. r changes by a small correction, so that little
 // is lost to rounding.
@@ -70,57 +66,63 @@ void Fold(T* __restrict x, T* __restrict r, T x0, T s, int length) {
 }
 
 namespace internal {
-// Calls f for 0 .. count - 1, each a constant. Unrolled by hand: at -O2 a compiler keeps such loops and their arrays.
-template <class F, int... k>
-ARMCAL_INLINE inline void EachOf([[maybe_unused]] F f, std::integer_sequence<int, k...>) {
-  (f(std::integral_constant<int, k>{}), ...);
-}
-template <int count, class F>
-ARMCAL_INLINE inline void Each(F f) {
-  EachOf(f, std::make_integer_sequence<int, count>{});
-}
-
 // `turns` elements of each row and of each column (or stored row). They are loaded before the first store: a core that
 // issues in order (Cortex-M7) would otherwise wait for each element's chain before it starts the next one. For the same
 // reason the pairs of a row and a stored row come in diagonals: pairs of one diagonal do not need each other.
 template <class Element, int rows, int stored, int stride, int turns, class T>
-ARMCAL_INLINE inline void BlockTurn(T* __restrict x, T* const* r, const T* c) {
+ARMCAL_INLINE inline void BlockTurn(T* __restrict x, T** r, const T* c) {
+  constexpr int kTogether = stride == rows ? turns : 1;  // turns whose elements of the rows lie side by side
+  constexpr int kGroups = turns / kTogether, kOwn = kTogether * rows;
+  constexpr int kOwnPlace = turns == 4 ? 12 : 16, kPlace = turns == 4 ? 16 : 24;
   T own[turns * rows], kept[turns * stored];
-  Each<turns>([&](auto t) ARMCAL_INLINE {
-    Each<rows>([&](auto i) ARMCAL_INLINE { own[t * rows + i] = x[t * stride + i]; });
-    Each<stored>([&](auto j) ARMCAL_INLINE { kept[t * stored + j] = r[j][t]; });
-  });
+  Each<stored>([&](auto j) ARMCAL_INLINE { Load<turns, kPlace + j * turns>(r[j], kept + j * turns); });
+  Each<kGroups>([&](auto g) ARMCAL_INLINE { Load<kOwn, kOwnPlace + g * kOwn>(x + g * stride, own + g * kOwn); });
   Each<rows + stored - 1>([&](auto diagonal) ARMCAL_INLINE {
     Each<rows>([&](auto i) ARMCAL_INLINE {
       constexpr int j = diagonal - i;
       if constexpr (0 <= j && j < stored) {
         constexpr int kAt = 2 * (i * stored + j);
         Each<turns>([&](auto t)
-                        ARMCAL_INLINE { Element()(own[t * rows + i], kept[t * stored + j], c[kAt], c[kAt + 1]); });
+                        ARMCAL_INLINE { Element()(own[t * rows + i], kept[j * turns + t], c[kAt], c[kAt + 1]); });
       }
     });
   });
-  Each<turns>([&](auto t) ARMCAL_INLINE {
-    Each<stored>([&](auto j) ARMCAL_INLINE { r[j][t] = kept[t * stored + j]; });
-    Each<rows>([&](auto i) ARMCAL_INLINE { x[t * stride + i] = own[t * rows + i]; });
-  });
+  Each<kGroups>([&](auto g) ARMCAL_INLINE { Store<kOwn, kOwnPlace + g * kOwn>(own + g * kOwn, x + g * stride); });
+  Each<stored>([&](auto j) ARMCAL_INLINE { r[j] = Store<turns, kPlace + j * turns>(kept + j * turns, r[j]); });
 }
 // All elements: rows x, columns r [stored], `length` of each. c [rows][stored][2]: two numbers for each pair. If kEven,
 // the length is even.
 template <class Element, int rows, int stored, int stride, bool kEven, class T>
 ARMCAL_INLINE inline void EachTurn(T* __restrict x, T** r, const T* c, int length) {
-  constexpr int kTurns = rows * stored <= 10 ? 2 : 1;  // as many as the registers hold
+  constexpr int kPairs = rows * stored;  // as many turns as the registers hold
+  constexpr int kTurns = kMovesGroups && kPairs <= 4 ? 4 : kPairs <= (kMovesGroups ? 8 : 10) ? 2 : 1;
   const T* const end = r[0] + length;
   const auto turns = [&](auto many) ARMCAL_INLINE {
     BlockTurn<Element, rows, stored, stride, many>(x, r, c);
-    Each<stored>([&](auto j) ARMCAL_INLINE { r[j] += many; });
     x += many * stride;
   };
   while (r[0] + (kTurns - 1) < end) turns(std::integral_constant<int, kTurns>{});
-  if constexpr (!kEven && kTurns == 2)
+  if constexpr (kTurns == 4)
+    if (r[0] + 1 < end) turns(std::integral_constant<int, 2>{});
+  if constexpr (!kEven && kTurns > 1)
     if (r[0] < end) turns(std::integral_constant<int, 1>{});
 }
 }  // namespace internal
+
+// sum + the sum of a[k] b[k] for k < length.
+template <class T>
+ARMCAL_NOINLINE T Dot(const T* __restrict a, const T* __restrict b, int length, T sum = T(0)) {
+  const auto turns = [&](auto many) ARMCAL_INLINE {
+    T left[many], right[many];
+    internal::Load<many, 0>(a, left), internal::Load<many, 4>(b, right);
+    internal::Each<many>([&](auto k) ARMCAL_INLINE { sum += left[k] * right[k]; });
+    a += many, b += many;
+  };
+  const T* const end = a + length;
+  while (a + 3 < end) turns(std::integral_constant<int, 4>{});
+  while (a < end) turns(std::integral_constant<int, 1>{});
+  return sum;
+}
 
 // Here several rows lie side by side: element k of row i is x[k * rows + i].
 
@@ -167,7 +169,7 @@ template <int columns, class T>
 ARMCAL_NOINLINE void FoldColumns(T* __restrict x, T* const* r, const T* __restrict fold, int length) {
   T c[2 * columns];
   T* each[columns];
-  internal::Each<2 * columns>([&](auto k) ARMCAL_INLINE { c[k] = fold[k]; });
+  internal::Load<2 * columns, 0>(fold, c);
   internal::Each<columns>([&](auto j) ARMCAL_INLINE { each[j] = r[j]; });
   internal::EachTurn<internal::FoldElement, 1, columns, 1, false>(x, each, c, length);
 }
@@ -204,7 +206,7 @@ template <int rows, int stored, int stride, class T>
 ARMCAL_NOINLINE void FoldBlock(T* __restrict x, T* __restrict first, const T* __restrict rotation, int length) {
   T c[2 * rows * stored];
   T* r[stored];
-  internal::Each<2 * rows * stored>([&](auto k) ARMCAL_INLINE { c[k] = rotation[k]; });
+  internal::Load<2 * rows * stored, 0>(rotation, c);
   r[0] = first + stored;
   internal::Each<stored - 1>([&](auto j) ARMCAL_INLINE { r[j + 1] = r[j] + (length + stored - 2 - j); });
   internal::EachTurn<internal::FoldElement, rows, stored, stride, (rows > 1)>(x + (stored + 1) * stride, r, c,

@@ -28,7 +28,7 @@ struct Committed {
 template <class Model>
 struct Rows {
   float front[Model::kFront > 0 ? Model::kFront : 1] = {};
-  float dense[Model::kDense > 0 ? Model::kJoints * Model::kDense : 1] = {};
+  float dense[Model::kDense > 0 ? Model::kJoints* Model::kDense : 1] = {};
 };
 
 // The states of effects with memory. Each stream of samples has a Memory of its own.
@@ -69,8 +69,10 @@ ARMCAL_NOINLINE inline float AddTorque(const float* p, const float* value, int c
 // [kColumns]. Context: any.
 template <class Model>
 float LoadTorque(const float* p, const Rows<Model>& rows, int joint) {
-  const int first = Model::kRowBegin[joint];
-  return AddTorque(p + Model::kFront + first, rows.dense + joint * Model::kDense + first, Model::kDense - first, 0.0f);
+  const int first = Model::kRowBegin[joint], effects = math::Max(first, Model::kRigid);
+  const float *const dense = p + Model::kFront, *const row = rows.dense + joint * Model::kDense;
+  const float links_Nm = math::Dot(dense + first, row + first, effects - first);
+  return AddTorque(dense + effects, row + effects, Model::kDense - effects, links_Nm);
 }
 
 // Torque of one joint (N m or N). p [kColumns]; load_Nm is its LoadTorque. Context: any.

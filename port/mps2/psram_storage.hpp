@@ -10,4 +10,8 @@ namespace armcal::port::mps2 {
 // erase is a fault: see flash_guard.hpp.
 hardware::Storage PsramStorage();
 
+// The same as two sectors of 128 KB, which take 2 s to erase. Erase answers kBusy meanwhile, and the code's flash may
+// be read.
+hardware::Storage SlowPsramStorage();
+
 }  // namespace armcal::port::mps2

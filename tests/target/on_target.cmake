@@ -46,6 +46,11 @@ add_test(NAME Firmware_StoredTables_SurvivePowerCuts
   COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/stored_tables.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_firmware>)
 set_tests_properties(Firmware_StoredTables_SurvivePowerCuts PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 1200 LABELS long)
 
+# The same firmware on sectors that take two seconds to erase.
+add_test(NAME Firmware_WhileASectorIsErased_LosesNoSample
+  COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/slow_sectors.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_firmware_slow>)
+set_tests_properties(Firmware_WhileASectorIsErased_LosesNoSample PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300 LABELS target)
+
 # The same firmware with its tick in RAM: while the flash is erased, nothing may read it.
 if(ARMCAL_TICK_IN_RAM)
   set(ram_image --image $<TARGET_FILE:armcal_firmware_ram> --map ${PROJECT_BINARY_DIR}/port/mps2/armcal_firmware_ram.map --within 20000000-20400000)

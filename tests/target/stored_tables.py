@@ -121,10 +121,10 @@ class Debugger:
         assert self.ask(command) == b"OK", "no watchpoint"
 
 
-def blank_memory(folder):
+def blank_memory(folder, storage_bytes=SECTORS):
     memory = os.path.join(folder, "psram")
     with open(memory, "wb") as file:
-        file.write(b"\xff" * SECTORS)
+        file.write(b"\xff" * storage_bytes)
         file.truncate(MEMORY)
     return memory
 

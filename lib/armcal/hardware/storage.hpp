@@ -7,9 +7,10 @@
 
 namespace armcal::hardware {
 
-// Erasable memory of equal sectors. Every function takes a bounded time, returns when the operation is complete, and
-// answers kOk or kStorageFault. A driver may report errors of its error correction as kStorageFault. Context:
-// background.
+// Erasable memory of equal sectors. Every function takes a bounded time and answers kOk or kStorageFault. A driver may
+// report errors of its error correction as kStorageFault. Program and erase may return when the operation is complete,
+// or start it and answer kBusy. Then they are called again, with the same arguments and nothing else in between, until
+// they answer how it ended. The driver must end it in bounded time. Context: background.
 struct Storage {
   void* context;
   std::uint32_t sector_count;  // at least 2; the lower half is slot 0, the upper half slot 1

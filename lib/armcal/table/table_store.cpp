@@ -316,7 +316,9 @@ void TableStore::FillCommit(std::uint8_t* bytes) const {
 
 Status TableStore::EraseNext() {
   state_[target_] = SlotState::kCorrupt;  // until the new record is whole
-  if (!IsOk(storage_.Erase(BaseOf(target_) + at_))) return Abandon();
+  const Status erased = storage_.Erase(BaseOf(target_) + at_);
+  if (erased == Status::kBusy) return erased;
+  if (!IsOk(erased)) return Abandon();
   ++at_;
   if (at_ * storage_.sector_bytes >= RecordBytes(source_words_, storage_.program_unit)) {
     stage_ = Stage::kProgram;
@@ -330,7 +332,9 @@ Status TableStore::ProgramNext() {
   const std::uint32_t count = end - at_ < kChunkBytes ? end - at_ : kChunkBytes;
   std::uint8_t bytes[kChunkBytes];
   FillBody(at_, bytes, count);
-  if (!IsOk(storage_.Program(AddressOf(target_) + at_, bytes, count))) return Abandon();
+  const Status programmed = storage_.Program(AddressOf(target_) + at_, bytes, count);
+  if (programmed == Status::kBusy) return programmed;
+  if (!IsOk(programmed)) return Abandon();
   at_ += count;
   if (at_ == end) {
     stage_ = Stage::kVerify;
@@ -356,7 +360,9 @@ Status TableStore::Commit() {
   std::uint8_t bytes[kChunkBytes];
   FillCommit(bytes);
   const std::uint32_t at = AddressOf(target_) + CommitAt();
-  if (!IsOk(storage_.Program(at, bytes, RoundUp(4, storage_.program_unit)))) return Abandon();
+  const Status committed = storage_.Program(at, bytes, RoundUp(4, storage_.program_unit));
+  if (committed == Status::kBusy) return committed;
+  if (!IsOk(committed)) return Abandon();
   stage_ = Stage::kVerifyCommit;
   return Status::kBusy;
 }
@@ -383,11 +389,12 @@ Status TableStore::Abandon() {
 
 // It is enough to erase the sector of the header, because a record without a header is not taken.
 Status TableStore::EraseTarget() {
-  const bool erased = IsOk(storage_.Erase(BaseOf(target_)));
-  state_[target_] = erased ? SlotState::kBlank : SlotState::kCorrupt;
+  const Status undone = storage_.Erase(BaseOf(target_));
+  if (undone == Status::kBusy) return undone;
+  state_[target_] = IsOk(undone) ? SlotState::kBlank : SlotState::kCorrupt;
   revocable_ = false;
   stage_ = Stage::kIdle;
-  return erased ? result_ : Status::kStorageFault;
+  return IsOk(undone) ? result_ : Status::kStorageFault;
 }
 
 }  // namespace armcal::table

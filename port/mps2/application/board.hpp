@@ -16,7 +16,11 @@ namespace mps2 = armcal::port::mps2;
 inline constexpr std::uint32_t kSilence_ms = 200;  // because an emulated line delivers in portions; 2 ms on a real line
 inline armcal::application::PretendAxes<armcal::generated::SelectedModel> axes;
 
+#ifdef ARMCAL_SLOW_SECTORS  // of the image armcal_firmware_slow
+inline armcal::hardware::Storage Storage() { return mps2::SlowPsramStorage(); }
+#else
 inline armcal::hardware::Storage Storage() { return mps2::PsramStorage(); }
+#endif
 inline armcal::hardware::Clock Clock() { return mps2::TickClock(); }
 inline armcal::hardware::Serial Serial() { return mps2::Uart1(); }
 // Its axes are always enabled and drive nothing.

@@ -38,8 +38,8 @@ struct Bench {
       Idle();
     }
   }
-  void Idle() {  // the limit is for an adoption that stays refused, which would keep it busy until a time-out
-    for (int k = 0; k < 100000 && controller.Step(); ++k) {
+  void Idle() {
+    for (int k = 0; k < steps && controller.Step(); ++k) {
     }
   }
 
@@ -130,6 +130,7 @@ struct Bench {
   Status booted = Status::kOk, torque = Status::kOk;
   float tau_Nm[n] = {};
   int disturbance_LSB = 0;
+  int steps = 100000;  // of the background in a tick, at most: an adoption that stays refused never ends
 };
 
 }  // namespace armcal::test

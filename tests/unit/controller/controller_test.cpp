@@ -151,6 +151,35 @@ TEST(Controller, OnABoardThatDoesNotAllowIt_RefusesABumplessTable) {
   EXPECT_EQ(drive->Boot(), Status::kForbidden) << "not even from storage";
 }
 
+// Sectors of 128 KB, which take two seconds to erase. The driver answers kBusy meanwhile.
+TEST(Controller, ASaveWhoseEraseTakesTwoSeconds_LosesNoSample) {
+  constexpr int kSteps = 4, kErase_ticks = 2000;
+  const auto bench = std::make_unique<Bench<Forgetting>>(
+      Bench<Forgetting>::Rules(), link::Identity{}, test::NorFlash({2, 131072, 8, 0xFF, 0, kSteps * kErase_ticks}));
+  auto table = estimator::DefaultTable<Model>();
+  ASSERT_EQ(bench->Flash(table), Status::kOk);
+  bench->steps = kSteps;
+  bench->Run(1000);
+  table.joint[0].sigma_Nm *= 1.5f;
+  std::uint32_t crc = 0;
+  ASSERT_EQ(bench->Check(table, crc), Status::kOk);
+  ASSERT_EQ(bench->Command(reg::kSave, crc), Status::kOk);
+  const std::uint32_t used = bench->Value<reg::kRowsUsedA>();
+  int ticks = 0;
+  for (; bench->Value<reg::kTransactionState>() == static_cast<int>(link::TransactionState::kCommitting); ++ticks) {
+    ASSERT_LT(ticks, 2 * kErase_ticks);
+    bench->Run(1);
+    if (ticks == kErase_ticks - 200) {
+      EXPECT_GT(bench->Value<reg::kRowsUsedA>(), used) << "it learns meanwhile";
+    }
+  }
+  EXPECT_GE(ticks, kErase_ticks);
+  EXPECT_EQ(bench->Value<reg::kSampleGaps>(), 0u);
+  EXPECT_EQ(bench->controller.estimator<0>().tick_gaps(), 0u);
+  EXPECT_EQ(bench->controller.adopted().sigma_Nm[0], table.joint[0].sigma_Nm);
+  EXPECT_FALSE(bench->flash.misused());
+}
+
 // The board allows five saves, then one a minute.
 TEST(Controller, Saves_AreAllowedInABurstAndThenOneAMinute) {
   const auto bench = std::make_unique<Bench<Forgetting>>();

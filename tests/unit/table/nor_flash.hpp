@@ -13,6 +13,7 @@ namespace armcal::test {
 struct Geometry {
   std::uint32_t sectors, sector_bytes, unit;
   std::uint8_t erased;
+  int busy_program = 0, busy_erase = 0;  // how often each one answers kBusy before it is done
 };
 
 // Where the power fails: in which operation (program or erase, counted from 0) and after how many of its bytes. Of the
@@ -37,6 +38,7 @@ class NorFlash {
   void CutAt(Cut cut) { cut_ = cut; }
   void PowerUp() {
     dead_ = false;
+    asked_ = 0;
     cut_ = {-1, 0};
     operations_ = 0;
   }
@@ -57,12 +59,14 @@ class NorFlash {
   int operations() const { return operations_; }
   int erases(std::uint32_t sector) const { return sector < erases_.size() ? erases_[sector] : 0; }
   bool dead() const { return dead_; }
-  bool misused() const { return misused_; }  // a unit was programmed twice, or was not aligned
+  // A unit was programmed twice or not aligned, or a busy flash was asked something else.
+  bool misused() const { return misused_; }
   const std::vector<std::uint32_t>& lengths() const { return lengths_; }  // bytes of each operation
 
  private:
   static core::Status Read(void* self, std::uint32_t address, std::uint8_t* bytes, std::uint32_t count) {
     auto& f = *static_cast<NorFlash*>(self);
+    if (f.asked_ > 0) f.misused_ = true;
     if (f.dead_ || address + count > f.cells_.size()) return core::Status::kStorageFault;
     for (std::uint32_t i = 0; i < count; ++i) bytes[i] = f.cells_[address + i];
     for (auto at = f.unstable_.lower_bound(address); at != f.unstable_.end() && at->first < address + count; ++at)
@@ -73,6 +77,7 @@ class NorFlash {
   static core::Status Program(void* self, std::uint32_t address, const std::uint8_t* bytes, std::uint32_t count) {
     auto& f = *static_cast<NorFlash*>(self);
     const std::uint32_t unit = f.geometry_.unit;
+    if (f.IsBusy(address, count, f.geometry_.busy_program)) return core::Status::kBusy;
     if (address % unit != 0 || count % unit != 0 || count > 64) f.misused_ = true;
     for (std::uint32_t u = address / unit; u < (address + count) / unit; ++u) {
       f.misused_ = f.misused_ || f.written_[u];
@@ -87,6 +92,7 @@ class NorFlash {
   static core::Status Erase(void* self, std::uint32_t sector) {
     auto& f = *static_cast<NorFlash*>(self);
     const std::uint32_t base = sector * f.geometry_.sector_bytes;
+    if (f.IsBusy(base, f.geometry_.sector_bytes, f.geometry_.busy_erase)) return core::Status::kBusy;
     if (f.erases_.size() <= sector) f.erases_.resize(sector + 1, 0);
     ++f.erases_[sector];
     return f.Operate(base, f.geometry_.sector_bytes, [&](std::uint32_t i) {
@@ -120,6 +126,15 @@ class NorFlash {
     return cut ? core::Status::kStorageFault : core::Status::kOk;
   }
 
+  bool IsBusy(std::uint32_t base, std::uint32_t count, int calls) {
+    if (dead_) return false;
+    if (asked_ > 0 && (base != asked_base_ || count != asked_count_)) misused_ = true;
+    asked_base_ = base, asked_count_ = count;
+    if (asked_ < calls) return ++asked_, true;
+    asked_ = 0;
+    return false;
+  }
+
   struct Weak {
     std::uint8_t bit;
     double wrong;  // share of readings
@@ -138,6 +153,8 @@ class NorFlash {
   Cut cut_{-1, 0};
   int failing_ = -1, skipping_ = -1;
   int operations_ = 0;
+  int asked_ = 0;  // asked_: how often the present operation has answered kBusy
+  std::uint32_t asked_base_ = 0, asked_count_ = 0;
   bool dead_ = false, misused_ = false;
 };
 

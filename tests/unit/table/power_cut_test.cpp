@@ -147,9 +147,9 @@ TEST_P(PowerCut, Store_AfterASecondCutDuringRecovery_LoadsOldOrNew) {
 
 INSTANTIATE_TEST_SUITE_P(Geometries, PowerCut,
                          testing::Values(Geometry{2, 256, 1, 0xFF}, Geometry{2, 256, 4, 0x00},
-                                         Geometry{2, 512, 8, 0xFF}, Geometry{2, 256, 32, 0xFF},
-                                         Geometry{2, 256, 32, 0x00}, Geometry{6, 64, 8, 0xFF},
-                                         Geometry{4, 128, 64, 0x00}));
+                                         Geometry{2, 512, 8, 0xFF}, Geometry{2, 512, 8, 0xFF, 3, 5},
+                                         Geometry{2, 256, 32, 0xFF}, Geometry{2, 256, 32, 0x00},
+                                         Geometry{6, 64, 8, 0xFF}, Geometry{4, 128, 64, 0x00}));
 
 // A store that has loaded table 2 while table 1 lies in the other slot. Then cells go bad.
 struct LoadedStore {

@@ -54,8 +54,9 @@ struct Tally {
 };
 
 void RunCase(std::uint32_t seed, Tally& tally) {
-  static const Geometry geometries[] = {{2, 256, 1, 0xFF}, {2, 256, 4, 0x00},  {2, 512, 8, 0xFF},  {2, 256, 32, 0xFF},
-                                        {6, 64, 8, 0xFF},  {4, 128, 64, 0x00}, {2, 256, 32, 0x00}, {4, 256, 16, 0xFF}};
+  static const Geometry geometries[] = {{2, 256, 1, 0xFF},  {2, 256, 4, 0x00}, {2, 512, 8, 0xFF, 2, 7},
+                                        {2, 256, 32, 0xFF}, {6, 64, 8, 0xFF},  {4, 128, 64, 0x00, 1, 1},
+                                        {2, 256, 32, 0x00}, {4, 256, 16, 0xFF}};
   std::mt19937 random(seed);
   const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
   const auto chance = [&] { return std::uniform_real_distribution<double>(0.0, 1.0)(random); };

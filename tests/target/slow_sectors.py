@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+"""The firmware on a memory whose sectors take two seconds to erase: a save loses no sample and no tick.
+
+  slow_sectors.py BOARD IMAGE
+
+Saves tables. Reads during each save how many rows the filter has used and how many samples were lost. 77: no QEMU.
+"""
+import shutil
+import sys
+import tempfile
+
+from stored_tables import BLANK, Board, blank_memory, halves, variant
+
+SAVES, STORAGE_BYTES = 2, 2 * 128 * 1024
+ERASE_TICKS, COMMITTING, ACTIVE = 2000, 4, 5
+TICK, SAMPLE_GAPS, ROWS_USED, STATE = 0x0046, 0x0054, 0x0060, 0x0040
+
+
+def save(b, table):
+    """Answers how many ticks the save took, and how many rows were used in the first half of it."""
+    command = b.send(table)
+    begin, rows = b.line.u32(TICK), b.line.u32(ROWS_USED)
+    b.line.write(0x0000, command)
+    used = 0
+    while (state := b.line.read(4, STATE, 1)[0]) == COMMITTING:
+        if (now := b.line.u32(TICK)) - begin < ERASE_TICKS // 2:
+            used = b.line.u32(ROWS_USED) - rows
+    assert state == ACTIVE, f"transaction state {state}, status {b.line.read(4, STATE + 1, 1)[0]}"
+    return b.line.u32(TICK) - begin, used
+
+
+def main():
+    board, image = sys.argv[1:]
+    if shutil.which("qemu-system-arm") is None:
+        print("skipped: no qemu-system-arm (toolchains/install.sh cross)")
+        return 77
+    with tempfile.TemporaryDirectory() as folder, Board(board, image, blank_memory(folder, STORAGE_BYTES)) as b:
+        assert b.line.read(4, 0x0042, 1) == [BLANK], "the first boot of an empty storage"
+        default = b.table()
+        for k in range(SAVES):
+            ticks, used = save(b, variant(default, k))
+            assert b.table() == variant(default, k), f"save {k}"
+            assert ticks >= ERASE_TICKS, f"save {k} took {ticks} ticks"
+            assert used > 0, f"save {k}: no row was used meanwhile"
+            lost = b.line.u32(SAMPLE_GAPS)
+            assert lost == 0, f"save {k}: {lost} samples lost"
+            print(f"save {k}: {ticks} ticks, no sample lost")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -7,10 +7,18 @@
 
 namespace armcal::filter {
 
+// Counts the samples in which each joint moves, and those in which all of them do. moving: bit i for joint i. Shape:
+// moved [joints + 1], the last one for all; the counts wrap. One copy serves all filters. Context: background.
+ARMCAL_NOINLINE inline void CountMoving(std::uint32_t moving, int joints, std::uint8_t* moved) {
+  const std::uint32_t all = (1u << joints) - 1u;
+  for (int i = 0; i < joints; ++i) moved[i] = static_cast<std::uint8_t>(moved[i] + (moving >> i & 1u));
+  moved[joints] = static_cast<std::uint8_t>(moved[joints] + ((moving & all) == all));
+}
+
 // Takes the rows of a sample in their order, two at a time. Process noise is added by rank-one sums. `considered`
 // columns follow Schmidt's form. After each sample, noise is added to one column only, and the next sample serves the
-// next column. So the filter adds the noise of one full round at once. The state is [front, dense], and in an extended
-// filter eta after it. Every call is bounded. Context: background.
+// next column. It is the noise of all samples since the column's last turn in which its joints have moved. The state is
+// [front, dense], and in an extended filter eta after it. Every call is bounded. Context: background.
 template <class Layout, Form form = Form::kDense, Beside beside = Beside::kNothing>
 class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
  public:
@@ -49,6 +57,8 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
       considered_[p / 32] |= static_cast<std::uint32_t>(prior.considered[k]) << (p % 32);
     }
     next_turn_ = 0;
+    for (std::uint8_t& moved : moved_) moved = 0;
+    for (std::uint8_t& moved : at_turn_) moved = 0;
     floor_count_ = 0;
     clamp_count_ = 0;
   }
@@ -91,17 +101,20 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
     return kEndCost + Layout::kJoints / kRowsAtOnce * kRowCost + Estimate::kRowsCost + sum;
   }
 
-  // Once after the rows of a sample. Adds process noise to a column whose joints move (bit i of `moving`: joint i), and
-  // holds the floor under the dense D.
+  // Once after the rows of a sample: adds process noise, and holds the floor under the dense D. Bit i of `moving`:
+  // joint i moves.
   void BeginEnd(std::uint32_t moving) {
     floor_count_ += estimate_.HoldFloor(*prior_);
     if (turns_ == 0) return;
+    CountMoving(moving, Layout::kJoints, moved_);
     const int p = turn_[next_turn_], k = Columns::kAt.column[p];
-    const std::uint32_t needed = JointsOf<Layout>(k);
-    const float noise = prior_->noise[k] * static_cast<float>(turns_);
-    estimate_.BeginUnitSum(p, math::Masked(noise, math::MaskOf((moving & needed) == needed)), LastOf(k));
+    std::uint8_t& last = at_turn_[next_turn_];
+    const std::uint8_t now = moving != 0u ? moved_[JointOf<Layout>(k)] : last;  // while all joints rest, no turn passes
+    const auto samples = static_cast<std::uint8_t>(now - last);
+    last = now;
+    estimate_.BeginUnitSum(p, prior_->noise[k] * static_cast<float>(samples), LastOf(k));
     const int following = next_turn_ + 1 < turns_ ? next_turn_ + 1 : 0;
-    next_turn_ = moving != 0u ? following : next_turn_;  // while all joints rest, no turn passes
+    next_turn_ = moving != 0u ? following : next_turn_;
   }
   bool StepEnd(int& credit) {
     if (turns_ > 0 && !estimate_.StepSum(credit)) return false;
@@ -180,6 +193,8 @@ class KalmanFilter : public WholeRows<KalmanFilter<Layout, form, beside>> {
   std::uint32_t considered_[(kSize + 31) / 32] = {};
   std::uint8_t turn_[kSize] = {};  // positions with noise
   int turns_ = 0, next_turn_ = 0, last_noise_ = 0;
+  // Samples with motion (CountMoving), now and at the last turn of each position. A turn comes before they wrap.
+  std::uint8_t moved_[Layout::kJoints + 1] = {}, at_turn_[kSize] = {};
   ColumnRange reset_ = {};  // what remains of a reset
   std::uint32_t floor_count_ = 0, clamp_count_ = 0;
 };

@@ -36,13 +36,6 @@ constexpr int JointOf(int column) {
   for (int i = 0; i < Layout::kJoints; ++i) joint += column >= Layout::kFrontBegin[i + 1];
   return joint;
 }
-// The joints that must all move in a sample for process noise to be added to the column: its own joint for a front
-// column, all joints for any other. A bit each.
-template <class Layout>
-constexpr std::uint32_t JointsOf(int column) {
-  const int joint = JointOf<Layout>(column);
-  return joint < Layout::kJoints ? 1u << joint : (1u << Layout::kJoints) - 1u;
-}
 
 // The columns that a reset takes together: the front columns of a joint, or (block kJoints) all other columns.
 struct ColumnRange {

@@ -54,6 +54,8 @@ inline const Ticks& JitteredTicks() {
   return ticks;
 }
 
+inline constexpr std::uint32_t kLost = ~0u;  // in the place of a tick's number: the drive never sees it
+
 // bad: what the drive sees. known: the same ticks, exactly in time, clean and flagged by the bus.
 struct Pair {
   Ticks bad, known = CleanTicks();
@@ -115,6 +117,13 @@ inline const std::vector<Glitch>& Battery() {
            p.Flag(k, 0);
          });
        }},
+      {"lost frames",
+       [](Pair& p) {
+         p.EverySecond([&](int k) {
+           const int ticks = 1 + static_cast<int>(p.random() % 3);
+           for (int t = k; t < k + ticks; ++t) p.bad[t].tick = kLost, p.Flag(t, 0);
+         });
+       }},
       {"swapped frames",
        [](Pair& p) {
          p.EverySecond([&](int k) {
@@ -169,7 +178,7 @@ struct GlitchTest : testing::Test {
     arm->Adopt(*table, 0);
     std::vector<Estimates<Model>> published(1);
     for (const auto& raw : ticks) {
-      (void)arm->Push(raw);
+      if (raw.tick != kLost) (void)arm->Push(raw);
       while (arm->Step()) {
       }
       if (arm->Take(published.back())) published.push_back(published.back());

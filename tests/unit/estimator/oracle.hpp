@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "armcal/estimator/estimator.hpp"
+#include "tests/unit/filter/moving_joints.hpp"
 
 namespace armcal::estimator::test {
 
@@ -97,7 +98,7 @@ struct Oracle {
       r = Eigen::HouseholderQR<Matrix>(stacked).matrixQR().topRows(n).template triangularView<Eigen::Upper>();
       stacked.setZero();
       for (int k = 0; k < n && !lambda.empty(); ++k) {
-        const std::uint32_t needed = filter::JointsOf<Model>(active[k]);
+        const std::uint32_t needed = filter::test::JointsOf<Model>(active[k]);
         if ((moving & needed) == needed) r.row(k) *= std::sqrt(lambda[active[k]]);
       }
     }

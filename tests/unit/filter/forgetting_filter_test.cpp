@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "armcal/filter/kalman_filter.hpp"
+#include "tests/unit/filter/moving_joints.hpp"
 #include "tests/unit/filter/rows.hpp"
 
 namespace armcal::filter {

@@ -146,17 +146,29 @@ TEST(KalmanFilter, ProcessNoise_HasTheStatedMeanRate_AndWaitsForMotion) {
   filter.Restart(bench.prior);
   for (int s = 0; s < 300; ++s) filter.EndSample(kAll);
   SmallKalman::ReadOut out = Read(filter);
-  EXPECT_NEAR(out.sd[0] * out.sd[0], 1 + 0.3, 1e-4);
+  // Two samples have passed since the turn of column 0, and one since that of column 8.
+  EXPECT_NEAR(out.sd[0] * out.sd[0], 1 + 0.298, 1e-4);
   EXPECT_NEAR(out.sd[3] * out.sd[3], 1 + 0.6, 1e-4);
-  EXPECT_NEAR(out.sd[8] * out.sd[8], 1 + 1.2, 1e-4);
+  EXPECT_NEAR(out.sd[8] * out.sd[8], 1 + 1.196, 1e-4);
   EXPECT_NEAR(out.sd[1], 1, 1e-6);
 
   filter.Restart(bench.prior);
   for (int s = 0; s < 300; ++s) filter.EndSample(1);  // only the first joint moves
   out = Read(filter);
-  EXPECT_NEAR(out.sd[0] * out.sd[0], 1 + 0.3, 1e-4);
+  EXPECT_NEAR(out.sd[0] * out.sd[0], 1 + 0.298, 1e-4);
   EXPECT_EQ(out.sd[3], 1.0f);
   EXPECT_NEAR(out.sd[8], 1.0f, 1e-6f);
+
+  // All joints move in every second sample, or in every third one, whichever column has its turn then.
+  for (const int every : {2, 3}) {
+    filter.Restart(bench.prior);
+    for (int s = 0; s < 300; ++s) filter.EndSample(s % every == 0 ? kAll : 2u);
+    out = Read(filter);
+    for (const int k : {0, 3}) {
+      const double samples = 300.0 / every, noise = bench.prior.noise[k];
+      EXPECT_NEAR(out.sd[k] * out.sd[k], 1 + samples * noise, 1.01 * noise) << k << ", every " << every;
+    }
+  }
 }
 
 TYPED_TEST(EitherForm, LinkFloor_HoldsDAndCountsItself) {
@@ -215,7 +227,7 @@ TYPED_TEST(EitherForm, FrontNoise_IsTheTextbooksInTurn) {
   TypeParam filter;
   filter.Restart(bench.prior);
   Textbook textbook(bench.prior);
-  int turn = 0;
+  int samples = 0, last[3] = {};  // of each column's turn
   for (const Row& r : bench.Rows(300)) {
     if (r.joint == 0) (void)TakeRows(filter, &r);
     const UpdateReport got = filter.report(r.joint);
@@ -224,8 +236,9 @@ TYPED_TEST(EitherForm, FrontNoise_IsTheTextbooksInTurn) {
     EXPECT_NEAR(got.variance / expected.variance, 1, 1e-4);
     if (r.joint < Small::kJoints - 1) continue;
     // In the order of the factor: joint 0's columns, then joint 2's.
-    const int k = noisy[turn++ % 3];
-    textbook.p(k, k) += 3.0 * bench.prior.noise[k];
+    const int turn = samples++ % 3, k = noisy[turn];
+    textbook.p(k, k) += (samples - last[turn]) * static_cast<double>(bench.prior.noise[k]);
+    last[turn] = samples;
     filter.EndSample(kAll);
   }
 }

@@ -153,6 +153,8 @@ class Estimator {
   // The filter's finished read-out, for BeginPhysical. nullptr: there is none yet, one is being computed, or rows have
   // come in since. Context: background.
   const typename Filter::ReadOut* read_out() const { return stands_ ? &read_out_ : nullptr; }
+  // How many read-outs have been finished. Context: background.
+  std::uint32_t read_outs() const { return read_outs_; }
 
  private:
   enum class Stage : std::uint8_t {
@@ -341,6 +343,7 @@ class Estimator {
     estimates_.refused = intake_.refused();
     published_.Post(estimates_);
     stands_ = true;
+    ++read_outs_;
     stage_ = Stage::kIdle;
   }
 
@@ -368,6 +371,7 @@ class Estimator {
   std::uint32_t updating_ = 0, used_ = 0;        // joints, a bit each: rows that may change the estimate, and that did
   std::uint32_t outside_ = 0;                    // rows that the gate refuses
   std::uint32_t resets_due_ = 0;                 // blocks, a bit each
+  std::uint32_t read_outs_ = 0;
   std::uint32_t publish_every_ = 125;
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;

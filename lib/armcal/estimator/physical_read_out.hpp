@@ -23,27 +23,32 @@ const auto& EstimateOf(const filter::KalmanFilter<Layout, form, beside>& filter,
 }
 
 // Starts to copy estimate and covariance of an estimator's filter to `read_out`. Call it when no sample is being
-// processed, and then ContinuePhysical until it answers kOk; the estimator must not Step before that. Then call
-// read_out.Step until it returns true; the estimator may go on meanwhile. table: the table of the estimator. rigid: the
-// work space that BuildAdoptedTable filled for this table. Both must not change until the read-out is done. warm: true
-// if the last read-out was of the same table. kBusy: the filter has no finished read-out (Estimator::read_out); call
-// RequestReadOut, wait, and call this again. All other answers are those of MapReadOut::Begin. Context: background.
+// processed, and then ContinuePhysical until it answers kOk; the estimator must not Step before that, or the hand-over
+// has to begin again. Then call read_out.Step until it returns true; the estimator may go on meanwhile. table: the
+// table of the estimator. rigid: the work space that BuildAdoptedTable filled for this table. Both must not change
+// until the read-out is done. warm: true if the last read-out was of the same table. kBusy: the filter has no finished
+// read-out (Estimator::read_out); call RequestReadOut, wait, and call this again. All other answers are those of
+// MapReadOut::Begin. Context: background.
 template <class Model, class Filter, class Source, class T>
 core::Status BeginPhysical(const AdoptedTable<Model>& table, const physical::RigidPrior<Model, float>& rigid,
                            const Estimator<Model, Filter, Source>& estimator, bool warm,
                            physical::MapReadOut<Model, T>& read_out) {
   const typename Filter::ReadOut* done = estimator.read_out();
   if (done == nullptr) return core::Status::kBusy;
-  return read_out.Begin({rigid.mean, rigid.sd, table.committed.p, table.scale, table.prior.dense_ud}, done->x, warm);
+  const core::Status begun =
+      read_out.Begin({rigid.mean, rigid.sd, table.committed.p, table.scale, table.prior.dense_ud}, done->x, warm);
+  if (core::IsOk(begun)) read_out.SetSource(estimator.read_outs());
+  return begun;
 }
 
 // One slice of that: a column of the filter's factor, some kColumns^2 multiplications and additions. kBusy: call it
-// again. kOk: all columns are copied. All other answers are those of MapReadOut::AddSpread. Context: background.
+// again. kOk: all columns are copied. kWrongOrder: the estimator has stepped since BeginPhysical, so its estimate is
+// another one; call BeginPhysical again. All other answers are those of MapReadOut::AddSpread. Context: background.
 template <class Model, class Filter, class Source, class T>
 core::Status ContinuePhysical(const Estimator<Model, Filter, Source>& estimator,
                               physical::MapReadOut<Model, T>& read_out) {
   const typename Filter::ReadOut* done = estimator.read_out();
-  if (done == nullptr) return core::Status::kBusy;
+  if (done == nullptr || estimator.read_outs() != read_out.source()) return core::Status::kWrongOrder;
   const auto& estimate = EstimateOf(estimator.filter(), *done);
   constexpr int kSize = std::decay_t<decltype(estimate)>::kSize;
   float spread[kSize];

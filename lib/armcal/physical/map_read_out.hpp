@@ -70,6 +70,9 @@ class MapReadOut {
     ++next_;
     return core::Status::kOk;
   }
+  // A number of the caller's: which estimate it has begun with.
+  void SetSource(std::uint32_t number) { source_ = number; }
+  std::uint32_t source() const { return source_; }
   // Columns that AddSpread has taken since Begin; 0 from the first Step on.
   int spreads() const { return stage_ == Stage::kSpread ? next_ : 0; }
 
@@ -263,6 +266,7 @@ class MapReadOut {
   Result result_;
   T share_ = T(1), cost_ = T(0);  // of the step that is tried
   int next_ = 0, level_ = 0, halvings_ = 0;
+  std::uint32_t source_ = 0;
   bool warm_ = false, inside_ = false;
   Stage stage_ = Stage::kDone;
 };

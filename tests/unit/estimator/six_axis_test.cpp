@@ -116,5 +116,29 @@ TEST(SixAxis, PhysicalReadOut_OfBothFilters_IsTheSameArmAndNearerToTheTruthThanT
   EXPECT_LT(after, 0.02 * before);
 }
 
+// Otherwise the columns of two estimates would be mixed.
+TEST(SixAxis, AHandOverThatASampleInterrupts_BeginsAgain) {
+  auto host = std::make_unique<Host<Model, filter::KalmanFilter<Model>>>();
+  ASSERT_EQ(host->Adopt(), core::Status::kOk);
+  const auto samples = Record(DrawTruth(host->table, host->b0()), 3);
+  ASSERT_EQ(host->Feed(samples[0]), core::Status::kOk);
+  host->Read();
+  auto out = std::make_unique<physical::MapReadOut<Model, double>>();
+  const auto begin = [&] { return BeginPhysical(host->adopted, host->rigid, host->estimator, false, *out); };
+  const auto go_on = [&] { return ContinuePhysical(host->estimator, *out); };
+  EXPECT_EQ(begin(), core::Status::kOk);
+  EXPECT_EQ(go_on(), core::Status::kBusy);
+  ASSERT_EQ(host->Feed(samples[1]), core::Status::kOk);
+  EXPECT_EQ(begin(), core::Status::kBusy) << "there is no finished read-out";
+  EXPECT_EQ(go_on(), core::Status::kWrongOrder);
+  host->Read();
+  EXPECT_EQ(go_on(), core::Status::kWrongOrder) << "the read-out is a later one";
+  EXPECT_EQ(begin(), core::Status::kOk);
+  int columns = 1;
+  for (; go_on() == core::Status::kBusy; ++columns) {
+  }
+  EXPECT_EQ(columns, Model::kColumns);
+}
+
 }  // namespace
 }  // namespace armcal::estimator

@@ -5,7 +5,9 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <iterator>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -117,7 +119,20 @@ nlohmann::ordered_json Json(const codegen::Model& m, const HostPort& port) {
   j["inconsistent"] = port.b.inconsistent;
   j["prior_too_narrow"] = port.prior_too_narrow();
   j["samples"] = port.a.samples;
+  j["gate"]["forgetting"] = {{"rows_used", port.a.rows_used}, {"rows_outside", port.a.rows_outside}};
+  j["gate"]["kalman"] = {{"rows_used", port.b.rows_used}, {"rows_outside", port.b.rows_outside}};
   return j;
+}
+
+// How many rows the row gate refused: more than a few say that the model or the table's noise is wrong.
+void PrintGate(const HostPort& port) {
+  const auto share = [](const estimator::Estimates<Model>& e) {
+    const double outside = std::accumulate(std::begin(e.rows_outside), std::end(e.rows_outside), 0.0);
+    const double used = std::accumulate(std::begin(e.rows_used), std::end(e.rows_used), 0.0);
+    return used + outside > 0 ? 100 * outside / (used + outside) : 0;
+  };
+  fmt::print("Rows outside the gate: forgetting filter {:.2f} %, Kalman filter {:.2f} %\n", share(port.a),
+             share(port.b));
 }
 
 void PrintBodies(const HostPort& port) {
@@ -243,6 +258,7 @@ int FromLog(const Options& o, const codegen::Model& m) {
     fmt::print("{:16} {:14.6g} {:12.3g} {:14.6g} {:12.3g}\n", names[c], port.a.value[c], port.a.sd[c], port.b.value[c],
                port.b.sd[c]);
   PrintBodies(port);
+  PrintGate(port);
   if (!o.json.empty()) files::WriteWholeFile(o.json, Json(m, port).dump(1) + "\n");
   return 0;
 }

@@ -109,6 +109,8 @@ def compare(rows, keys, accepted, limits, section, rise, faults):
             faults.append(f"{name}: no accepted figures")
         for key in keys:
             now, before, most = row[key], known.get(key), limits.get(name, {}).get(key)
+            if isinstance(most, dict):  # a limit for each core
+                most = most.get(section.split(".")[0])
             if before is not None and key != "slice_min" and now > before * (1 + rise):
                 faults.append(f"{name}: {key} {now}, was {before} (+{100 * (now / before - 1):.1f} %)")
             if most is not None and now > most:

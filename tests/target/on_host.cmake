@@ -23,3 +23,11 @@ foreach(program elementary kernels signal filters estimator)
   set_tests_properties(bits_${program}_native PROPERTIES LABELS fast)
 endforeach()
 target_compile_options(target_filters_native PRIVATE -march=native)
+
+# Under sanitizers: the code of the filters without the matrices of their unit tests, which take minutes to compile so.
+if(ARMCAL_SANITIZE)
+  foreach(program elementary kernels filters)
+    add_test(NAME sanitized_${program} COMMAND bits_${program})
+    set_tests_properties(sanitized_${program} PROPERTIES LABELS fast)
+  endforeach()
+endif()

@@ -206,18 +206,21 @@ TEST(Store, WhenAnyOperationFailsOrDoesNothing_KeepsTheTableInForce) {
   }
 }
 
-TEST(Store, Revoked_IsAsBeforeTheSave) {
-  NorFlash flash(kNor);
-  Prepare(flash, 1);
-  TableStore store(flash.storage(), kSchema, kWords);
-  Words words(kWords);
-  ASSERT_EQ(store.Load(words.data()), Status::kOk);
-  EXPECT_EQ(store.Revoke(), Status::kWrongOrder);
-  ASSERT_EQ(SaveAll(store, Table(2)), Status::kOk);
-  ASSERT_EQ(store.Revoke(), Status::kOk);
-  EXPECT_EQ(Finish(store), Status::kOk);
-  EXPECT_EQ(store.sequence(), 1u);
-  EXPECT_EQ(Boot(flash), Table(1));
+TEST(Store, Revoked_IsAsBeforeTheSave_AlsoOnABusyFlash) {
+  for (const test::Geometry& geometry : {kNor, test::Geometry{2, 512, 8, 0xFF, 2, 3}}) {
+    NorFlash flash(geometry);
+    Prepare(flash, 1);
+    TableStore store(flash.storage(), kSchema, kWords);
+    Words words(kWords);
+    ASSERT_EQ(store.Load(words.data()), Status::kOk);
+    EXPECT_EQ(store.Revoke(), Status::kWrongOrder);
+    ASSERT_EQ(SaveAll(store, Table(2)), Status::kOk);
+    ASSERT_EQ(store.Revoke(), Status::kOk);
+    EXPECT_EQ(Finish(store), Status::kOk);
+    EXPECT_EQ(store.sequence(), 1u);
+    EXPECT_FALSE(flash.misused());
+    EXPECT_EQ(Boot(flash), Table(1));
+  }
 }
 
 TEST(Store, WithAWrappedSequence_TakesTheNewerOne) {

@@ -9,6 +9,7 @@
 
 #include "armcal/filter/forgetting_filter.hpp"
 #include "armcal/filter/kalman_filter.hpp"
+#include "armcal/filter/model_bank.hpp"
 #include "codegen/generated/er20_like/model.hpp"
 #include "tests/unit/estimator/moving_arm.hpp"
 
@@ -200,7 +201,8 @@ struct GlitchTest : testing::Test {
     RecordProperty(name, std::to_string(worst));
   }
 };
-using GlitchFilters = testing::Types<filter::ForgettingFilter<Model>, filter::KalmanFilter<Model, filter::Form::kBlock>,
-                                     filter::KalmanFilter<Model>, filter::ExtendedKalmanFilter<Model>>;
+using GlitchFilters =
+    testing::Types<filter::ForgettingFilter<Model>, filter::KalmanFilter<Model, filter::Form::kBlock>,
+                   filter::KalmanFilter<Model>, filter::ExtendedKalmanFilter<Model>, filter::ModelBank<Model>>;
 
 }  // namespace armcal::estimator::test

@@ -66,7 +66,7 @@ ARMCAL_INLINE inline T (&Memory(T* at))[count] {
       __asm("vstmia %1!, {s" #a "}" : "=m"(*to), "+r"(to) : "t"(r0));                                          \
       return to;                                                                                               \
     }                                                                                                          \
-  };
+  }
 #define ARMCAL_GROUP_2(a, b)                                                                                   \
   template <> struct Group<2, a> {                                                                             \
     ARMCAL_INLINE static void Load(const float* from, float* to) {                                             \
@@ -79,7 +79,7 @@ ARMCAL_INLINE inline T (&Memory(T* at))[count] {
       __asm("vstmia %1!, {s" #a "-s" #b "}" : "=m"(Memory<2>(to)), "+r"(to) : "t"(r0), "t"(r1));               \
       return to;                                                                                               \
     }                                                                                                          \
-  };
+  }
 #define ARMCAL_GROUP_3(a, b, c)                                                                                \
   template <> struct Group<3, a> {                                                                             \
     ARMCAL_INLINE static void Load(const float* from, float* to) {                                             \
@@ -93,7 +93,7 @@ ARMCAL_INLINE inline T (&Memory(T* at))[count] {
       __asm("vstmia %1!, {s" #a "-s" #c "}" : "=m"(Memory<3>(to)), "+r"(to) : "t"(r0), "t"(r1), "t"(r2));      \
       return to;                                                                                               \
     }                                                                                                          \
-  };
+  }
 #define ARMCAL_GROUP_4(a, b, c, d)                                                                             \
   template <> struct Group<4, a> {                                                                             \
     ARMCAL_INLINE static void Load(const float* from, float* to) {                                             \
@@ -109,13 +109,13 @@ ARMCAL_INLINE inline T (&Memory(T* at))[count] {
             : "=m"(Memory<4>(to)), "+r"(to) : "t"(r0), "t"(r1), "t"(r2), "t"(r3));                             \
       return to;                                                                                               \
     }                                                                                                          \
-  };
-ARMCAL_GROUP_1(24) ARMCAL_GROUP_1(25) ARMCAL_GROUP_1(26) ARMCAL_GROUP_1(27)
-ARMCAL_GROUP_2(16, 17) ARMCAL_GROUP_2(18, 19) ARMCAL_GROUP_2(20, 21)
-ARMCAL_GROUP_2(24, 25) ARMCAL_GROUP_2(26, 27) ARMCAL_GROUP_2(28, 29) ARMCAL_GROUP_2(30, 31)
-ARMCAL_GROUP_3(16, 17, 18) ARMCAL_GROUP_3(19, 20, 21)
-ARMCAL_GROUP_4(0, 1, 2, 3) ARMCAL_GROUP_4(4, 5, 6, 7) ARMCAL_GROUP_4(8, 9, 10, 11) ARMCAL_GROUP_4(12, 13, 14, 15)
-ARMCAL_GROUP_4(16, 17, 18, 19) ARMCAL_GROUP_4(20, 21, 22, 23) ARMCAL_GROUP_4(24, 25, 26, 27) ARMCAL_GROUP_4(28, 29, 30, 31)
+  }
+ARMCAL_GROUP_1(24); ARMCAL_GROUP_1(25); ARMCAL_GROUP_1(26); ARMCAL_GROUP_1(27);
+ARMCAL_GROUP_2(16, 17); ARMCAL_GROUP_2(18, 19); ARMCAL_GROUP_2(20, 21);
+ARMCAL_GROUP_2(24, 25); ARMCAL_GROUP_2(26, 27); ARMCAL_GROUP_2(28, 29); ARMCAL_GROUP_2(30, 31);
+ARMCAL_GROUP_3(16, 17, 18); ARMCAL_GROUP_3(19, 20, 21);
+ARMCAL_GROUP_4(0, 1, 2, 3); ARMCAL_GROUP_4(4, 5, 6, 7); ARMCAL_GROUP_4(8, 9, 10, 11); ARMCAL_GROUP_4(12, 13, 14, 15);
+ARMCAL_GROUP_4(16, 17, 18, 19); ARMCAL_GROUP_4(20, 21, 22, 23); ARMCAL_GROUP_4(24, 25, 26, 27); ARMCAL_GROUP_4(28, 29, 30, 31);
 // clang-format on
 #undef ARMCAL_GROUP_1
 #undef ARMCAL_GROUP_2
@@ -123,9 +123,9 @@ ARMCAL_GROUP_4(16, 17, 18, 19) ARMCAL_GROUP_4(20, 21, 22, 23) ARMCAL_GROUP_4(24,
 #undef ARMCAL_GROUP_4
 #endif
 
-    // Any number of floats, as groups of four and one of what remains.
-    template <int count, int place, class T>
-    ARMCAL_INLINE inline void Load(const T* from, T* to) {
+// Any number of floats, as groups of four and one of what remains.
+template <int count, int place, class T>
+ARMCAL_INLINE inline void Load(const T* from, T* to) {
   if constexpr (count > 4) {
     Group<4, place>::Load(from, to);
     Load<count - 4, place + 4>(from + 4, to + 4);

@@ -48,8 +48,8 @@ enum class SlotState : std::uint8_t {
 
 // The steps of a save: it reads the record in force eight times and checks it, because a weak cell may read well only
 // sometimes. It erases the other slot, programs it, reads it back, programs the commit word and reads that back. Each
-// Step erases one sector, programs one piece of at most kChunkBytes, reads up to three such pieces, or asks a driver that
-// has answered kBusy.
+// Step erases one sector, programs one piece of at most kChunkBytes, reads up to three such pieces, or asks once more a
+// driver that has answered kBusy.
 // If the record in force can no longer be read and the other slot holds a good record, the new record replaces the bad
 // one, and the good one is not touched. So a save never erases the only good record. Context of every call: background.
 class TableStore {

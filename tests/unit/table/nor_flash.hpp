@@ -153,7 +153,7 @@ class NorFlash {
   Cut cut_{-1, 0};
   int failing_ = -1, skipping_ = -1;
   int operations_ = 0;
-  int asked_ = 0;  // asked_: how often the present operation has answered kBusy
+  int asked_ = 0;  // how often the present operation has answered kBusy
   std::uint32_t asked_base_ = 0, asked_count_ = 0;
   bool dead_ = false, misused_ = false;
 };

@@ -113,6 +113,8 @@ TEST(Change, OfFriction_IsFollowedAsFastAsWithoutAGate_ByTheKalmanForms) {
     for (const bool burst : {false, true}) {
       ExpectToFollow<filter::KalmanFilter<Model>>({false, 1, noise, burst});
       ExpectToFollow<filter::KalmanFilter<Model, filter::Form::kBlock>>({false, 1, noise, burst});
+      ExpectToFollow<filter::ExtendedKalmanFilter<Model>>({false, 1, noise, burst});
+      ExpectToFollow<filter::ModelBank<Model>>({false, 1, noise, burst});
     }
 }
 

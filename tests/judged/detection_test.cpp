@@ -99,5 +99,26 @@ TEST(Gear, StiffSpring_PassesTheLoadOn) {
   EXPECT_NEAR(soft / stiff, 16, 10);
 }
 
+// Where the arm hardly accelerates, the link stands where its gear bends to, and the gear carries the load of that
+// place.
+TEST(Gear, SlowMotion_CarriesTheLoadOfWhereTheLinkStands) {
+  Bench b;
+  b.m.qd *= 1e-2, b.m.qdd *= 1e-4;  // the same places, passed slowly
+  b.m.t *= 1e2;
+  const MatrixXd links = LinkTorque(b.arm, b.m);
+  double stiffness = 0;
+  const MatrixXd missing = BehindGear(b.arm, b.m, links, 1, [&](double inertia) -> GearLaw {
+    stiffness = std::pow(2 * kPi * 6, 2) * inertia;
+    return [=](double y, double rate) { return -stiffness * (y + 0.1 * rate); };
+  });
+  Motion moved = b.m;
+  for (int i = 0; i < 20; ++i) moved.q.col(1) = b.m.q.col(1) - LinkTorque(b.arm, moved).col(1) / stiffness;
+  const MatrixXd expected = LinkTorque(b.arm, moved) - links;
+  for (int j = 0; j < 6; ++j) {
+    const double error = (missing.col(j) - expected.col(j)).norm();
+    EXPECT_LT(error, 0.02 * expected.norm()) << j;
+  }
+}
+
 }  // namespace
 }  // namespace armcal::judged

@@ -28,11 +28,19 @@ VectorXd InertiaAbout(const Arm& arm, const Motion& m, int joint) {
   return out;
 }
 
-double AtRest(const GearLaw& law, double load_Nm) {
+// What a joint's load changes by where its link stands a little further, N m/rad.
+VectorXd LoadSlope(const Arm& arm, const Motion& m, const MatrixXd& links, int joint) {
+  constexpr double kStep_rad = 1e-4;
+  Motion moved = m;
+  moved.q.col(joint).array() += kStep_rad;
+  return (LinkTorque(arm, moved).col(joint) - links.col(joint)) / kStep_rad;
+}
+
+double AtRest(const GearLaw& law, double load_Nm, double slope_Nmprad) {
   double low = -0.3, high = 0.3;  // a gear's torque falls as the link runs ahead
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
-    (law(middle, 0) > load_Nm ? low : high) = middle;
+    (law(middle, 0) > load_Nm + slope_Nmprad * middle ? low : high) = middle;
   }
   return 0.5 * (low + high);
 }
@@ -205,22 +213,22 @@ std::vector<Form> GearForms() {
 
 MatrixXd BehindGear(const Arm& arm, const Motion& m, const MatrixXd& links, int joint,
                     const std::function<GearLaw(double inertia_kgm2)>& law) {
-  const VectorXd inertia = InertiaAbout(arm, m, joint);
+  const VectorXd inertia = InertiaAbout(arm, m, joint), stiffness = LoadSlope(arm, m, links, joint);
   const GearLaw gear = law(inertia.mean());
   const int parts = static_cast<int>(std::ceil((m.t[1] - m.t[0]) / kStep_s));
   const double h = (m.t[1] - m.t[0]) / parts;
   Motion moved = m;
   VectorXd passed(m.samples());
-  double y = AtRest(gear, links(0, joint)), rate = 0;
+  double y = AtRest(gear, links(0, joint), stiffness[0]), rate = 0;
   for (int k = 0; k < m.samples(); ++k) {
     const double torque = gear(y, rate);
     passed[k] = torque;
     moved.q(k, joint) += y, moved.qd(k, joint) += rate;
-    moved.qdd(k, joint) += (torque - links(k, joint)) / inertia[k];
+    moved.qdd(k, joint) += (torque - links(k, joint) - stiffness[k] * y) / inertia[k];
     if (k + 1 == m.samples()) break;
     const double slope = (links(k + 1, joint) - links(k, joint)) / parts;
     for (int i = 0; i < parts; ++i) {
-      rate += h * (gear(y, rate) - links(k, joint) - slope * i) / inertia[k];
+      rate += h * (gear(y, rate) - links(k, joint) - slope * i - stiffness[k] * y) / inertia[k];
       y += h * rate;
     }
   }

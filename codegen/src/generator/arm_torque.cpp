@@ -16,8 +16,11 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
   for (int i = 0; i < joints_; ++i)
     keep({Quantity::kRigidTorque, i}, LoadTorque(graph_, moving, model.base_columns(), robot, i));
   add(BodyRegressor(graph_, robot, false), [](int i) { return InputId{Quantity::kGravityTorque, i}; });
-  for (int j = 0; j < joints_; ++j)
-    add(AccelerationRows(graph_, robot, j), [j](int i) { return InputId{Quantity::kMassMatrix, i, j}; });
+  for (int j = 0; j < joints_; ++j) {
+    const BodyRows rows = AccelerationRows(graph_, robot, j);
+    for (int i = 0; i < joints_; ++i)
+      keep({Quantity::kMassMatrix, i, j}, LoadTorque(graph_, rows, model.base_columns(), robot, i));
+  }
   for (int axis = 0; axis < 3; ++axis) {
     Robot tilted = robot;
     tilted.gravity_mps2 = {};
@@ -29,6 +32,15 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
       const Expr gravity = part_[static_cast<std::size_t>(joints_ + i)].value;
       keep({Quantity::kGravityStiffness, i, j}, Derivative(gravity, graph_.Input({Quantity::kPosition, j})));
     }
+  const auto keep_slopes = [&](Quantity slope, Quantity over) {
+    for (int j = 0; j < joints_; ++j)
+      for (int i = 0; i < joints_; ++i) {
+        const Expr rigid = part_[static_cast<std::size_t>(i)].value;
+        keep({slope, i, j}, Derivative(rigid, graph_.Input({over, j})));
+      }
+  };
+  keep_slopes(Quantity::kTorqueSlope, Quantity::kPosition);
+  keep_slopes(Quantity::kTorqueSpeedSlope, Quantity::kSpeed);
   const Flange flange = FlangeOf(graph_, robot);
   const auto with_slopes = [&](const std::array<Expr, 3>& v, Quantity itself, Quantity slope) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -60,7 +72,8 @@ void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const s
   }
   out.rigid.resize(samples, n), out.gravity.resize(samples, n);
   out.mass.resize(n, std::vector<Eigen::VectorXd>(n)), out.tilt.resize(n, std::vector<Eigen::VectorXd>(3));
-  out.stiffness.resize(n, std::vector<Eigen::VectorXd>(n));
+  for (auto* matrix : {&out.stiffness, &out.slope, &out.speed_slope})
+    matrix->resize(n, std::vector<Eigen::VectorXd>(n));
   out.flange.resize(3), out.jacobian.resize(n, std::vector<Eigen::VectorXd>(3));
   out.approach.resize(3), out.approach_slope.resize(n, std::vector<Eigen::VectorXd>(3));
   std::vector<double*> place;
@@ -76,6 +89,9 @@ void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const s
     for (int i = 0; i < n; ++i) entry(out.tilt[i][axis]);
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) entry(out.stiffness[i][j]);
+  for (auto* slope : {&out.slope, &out.speed_slope})
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) entry((*slope)[i][j]);
   for (const auto& [itself, slope] :
        {std::pair{&out.flange, &out.jacobian}, std::pair{&out.approach, &out.approach_slope}})
     for (int axis = 0; axis < 3; ++axis) {

@@ -15,6 +15,8 @@ struct TorqueParts {
   std::vector<std::vector<Eigen::VectorXd>> tilt;  // [row][axis] per m/s^2 of gravity along the base frame's x, y, z
   std::vector<std::vector<Eigen::VectorXd>>
       stiffness;  // [row][joint] gravity's torque per unit of the joint's position
+  std::vector<std::vector<Eigen::VectorXd>> slope,
+      speed_slope;  // [row][joint] the links' torque per unit of the joint's position and speed
   // Where the last link's frame stands, m, and the direction of its z axis, and their slopes over the row's position.
   std::vector<Eigen::VectorXd> flange, approach;                       // [axis]
   std::vector<std::vector<Eigen::VectorXd>> jacobian, approach_slope;  // [row][axis]

@@ -43,23 +43,25 @@ Expr Lowpass(Graph& g, const std::vector<Expr>& a) {
 }
 
 // A mass that follows x on a spring and a damper: y'' = w0^2 (x - y) + 2 zeta w0 (x' - y'), x straight between samples
-// (held, it would lead by half of dt): the exact solution after dt.
-Expr Spring(Graph& g, const std::vector<Expr>& a) {
+// (held, it would lead by half of dt): the exact solution after dt. The states are y - x, which no rounding of x hides,
+// and y'.
+Expr Spring(Graph& g, const std::vector<Expr>& a, bool is_rate) {
   const Expr x = a[0], w0 = a[1], zeta = a[2], dt = g.Input({Quantity::kTimeStep});
   const Expr damped = w0 * g.Unary(Op::kSqrt, g.Constant(1) - zeta * zeta), angle = damped * dt;
   const Expr decay = g.Unary(Op::kExp, -(zeta * w0 * dt));
   const Expr c = decay * g.Unary(Op::kCos, angle), s = decay * g.Unary(Op::kSin, angle) / damped;
-  const Expr from = Previous(g, {x}), slope = (x - from) / dt;
-  const auto position = [&](Expr y, Expr rate) { return x + (y - from) * (c + zeta * w0 * s) + (rate - slope) * s; };
-  const auto speed = [&](Expr y, Expr rate) {
-    return slope + (rate - slope) * (c - zeta * w0 * s) - (y - from) * (w0 * w0) * s;
+  const Expr slope = (x - Previous(g, {x})) / dt;
+  const auto stretch = [&](Expr from, Expr rate) { return from * (c + zeta * w0 * s) + (rate - slope) * s; };
+  const auto speed = [&](Expr from, Expr rate) {
+    return slope + (rate - slope) * (c - zeta * w0 * s) - from * (w0 * w0) * s;
   };
   const std::string name = StateName("spring", a), rate_name = StateName("spring", a, 1);
-  const Expr y = g.State(name, x, [&](Expr value) {
+  const Expr from = g.State(name, g.Constant(0), [&](Expr value) {
     const Expr rate = g.State(rate_name, g.Constant(0), [&](Expr r) { return speed(value, r); });
-    return position(value, rate);
+    return stretch(value, rate);
   });
-  return position(y, g.State(rate_name, g.Constant(0), [](Expr r) { return r; }));
+  const Expr rate = g.State(rate_name, g.Constant(0), [](Expr r) { return r; });
+  return is_rate ? speed(from, rate) : stretch(from, rate);
 }
 
 Expr Play(Graph& g, const std::vector<Expr>& a) {
@@ -211,7 +213,8 @@ class Parser {
     }
     if (name == "previous") return need(1), Previous(g_, a);
     if (name == "lowpass") return need(2), Lowpass(g_, a);
-    if (name == "spring") return need(3), Spring(g_, a);
+    if (name == "spring_stretch") return need(3), Spring(g_, a, false);
+    if (name == "spring_rate") return need(3), Spring(g_, a, true);
     if (name == "play") return need(2), Play(g_, a);
     if (name == "delay") {
       need(3);

@@ -8,7 +8,8 @@
 // stable for every step; `dt` is the time since the sample before:
 //   previous(x)           x one sample ago (at the first sample x itself)
 //   lowpass(x, T)         first order, time constant T > 0
-//   spring(x, w0, zeta)   a mass that follows x on a spring and a damper, 0 <= zeta < 1
+//   spring_stretch(x, w0, zeta)  how far a mass that follows x on a spring and a damper is ahead of x, 0 <= zeta < 1
+//   spring_rate(x, w0, zeta)  that mass's speed
 //   play(x, gap)          play operator: follows x once it has moved gap/2 away
 //   delay(x, d, n)        x a time d ago, 0 <= d <= n dt, linear between samples; n a whole number
 // sgn is the sign law of the caller (sign or tanh(x / width)); sign is the plain one.

@@ -82,11 +82,16 @@ Expr Model::QuantityOf(const InputId& id) {
       return sum;
     }
     case Quantity::kMassMatrix:
-      return CommittedTorque(AccelerationRows(*graph_, robot_, id.body), id.row);
+      depends_on_estimate_ = true;
+      return LoadTorque(*graph_, AccelerationRows(*graph_, robot_, id.body), base_.column, robot_, id.row);
     case Quantity::kGravitySlope:
       return CommittedTorque(TiltedRows(id.parameter), id.row);
     case Quantity::kGravityStiffness:
       return Derivative(CommittedTorque(gravity_rows_, id.row), graph_->Input({Quantity::kPosition, id.body}));
+    case Quantity::kTorqueSlope:
+      return Derivative(QuantityOf({Quantity::kRigidTorque, id.row}), graph_->Input({Quantity::kPosition, id.body}));
+    case Quantity::kTorqueSpeedSlope:
+      return Derivative(QuantityOf({Quantity::kRigidTorque, id.row}), graph_->Input({Quantity::kSpeed, id.body}));
     case Quantity::kFlangePosition:
       return FlangeOf(*graph_, robot_).position[id.parameter];
     case Quantity::kFlangeJacobian:

@@ -26,6 +26,8 @@ enum class Quantity : std::uint8_t {
   kMassMatrix,
   kGravitySlope,
   kGravityStiffness,
+  kTorqueSlope,
+  kTorqueSpeedSlope,
   // of the kinematics
   kFlangePosition,
   kFlangeJacobian,
@@ -43,8 +45,8 @@ enum class Quantity : std::uint8_t {
 // One input of a graph. Indices count from 0; those that the quantity does not have are 0.
 struct InputId {
   Quantity quantity;
-  int row = 0;        // the joint, or the row of a matrix
-  int body = 0;       // kBodyColumn: the body; kMassMatrix, kGravityStiffness: the column
+  int row = 0;   // the joint, or the row of a matrix
+  int body = 0;  // kBodyColumn: the body; kMassMatrix, kGravityStiffness, kTorqueSlope, kTorqueSpeedSlope: the column
   int parameter = 0;  // kBodyColumn: of the body's ten; kGravitySlope and the flange's: axis 0 to 2
   std::string symbol = {};
 

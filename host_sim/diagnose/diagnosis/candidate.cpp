@@ -93,6 +93,10 @@ const double* ColumnOf(const Quantities& quantities, const Eigen::MatrixXd& dela
       return quantities.parts.tilt[input.row][input.parameter].data();
     case codegen::Quantity::kGravityStiffness:
       return quantities.parts.stiffness[input.row][input.body].data();
+    case codegen::Quantity::kTorqueSlope:
+      return quantities.parts.slope[input.row][input.body].data();
+    case codegen::Quantity::kTorqueSpeedSlope:
+      return quantities.parts.speed_slope[input.row][input.body].data();
     case codegen::Quantity::kFlangePosition:
       return quantities.parts.flange[input.parameter].data();
     case codegen::Quantity::kFlangeJacobian:

@@ -62,7 +62,8 @@ Quantities PickSamples(const Quantities& q, int every, calibration::Dataset& dat
   out.parts.rigid = PickRows(q.parts.rigid, every), out.parts.gravity = PickRows(q.parts.gravity, every);
   for (const auto& [from, to] :
        {std::pair{&q.parts.mass, &out.parts.mass}, std::pair{&q.parts.tilt, &out.parts.tilt},
-        std::pair{&q.parts.stiffness, &out.parts.stiffness}, std::pair{&q.parts.jacobian, &out.parts.jacobian},
+        std::pair{&q.parts.stiffness, &out.parts.stiffness}, std::pair{&q.parts.slope, &out.parts.slope},
+        std::pair{&q.parts.speed_slope, &out.parts.speed_slope}, std::pair{&q.parts.jacobian, &out.parts.jacobian},
         std::pair{&q.parts.approach_slope, &out.parts.approach_slope}})
     for (const auto& row : *from) {
       to->emplace_back();

@@ -62,16 +62,25 @@ class ArmTorqueOf : public testing::TestWithParam<const char*> {
       for (int i = 0; i < n(); ++i) {
         compare(parts.rigid(k, i), rigid[i]), compare(parts.gravity(k, i), gravity[i]);
         for (int j = 0; j < n(); ++j)
-          compare(parts.mass[i][j][k], (arm.Torque(q, none, VectorXd::Unit(n(), j)) - gravity)[i]);
+          compare(parts.mass[i][j][k], (links.Torque(q, none, VectorXd::Unit(n(), j)) - gravity)[i]);
         for (int axis = 0; axis < 3; ++axis) tilt[i][axis][k] = tilted[axis].Torque(q, none, none)[i];
       }
       for (int j = 0; j < n(); ++j) {
+        const VectorXd axis = VectorXd::Unit(n(), j);
         // four places: the error is of fourth order, 1e-13
-        const auto gravity_at = [&](double step) { return arm.Torque(q + step * VectorXd::Unit(n(), j), none, none); };
-        const VectorXd slope = (8 * (gravity_at(kStep_rad) - gravity_at(-kStep_rad)) - gravity_at(2 * kStep_rad) +
-                                gravity_at(-2 * kStep_rad)) /
-                               (12 * kStep_rad);
-        for (int i = 0; i < n(); ++i) compare(parts.stiffness[i][j][k], slope[i]);
+        const auto slope = [&](const auto& at) -> VectorXd {
+          return (8 * (at(kStep_rad) - at(-kStep_rad)) - at(2 * kStep_rad) + at(-2 * kStep_rad)) / (12 * kStep_rad);
+        };
+        const VectorXd of_gravity =
+            slope([&](double step) -> VectorXd { return arm.Torque(q + step * axis, none, none); });
+        const VectorXd of_links =
+            slope([&](double step) -> VectorXd { return links.Torque(q + step * axis, qd, qdd); });
+        // a parabola over the speed: the difference is exact
+        const VectorXd over_speed = (links.Torque(q, qd + axis, qdd) - links.Torque(q, qd - axis, qdd)) / 2;
+        for (int i = 0; i < n(); ++i) {
+          compare(parts.stiffness[i][j][k], of_gravity[i]), compare(parts.slope[i][j][k], of_links[i]);
+          compare(parts.speed_slope[i][j][k], over_speed[i]);
+        }
       }
     }
     // What turns with joint 1 about an upright axis gravity does not see while the arm is level: no base parameter says
@@ -115,17 +124,22 @@ TEST_P(ArmTorqueOf, SomeParts_AreThoseAloneThatChange) {
             {codegen::Quantity::kMassMatrix, 1, 0},
             {codegen::Quantity::kGravitySlope, 1, 0, 2},
             {codegen::Quantity::kGravityStiffness, 1, 1},
+            {codegen::Quantity::kTorqueSlope, 0, 1},
+            {codegen::Quantity::kTorqueSpeedSlope, 1, 0},
             {codegen::Quantity::kModelTorque, 0}},
            some);
   codegen::TorqueParts expected = before;
   expected.gravity.col(1) = after.gravity.col(1);
   expected.mass[1][0] = after.mass[1][0], expected.tilt[1][2] = after.tilt[1][2];
   expected.stiffness[1][1] = after.stiffness[1][1];
+  expected.slope[0][1] = after.slope[0][1], expected.speed_slope[1][0] = after.speed_slope[1][0];
   EXPECT_EQ(some.rigid, expected.rigid);
   EXPECT_EQ(some.gravity, expected.gravity);
   EXPECT_EQ(some.mass, expected.mass);
   EXPECT_EQ(some.tilt, expected.tilt);
   EXPECT_EQ(some.stiffness, expected.stiffness);
+  EXPECT_EQ(some.slope, expected.slope);
+  EXPECT_EQ(some.speed_slope, expected.speed_slope);
   EXPECT_NE(some.mass, before.mass);
 }
 

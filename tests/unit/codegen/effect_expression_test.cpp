@@ -194,9 +194,12 @@ TEST(Memory, Spring_WithoutDamping_KeepsSwingingAboutWhatItFollows) {
   const double v = 0.7, w = 30, dt = 0.01;
   std::vector<double> x;
   for (int k = 0; k < 200; ++k) x.push_back(v * dt * k);
-  const auto y = RunOver("spring(x, p, 0)", x, w, dt);
-  for (std::size_t k = 0; k < y.size(); ++k)
-    EXPECT_NEAR(y[k], x[k] - v / w * std::sin(w * dt * static_cast<double>(k)), 1e-11);
+  const auto ahead = RunOver("spring_stretch(x, p, 0)", x, w, dt);
+  for (std::size_t k = 0; k < ahead.size(); ++k)
+    EXPECT_NEAR(ahead[k], -v / w * std::sin(w * dt * static_cast<double>(k)), 1e-11);
+  const auto rate = RunOver("spring_rate(x, p, 0)", x, w, dt);
+  for (std::size_t k = 0; k < rate.size(); ++k)
+    EXPECT_NEAR(rate[k], v - v * std::cos(w * dt * static_cast<double>(k)), 1e-10);
 }
 
 TEST(Memory, Play_FollowsOnceTheGapIsCrossed) {

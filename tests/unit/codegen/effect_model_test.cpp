@@ -94,7 +94,12 @@ TEST(EffectsInAModel, LoadLinear_IsThePayloadsTorque_InTheFileFrame) {
   }
 }
 
-// M[r, j]: torque of row r for unit acceleration of joint j, at rest, without gravity; the rotor is part of it.
+double RotorOf(const codegen::Robot& robot, int joint) {
+  const codegen::Motor& motor = robot.joint[static_cast<std::size_t>(joint)].motor;
+  return motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2;
+}
+
+// M[r, j]: torque of row r for unit acceleration of joint j, at rest, without gravity and without the motor's rotor.
 TEST(EffectsInAModel, BeltElasticity_TakesTheMassMatrixsColumn) {
   for (const char* name : kArms) {
     WithEffect arm(Use("belt_elasticity", {2}), name);
@@ -111,7 +116,8 @@ TEST(EffectsInAModel, BeltElasticity_TakesTheMassMatrixsColumn) {
     const auto missing = filter.Column(0, 0, log, {{"w0", 150}});
     const MatrixXd column = arm.Column("belt_elasticity.e3", {150});
     for (int k = 0; k < WithEffect::kSamples; ++k) {
-      const VectorXd inertia = kdl.Torque(arm.signals().q.row(k), kRest, VectorXd::Unit(6, 2));
+      const VectorXd inertia = kdl.Torque(arm.signals().q.row(k), kRest, VectorXd::Unit(6, 2)) -
+                               RotorOf(arm.robot(), 2) * VectorXd::Unit(6, 2);
       for (int i = 0; i < 6; ++i)
         EXPECT_NEAR(column(k, i), inertia[i] * missing[k], 1e-8) << name << " " << k << " " << i;
     }
@@ -128,12 +134,47 @@ TEST(EffectsInAModel, JointCompliance_MovesTheLinksUnderGravity) {
     for (int k = 0; k < WithEffect::kSamples; ++k) {
       const VectorXd q = arm.signals().q.row(k);
       // The gear carries the links, and not the motor's rotor.
-      const codegen::Motor& motor = arm.robot().joint[1].motor;
-      const double rotor = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2 * arm.signals().qdd(k, 1);
-      const double load = kdl.Torque(q, arm.signals().qd.row(k), arm.signals().qdd.row(k))[1] - rotor;
+      const double rotor_Nm = RotorOf(arm.robot(), 1) * arm.signals().qdd(k, 1);
+      const double load = kdl.Torque(q, arm.signals().qd.row(k), arm.signals().qdd.row(k))[1] - rotor_Nm;
       const VectorXd lower = q - kCompliance * load * VectorXd::Unit(6, 1);
       const VectorXd change = (kdl.Torque(lower, kRest, kRest) - kdl.Torque(q, kRest, kRest)) / kCompliance;
       for (int i = 0; i < 6; ++i) EXPECT_NEAR(column(k, i), change[i], 1e-4 * change.norm() + 1e-4) << name << " " << k;
+    }
+  }
+}
+
+// The link hangs on a spring that carries its load: to first order in C, what its place, speed and acceleration against
+// the motor's change of every joint's torque. They follow the load as w0^2 (load - s) + 2 zeta w0 (load' - s') says.
+TEST(EffectsInAModel, BeltUnderLoad_MovesTheLinks) {
+  constexpr double kStiffness = 2e4, kZeta = 0.3, kCompliance = 1e-9, kStep_s = 0.008;
+  constexpr int kParts = 4000;
+  for (const char* name : kArms) {
+    WithEffect arm(Use("belt_load", {1}), name);
+    KdlArm kdl(arm.robot(), arm.bodies());
+    const MatrixXd column = arm.Column("belt_load.C2", {kStiffness});
+    const VectorXd axis = VectorXd::Unit(6, 1);
+    double from = 0, s = 0, rate = 0;
+    for (int k = 0; k < WithEffect::kSamples; ++k) {
+      const VectorXd q = arm.signals().q.row(k), qd = arm.signals().qd.row(k), qdd = arm.signals().qdd.row(k);
+      const VectorXd torque = kdl.Torque(q, qd, qdd);
+      const double load = torque[1] - RotorOf(arm.robot(), 1) * qdd[1];
+      const double inertia = (kdl.Torque(q, kRest, axis) - kdl.Torque(q, kRest, kRest))[1] - RotorOf(arm.robot(), 1);
+      if (k == 0) from = s = load;
+      const double w2 = kStiffness / inertia, slope = (load - from) / kStep_s, h = kStep_s / kParts;
+      const auto swing = [&](double t, double place, double speed) {
+        return w2 * (from + slope * t - place) + 2 * kZeta * std::sqrt(w2) * (slope - speed);
+      };
+      for (int i = 0; i < kParts; ++i) {  // Heun
+        const double t = i * h, a = swing(t, s, rate), b = swing(t + h, s + h * rate, rate + h * a);
+        s += h * rate + 0.5 * h * h * a;
+        rate += 0.5 * h * (a + b);
+      }
+      from = load;
+      const VectorXd links = kdl.Torque(q - kCompliance * s * axis, qd - kCompliance * rate * axis,
+                                        qdd - kCompliance * w2 * (load - s) * axis);
+      VectorXd change = (links - torque) / kCompliance;
+      change[1] += RotorOf(arm.robot(), 1) * w2 * (load - s);  // the rotor is the motor's
+      for (int i = 0; i < 6; ++i) EXPECT_NEAR(column(k, i), change[i], 1e-4 * change.norm()) << name << " " << k;
     }
   }
 }

@@ -41,6 +41,8 @@ inline std::string TestName(const codegen::InputId& i) {
   if (i.quantity == Quantity::kMassMatrix) return "M" + numbers(i.row, i.body);
   if (i.quantity == Quantity::kGravitySlope) return "G" + numbers(i.row, i.parameter);
   if (i.quantity == Quantity::kGravityStiffness) return "K" + numbers(i.row, i.body);
+  if (i.quantity == Quantity::kTorqueSlope) return "T" + numbers(i.row, i.body);
+  if (i.quantity == Quantity::kTorqueSpeedSlope) return "V" + numbers(i.row, i.body);
   if (i.quantity == Quantity::kFlangePosition) return "F" + std::to_string(i.parameter);
   if (i.quantity == Quantity::kApproach) return "A" + std::to_string(i.parameter);
   if (i.quantity == Quantity::kFlangeJacobian) return "J" + numbers(i.row, i.parameter);

@@ -195,6 +195,9 @@ TEST(StatefulEffects, AnyStep_StaysWithinItsBound) {
       log["dt"].push_back(dt);
       log["M1_1"].push_back(1);
       log["tau_gravity2"].push_back(1);
+      log["tau_rigid2"].push_back(k % 2 ? unit(random) : Sign(unit(random)));
+      log["T1_1"].push_back(0);
+      log["V1_1"].push_back(0);
     }
     const auto bounded = [&](const std::string& record, int column, double bound, const Values& eta) {
       for (const double v : EffectRun(record).Column(column, 1, log, eta)) {
@@ -208,7 +211,10 @@ TEST(StatefulEffects, AnyStep_StaysWithinItsBound) {
       bounded("backlash", 0, x0 / 2, {{"gap", x0}});
       bounded("backlash", 1, 1, {{"gap", x0}});
     }
-    for (const double w0 : {60.0, 600.0}) bounded("belt_elasticity", 0, 3.5 + 1, {{"w0", w0}});
+    for (const double w0 : {60.0, 600.0}) {
+      bounded("belt_elasticity", 0, 3.5 + 1, {{"w0", w0}});
+      bounded("belt_load", 0, w0 * w0 * (3.5 + 1), {{"k", w0 * w0}});
+    }
   }
 }
 

@@ -92,6 +92,16 @@ class EveryQuantity : public testing::Test {
     q[joint] += moved_rad;
     return KdlArm(arm_.model().robot(), arm_.bodies()).Torque(q, none, none);
   }
+  // Of the arm with one joint a little further and faster.
+  VectorXd RigidAt(int sample, int joint, double further_rad, double faster_radps) const {
+    VectorXd q = At(data_.s.q, sample), qd = At(data_.s.qd, sample);
+    q[joint] += further_rad, qd[joint] += faster_radps;
+    return KdlArm(arm_.model().robot(), arm_.bodies()).Torque(q, qd, At(data_.s.qdd, sample));
+  }
+  double Rotor(int joint) const {
+    const codegen::Motor& motor = arm_.model().robot().joint[static_cast<std::size_t>(joint)].motor;
+    return motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2;
+  }
   VectorXd Rigid(int sample) const {
     return Torque(arm_.bodies(), sample, At(data_.s.qd, sample), At(data_.s.qdd, sample));
   }
@@ -118,11 +128,8 @@ class EveryQuantity : public testing::Test {
         return data_.s.t[sample];
       case Quantity::kTimeStep:
         return kStep_s;
-      case Quantity::kRigidTorque: {  // the rotor of the file is no load of the gear
-        const codegen::Motor& motor = arm_.model().robot().joint[static_cast<std::size_t>(joint)].motor;
-        const double rotor = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2;
-        return Rigid(sample)[joint] - rotor * data_.s.qdd(sample, joint);
-      }
+      case Quantity::kRigidTorque:  // the rotor of the file is no load of the gear
+        return Rigid(sample)[joint] - Rotor(joint) * data_.s.qdd(sample, joint);
       case Quantity::kModelTorque:  // the model of this test has no friction
         return Rigid(sample)[joint];
       case Quantity::kDelayedTorque:  // by one sample
@@ -131,7 +138,8 @@ class EveryQuantity : public testing::Test {
         return Torque(arm_.bodies(), sample, none, none)[joint];
       case Quantity::kMassMatrix: {
         const VectorXd unit = VectorXd::Unit(n(), w.index);
-        return (Torque(arm_.bodies(), sample, none, unit) - Torque(arm_.bodies(), sample, none, none))[row];
+        return (Torque(arm_.bodies(), sample, none, unit) - Torque(arm_.bodies(), sample, none, none))[row] -
+               (row == w.index ? Rotor(row) : 0);
       }
       case Quantity::kGravitySlope:
         return Torque(arm_.bodies(), sample, none, none, w.index)[row];
@@ -139,6 +147,13 @@ class EveryQuantity : public testing::Test {
         constexpr double kStep_rad = 1e-4;
         return (GravityAt(sample, w.index, kStep_rad) - GravityAt(sample, w.index, -kStep_rad))[row] / (2 * kStep_rad);
       }
+      case Quantity::kTorqueSlope: {
+        constexpr double kStep_rad = 1e-4;
+        return (RigidAt(sample, w.index, kStep_rad, 0) - RigidAt(sample, w.index, -kStep_rad, 0))[row] /
+               (2 * kStep_rad);
+      }
+      case Quantity::kTorqueSpeedSlope:  // a parabola over the speed
+        return (RigidAt(sample, w.index, 0, 1) - RigidAt(sample, w.index, 0, -1))[row] / 2;
       case Quantity::kFlangePosition:
         return FlangeAt(sample).p[w.index];
       case Quantity::kApproach:

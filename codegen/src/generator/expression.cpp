@@ -51,17 +51,17 @@ Expr Spring(Graph& g, const std::vector<Expr>& a, bool is_rate) {
   const Expr decay = g.Unary(Op::kExp, -(zeta * w0 * dt));
   const Expr c = decay * g.Unary(Op::kCos, angle), s = decay * g.Unary(Op::kSin, angle) / damped;
   const Expr slope = (x - Previous(g, {x})) / dt;
-  const auto stretch = [&](Expr from, Expr rate) { return from * (c + zeta * w0 * s) + (rate - slope) * s; };
-  const auto speed = [&](Expr from, Expr rate) {
-    return slope + (rate - slope) * (c - zeta * w0 * s) - from * (w0 * w0) * s;
+  const auto stretch = [&](Expr ahead, Expr rate) { return ahead * (c + zeta * w0 * s) + (rate - slope) * s; };
+  const auto speed = [&](Expr ahead, Expr rate) {
+    return slope + (rate - slope) * (c - zeta * w0 * s) - ahead * (w0 * w0) * s;
   };
   const std::string name = StateName("spring", a), rate_name = StateName("spring", a, 1);
-  const Expr from = g.State(name, g.Constant(0), [&](Expr value) {
+  const Expr ahead = g.State(name, g.Constant(0), [&](Expr value) {
     const Expr rate = g.State(rate_name, g.Constant(0), [&](Expr r) { return speed(value, r); });
     return stretch(value, rate);
   });
   const Expr rate = g.State(rate_name, g.Constant(0), [](Expr r) { return r; });
-  return is_rate ? speed(from, rate) : stretch(from, rate);
+  return is_rate ? speed(ahead, rate) : stretch(ahead, rate);
 }
 
 Expr Play(Graph& g, const std::vector<Expr>& a) {

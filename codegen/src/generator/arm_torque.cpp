@@ -27,20 +27,17 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
     tilted.gravity_mps2[axis] = 1;
     add(BodyRegressor(graph_, tilted, false), [axis](int i) { return InputId{Quantity::kGravitySlope, i, 0, axis}; });
   }
-  for (int j = 0; j < joints_; ++j)
-    for (int i = 0; i < joints_; ++i) {
-      const Expr gravity = part_[static_cast<std::size_t>(joints_ + i)].value;
-      keep({Quantity::kGravityStiffness, i, j}, Derivative(gravity, graph_.Input({Quantity::kPosition, j})));
-    }
-  const auto keep_slopes = [&](Quantity slope, Quantity over) {
+  const int rigid = 0, gravity = joints_;  // where their rows begin
+  const auto keep_slopes = [&](Quantity slope, int first, Quantity over) {
     for (int j = 0; j < joints_; ++j)
       for (int i = 0; i < joints_; ++i) {
-        const Expr rigid = part_[static_cast<std::size_t>(i)].value;
-        keep({slope, i, j}, Derivative(rigid, graph_.Input({over, j})));
+        const Expr torque = part_[static_cast<std::size_t>(first + i)].value;
+        keep({slope, i, j}, Derivative(torque, graph_.Input({over, j})));
       }
   };
-  keep_slopes(Quantity::kTorqueSlope, Quantity::kPosition);
-  keep_slopes(Quantity::kTorqueSpeedSlope, Quantity::kSpeed);
+  keep_slopes(Quantity::kGravityStiffness, gravity, Quantity::kPosition);
+  keep_slopes(Quantity::kTorqueSlope, rigid, Quantity::kPosition);
+  keep_slopes(Quantity::kTorqueSpeedSlope, rigid, Quantity::kSpeed);
   const Flange flange = FlangeOf(graph_, robot);
   const auto with_slopes = [&](const std::array<Expr, 3>& v, Quantity itself, Quantity slope) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -87,9 +84,7 @@ void ArmTorque::Evaluate(const Signals& s, std::span<const double> base, const s
     for (int i = 0; i < n; ++i) entry(out.mass[i][j]);
   for (int axis = 0; axis < 3; ++axis)
     for (int i = 0; i < n; ++i) entry(out.tilt[i][axis]);
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) entry(out.stiffness[i][j]);
-  for (auto* slope : {&out.slope, &out.speed_slope})
+  for (auto* slope : {&out.stiffness, &out.slope, &out.speed_slope})
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < n; ++i) entry((*slope)[i][j]);
   for (const auto& [itself, slope] :

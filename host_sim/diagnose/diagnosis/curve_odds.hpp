@@ -7,8 +7,7 @@
 namespace armcal::diagnosis {
 
 // Coefficients have a normal prior: neighbours are alike over some length, and all have one size. Length and size are
-// those that the data like best. A surface has neighbours in two directions. It may also be the product of a curve in
-// one direction and a curve in the other; each of the two has such a prior.
+// those that the data like best. A surface has neighbours in two directions.
 class CurveOdds {
  public:
   // S = C'C less what the base explains, and g = C'r. inner: coefficients in a row of a surface; those of a
@@ -25,17 +24,7 @@ class CurveOdds {
     Eigen::MatrixXd precision;  // at size one
     Eigen::VectorXd seen, u2;   // what the data see of each of its directions, the square of what they say of it
   };
-  struct Form {  // of products: how much alike a curve's neighbours are in either direction
-    Eigen::MatrixXd root, S;
-    Eigen::VectorXd g, u, v;  // u, v: where a search begins
-  };
-  struct Product;
-  void FormProducts(const Eigen::MatrixXd& S, const Eigen::VectorXd& g);
-  // The product that the data like best, where it is better than `best`.
-  void TryProducts(double share, double& best, Eigen::MatrixXd* precision) const;
 
-  int inner_, outer_;
-  std::vector<Form> forms_;  // of a surface
   std::vector<Prior> priors_;
   double free_gain_ = 0;
 };

@@ -132,8 +132,8 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
       searched = false;
     }
   }
-  std::sort(w.chosen.begin(), w.chosen.end(),
-            [](const Chosen& a, const Chosen& b) { return a.found.score > b.found.score; });
+  std::stable_sort(w.chosen.begin(), w.chosen.end(),
+                   [](const Chosen& a, const Chosen& b) { return a.found.score > b.found.score; });
   w.Polish();
   finding_.declared = w.declared;
   LeaveOutUndetermined(w, finding_);

@@ -2,6 +2,7 @@
 #include "host_sim/diagnose/diagnosis/evidence.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "host_sim/identify/calibration/channel.hpp"
 
@@ -14,6 +15,14 @@ namespace {
 
 constexpr double kSmooth_s = 0.02;     // over which columns are taken to be smooth
 constexpr double kRounding_Nm = 1e-9;  // of a column at the width of its prior: such as gravity's about an upright axis
+
+constexpr std::size_t kKeptValues = 30'000'000;  // 240 MB
+
+std::size_t SizeOf(const Columns& columns) {
+  std::size_t values = 0;
+  for (const MatrixXd& block : columns.block) values += static_cast<std::size_t>(block.size());
+  return values;
+}
 
 // The samples about row k are all used and in one piece.
 bool IsWhole(const RowIndex& rows, int k, int reach) {
@@ -83,7 +92,28 @@ Columns GatherColumns(const Candidate& candidate, const Evidence& evidence, cons
   return Gather(candidate, evidence.logs, evidence.index, eta);
 }
 
-Thinned::Thinned(const Evidence& evidence, int rows) : all(evidence) {
+const Columns* KeptColumns::Find(const Candidate& candidate, const std::vector<double>& eta) {
+  const auto at = kept_.find({&candidate, eta});
+  if (at == kept_.end()) return nullptr;
+  at->second.used = true;
+  return &at->second.columns;
+}
+
+void KeptColumns::Keep(const Candidate& candidate, const std::vector<double>& eta, const Columns& columns) {
+  if (values_ > kKeptValues) return;
+  values_ += SizeOf(columns);
+  kept_.insert_or_assign({&candidate, eta}, Entry{columns});
+}
+
+void KeptColumns::ForgetUnused() {
+  for (auto at = kept_.begin(); at != kept_.end();) {
+    const bool used = std::exchange(at->second.used, false);
+    if (!used) values_ -= SizeOf(at->second.columns);
+    at = used ? std::next(at) : kept_.erase(at);
+  }
+}
+
+Thinned::Thinned(const Evidence& evidence, int rows, KeptColumns& columns) : all(evidence), kept_columns(columns) {
   const auto averaged = [](const RowIndex& each) { return each.averaged(); };
   int skip = 1;
   if (std::none_of(evidence.index.begin(), evidence.index.end(), averaged))
@@ -117,6 +147,14 @@ Thinned::Thinned(const Evidence& evidence, int rows) : all(evidence) {
 }
 
 Columns Thinned::Gather(const Candidate& candidate, const std::vector<double>& eta) const {
+  if (candidate.record().depends_on_estimate) return GatherAnew(candidate, eta);
+  if (const Columns* known = kept_columns.Find(candidate, eta)) return *known;
+  Columns out = GatherAnew(candidate, eta);
+  kept_columns.Keep(candidate, eta, out);
+  return out;
+}
+
+Columns Thinned::GatherAnew(const Candidate& candidate, const std::vector<double>& eta) const {
   if (every == 1 || !candidate.has_memory()) return diagnosis::Gather(candidate, logs, index, eta);
   Columns out = GatherColumns(candidate, all, eta);
   for (std::size_t r = 0; r < out.joints.size(); ++r) out.block[r] = AverageRows(out.block[r], out.joints[r]);

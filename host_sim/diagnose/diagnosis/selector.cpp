@@ -56,6 +56,13 @@ std::vector<Found> FirstOf(const std::vector<Found>& ranked, int joints) {
   return out;
 }
 
+std::size_t LengthOfLaw(const codegen::EffectRecord& record) {
+  std::size_t length = 0;
+  for (const codegen::LinearParameter& p : record.linear)
+    for (const auto& [row, law] : p.rows) length += law.size();
+  return length;
+}
+
 // The torque passed a filter, of which only the rough form is known.
 bool IsFiltered(const calibration::Dataset& log) {
   return !log.channel.empty() || (log.saved_Hz.size() && log.saved_Hz.array().isFinite().any());
@@ -121,7 +128,7 @@ Grounds::Grounds(Diagnosis::Work& work, const std::vector<const Chosen*>& terms,
     }
     if (!coloured_) return;
   }
-  thinned_ = std::make_unique<Thinned>(work_.evidence, kThinnedRows);
+  thinned_ = std::make_unique<Thinned>(work_.evidence, kThinnedRows, work_.kept_columns);
   MakeMetrics(noise);
 }
 
@@ -180,6 +187,7 @@ bool Grounds::Sharpen(const Columns& with) {
 }
 
 bool Selector::Next(const std::vector<const Chosen*>& terms, Chosen& out) {
+  w_.kept_columns.ForgetUnused();
   Grounds grounds(w_, terms);
   std::vector<Candidate*> causes, events;
   for (const auto& c : w_.candidates)
@@ -287,21 +295,21 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
     ranked.push_back(f);
     something.insert({{c->record().name, c->joints()}, f});
   }
-  std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
+  std::stable_sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
   // Many curves fit the same torque about as well: the best ones of a joint stand for the others.
   std::map<std::vector<int>, int> curves;
   std::erase_if(ranked, [&](const Found& f) {
     return f.candidate->is_curve() && ++curves[f.candidate->rows()] > kCurvesOfAJoint;
   });
   ranked = FirstOf(ranked, w_.model.joints());
-  std::sort(screened.begin(), screened.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::stable_sort(screened.begin(), screened.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   if (screened.size() > kRescored) screened.resize(kRescored);
   for (const auto& [score, f] : screened)
     if (std::none_of(ranked.begin(), ranked.end(), [&](const Found& r) { return r.candidate == f.candidate; }))
       ranked.push_back(f);
   for (Found& f : ranked) f = Finish(f, grounds.ground());
   std::erase_if(ranked, [](const Found& f) { return f.gain.gain <= 0; });  // out of bounds on all rows
-  std::sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
+  std::stable_sort(ranked.begin(), ranked.end(), [](const Found& a, const Found& b) { return a.score > b.score; });
   return ranked;
 }
 
@@ -318,13 +326,16 @@ bool Selector::IsOutOfReach(const Candidate& c, const std::vector<const Chosen*>
          !SharesJoint(c, *terms.back()->candidate);
 }
 
-// By score; what is compiled in already wins among equals.
+// By score. Among equals what is compiled in already wins, then the shortest law.
 void Selector::Sort(std::vector<Found>& ranked) {
   const auto standing = [this](const Found& f) {
     const auto& names = w_.standby;
-    return f.score + (std::find(names.begin(), names.end(), f.candidate->record().name) != names.end() ? 1e-3 : 0);
+    const codegen::EffectRecord& record = f.candidate->record();
+    return f.score + (std::find(names.begin(), names.end(), record.name) != names.end() ? 1e-3 : 0) -
+           1e-6 * static_cast<double>(LengthOfLaw(record));
   };
-  std::sort(ranked.begin(), ranked.end(), [&](const Found& a, const Found& b) { return standing(a) > standing(b); });
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [&](const Found& a, const Found& b) { return standing(a) > standing(b); });
   if (ranked.empty() || !ranked[0].candidate->is_curve()) return;
   const Found& curve = ranked[0];
   // A surface has so many coefficients that it fits a part of much else.

@@ -151,6 +151,7 @@ RowIndex UsedRows(const std::vector<const calibration::Dataset*>& logs, int join
 void Diagnosis::Work::IndexRows() {
   evidence.index.clear();
   gathered.clear();
+  kept_columns.Clear();
   for (int j = 0; j < model.joints(); ++j) evidence.index.push_back(UsedRows(train, j));
   WeighRows();
 }

@@ -107,6 +107,7 @@ struct Diagnosis::Work {
   Estimate estimate;
   std::vector<Chosen> chosen;
   std::map<std::pair<const Candidate*, std::vector<double>>, Columns> gathered;  // of ColumnsOf
+  KeptColumns kept_columns;                                                      // of searches
   std::vector<std::vector<Eigen::MatrixXd>> regressor;  // [log][joint], kept if it does not depend on the estimate
   std::vector<char> bent;                               // [joint] 1: its declared rows must be filled anew
   Eigen::VectorXd followed;                             // the estimate that the evidence is at ...

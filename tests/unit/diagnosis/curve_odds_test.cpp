@@ -86,59 +86,6 @@ TEST(CurveOdds, OfASmoothSurface_AreNearlyItsGain) {
   EXPECT_GT(rows.Odds(6).Evidence(rows.Gain()), rows.Odds(36).Evidence(rows.Gain()) + 10);
 }
 
-// The likelihood of u x v with unit normal curves: over v a normal form, over u a sum on a grid.
-double ProductLikelihood(const CurveRows& rows, double size, double length_u, double length_v) {
-  const Eigen::Index wide = rows.C.cols() / 2;
-  const MatrixXd Bu = Alike(2, length_u).llt().matrixL(), Bv = Alike(static_cast<int>(wide), length_v).llt().matrixL(),
-                 C = std::sqrt(size) * rows.C;
-  constexpr double kReach = 5, kStep = 0.1;
-  double sum = 0;
-  for (double a = -kReach; a < kReach; a += kStep)
-    for (double b = -kReach; b < kReach; b += kStep) {
-      const VectorXd u = Bu * Eigen::Vector2d(a, b);
-      const MatrixXd D = (u[0] * C.leftCols(wide) + u[1] * C.rightCols(wide)) * Bv;
-      const MatrixXd M = D.transpose() * D + MatrixXd::Identity(wide, wide);
-      const VectorXd h = D.transpose() * rows.y;
-      sum += std::exp(0.5 * h.dot(M.ldlt().solve(h)) - 0.5 * (a * a + b * b)) / std::sqrt(M.determinant());
-    }
-  return 2 * std::log(sum * kStep * kStep / (2 * std::acos(-1.0)));
-}
-
-TEST(CurveOdds, OfAProduct_AreTheLikelihoodOfTheRows) {
-  CurveRows rows(60, 12, 0);
-  VectorXd a(12);
-  for (int k = 0; k < 6; ++k) a[k] = 0.6 * std::sin(2 * k), a[6 + k] = -0.8 * a[k];
-  rows.y += rows.C * a;
-  double best = 0;
-  for (double log_size = -4; log_size < 3; log_size += 0.7) {
-    best = std::max(best, ProductLikelihood(rows, std::exp(log_size), 0.1, 0.1));
-    best = std::max(best, ProductLikelihood(rows, std::exp(log_size), 1.5, 0.1));
-  }
-  ASSERT_GT(best, BestLikelihood(rows, {Alike(12, 0.1)}) + 2);
-  // The likelihood has two like peaks, at (u, v) and (-u, -v), and each is longer than a normal form: 3 of 115.
-  EXPECT_NEAR(rows.Odds(6).Evidence(rows.Gain()), best - 1.5, 1.5);
-}
-
-// Bumps along one direction times a wave along the other: 11 numbers instead of 36.
-TEST(CurveOdds, OfAProductWithBumps_AreNearlyItsGain) {
-  CurveRows rows(400, 36, 0);
-  VectorXd a(36);
-  const double bumps[] = {0, 0.3, -0.3, 0, 0.4, 0.1};
-  for (int i = 0; i < 6; ++i)
-    for (int k = 0; k < 6; ++k) a[6 * i + k] = bumps[i] * std::sin(1.1 * k);
-  rows.y += rows.C * a;
-  const double evidence = rows.Odds(6).Evidence(rows.Gain());
-  EXPECT_GT(evidence, BestLikelihood(rows, {Alike(36, 0.1)}, 0.5) + 15);
-  // A surface that is no product gains nothing by this.
-  CurveRows other(400, 36, 0);
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal;
-  for (double& x : a) x = 0.3 * normal(random);
-  other.y += other.C * a;
-  const double plain = BestLikelihood(other, {Alike(36, 0.1)}, 0.5);
-  EXPECT_NEAR(other.Odds(6).Evidence(other.Gain()), plain, 0.01 * plain);
-}
-
 // Noise that is larger by a factor makes every product, and with it the gain, smaller by its square.
 TEST(CurveOdds, WithASmallerGain_AreThoseOfNoisierRows) {
   const CurveRows rows(60, 8, 0.5);

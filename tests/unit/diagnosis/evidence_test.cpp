@@ -67,5 +67,47 @@ TEST(TrainingLog, IsShiftedByTheConfirmedDelayAlone) {
   EXPECT_EQ(work.train[0]->s.q, log.s.q);
 }
 
+// A log so short that no row is left out: thinned columns are those of all rows, whatever was kept before.
+TEST(KeptColumns, FollowTheRowsAndTheEstimate) {
+  tests::SyntheticArm arm(ArmOfTwoLinks(), 4);
+  Dataset log = arm.Run(4, 40);
+  const codegen::Catalogue records{{"viscous_cubic", tests::Records().at("viscous_cubic")},
+                                   {"load_friction", tests::Records().at("load_friction")}};
+  Diagnosis::Work work(arm.model(), records, {&log});
+  work.Solve({});
+  std::vector<std::vector<Eigen::MatrixXd>> seen;
+  const auto look = [&] {
+    work.FollowEstimate(work.all_reads);
+    const Thinned thinned(work.evidence, 2500, work.kept_columns);
+    seen.emplace_back();
+    for (const auto& c : work.candidates) {
+      seen.back().push_back(thinned.Gather(*c, {}).block[0]);
+      EXPECT_EQ(seen.back().back(), GatherColumns(*c, work.evidence, {}).block[0]) << c->name();
+    }
+  };
+  look();
+  work.estimate.x *= 1.1;
+  look();
+  log.used.topRows(100).setZero();
+  work.MakeTrain();
+  look();
+  EXPECT_NE(seen[1], seen[0]);
+  EXPECT_LT(seen[2][0].rows(), seen[1][0].rows());
+}
+
+TEST(KeptColumns, ThatNobodyAsksFor_AreForgotten) {
+  const Candidate cubic(tests::Records().at("viscous_cubic"), ArmOfTwoLinks(), {0});
+  Columns columns;
+  columns.block.emplace_back(Eigen::MatrixXd::Ones(3, 1));
+  KeptColumns kept;
+  kept.Keep(cubic, {1}, columns), kept.Keep(cubic, {2}, columns);
+  kept.ForgetUnused();  // both are new
+  ASSERT_NE(kept.Find(cubic, {2}), nullptr);
+  kept.ForgetUnused();
+  EXPECT_EQ(kept.Find(cubic, {1}), nullptr);
+  ASSERT_NE(kept.Find(cubic, {2}), nullptr);
+  EXPECT_EQ(kept.Find(cubic, {2})->block[0], columns.block[0]);
+}
+
 }  // namespace
 }  // namespace armcal::diagnosis

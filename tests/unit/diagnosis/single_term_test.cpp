@@ -60,7 +60,7 @@ TEST(SearchedTerm, WithAnAmplitudeBelowItsBound_GainsNothing) {
     w.FollowEstimate(w.all_reads);
     w.Prepare({});
     const Metric metric(w.rows, w.WhiteNoise());
-    const Thinned thinned(w.evidence, 1000);
+    const Thinned thinned(w.evidence, 1000, w.kept_columns);
     std::vector<NoiseModel> averaged;
     const BaseRows thin_rows = thinned.Average(w.rows, w.WhiteNoise(), averaged);
     const Metric thin_metric(thin_rows, averaged);

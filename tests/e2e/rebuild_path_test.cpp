@@ -48,7 +48,8 @@ exponent = 2.8
 }
 
 // A base that is not level turns gravity for the whole arm; a drag with the ninth power of speed is in no record. (At
-// the joint's speed limit, which every excitation comes close to, it is 30 N*m of the 90 that the axis has.)
+// the joint's speed limit it is 30 N*m of the 150 that the axis has.) The joint is one that moves faster in training
+// than on the held-out log: a curve stays constant beyond the speeds that it was fitted to.
 TEST_F(RebuildPath, ATiltedBaseAndAnUnknownFriction_AreCompiledIn) {
   const fs::path folder = FreshFolder("tilt_and_curve");
   const fs::path scenario = folder / "tilt_and_curve.toml";
@@ -64,18 +65,22 @@ pitch_deg = 0.6
 
 [[effect]]
 kind = "viscous_cubic"
-joint = 6
-drag_at_1radps_Nm = 2e-8
+joint = 5
+drag_at_1radps_Nm = 2e-6
 exponent = 9.0
 )";
-  const nlohmann::json result = RunDemo(scenario.string(), folder);
+  nlohmann::json result = RunDemo(scenario.string(), folder);
   ASSERT_FALSE(result.is_null());
   ExpectSoundLoop(result, folder);
-  ExpectFound(result, {"unknown"}, 6);
   ASSERT_EQ(result.at("terms").size(), 2u);
+  // The two are about as strong; either may stand first.
+  if (result["terms"][0].at("kind") == "base_tilt") std::swap(result["terms"][0], result["terms"][1]);
   const nlohmann::json &curve = result.at("terms")[0], &tilt = result.at("terms")[1];
   EXPECT_EQ(curve.at("record"), "curve_friction");
-  EXPECT_EQ(curve.at("signals"), nlohmann::json({"qd6"}));
+  EXPECT_EQ(curve.at("kind"), "unknown");
+  EXPECT_EQ(curve.at("joint"), 5);
+  EXPECT_TRUE(curve.at("confirmed").get<bool>());
+  EXPECT_EQ(curve.at("signals"), nlohmann::json({"qd5"}));
   EXPECT_EQ(tilt.at("kind"), "base_tilt");
   for (const int joint : {1, 2}) ExpectExcessGone(result, joint);
   EXPECT_FALSE(result.at("model").at("by_table").get<bool>());

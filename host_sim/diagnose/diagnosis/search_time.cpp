@@ -31,7 +31,7 @@ struct EventRow {
   MatrixXd factor;
 };
 
-// Where one of the shapes fits best. tried: places looked at. The factors hardly change within a window.
+// Where one of the shapes fits best. tried: places looked at.
 Window Strongest(const std::vector<VectorXd>& shapes, const std::vector<EventRow>& rows, const VectorXd& time,
                  double& tried) {
   const int samples = static_cast<int>(time.size());
@@ -41,16 +41,15 @@ Window Strongest(const std::vector<VectorXd>& shapes, const std::vector<EventRow
   tried = 0;
   for (const VectorXd& shape : shapes) {
     const int length = static_cast<int>(shape.size()), stride = std::max(1, length / kStepsPerWindow);
-    const Eigen::ArrayXd square = shape.array().square();
     for (int at = 0; at + length <= samples; at += stride, ++tried) {
       MatrixXd gram = MatrixXd::Zero(columns, columns);
       VectorXd right = VectorXd::Zero(columns);
       for (const EventRow& row : rows) {
         const auto used = row.used.segment(at, length);
         if (used.sum() < kSeen * length) continue;
-        const VectorXd factor = row.factor.row(at + length / 2);
-        gram += (square * used.array()).sum() * factor * factor.transpose();
-        right += shape.dot(row.left.segment(at, length)) * factor;
+        const MatrixXd column = shape.cwiseProduct(used).asDiagonal() * row.factor.middleRows(at, length);
+        gram += column.transpose() * column;
+        right += column.transpose() * row.left.segment(at, length);
       }
       gram.diagonal().array() += 1e-9 * gram.trace() + 1e-300;
       const double gain = right.dot(gram.ldlt().solve(right));
@@ -132,9 +131,11 @@ void Searcher::Windows() {
     }
     double tried = 0;
     const Window best = Strongest(shapes, rows, time, tried);
+    // A window pays for its own place and amplitudes. All windows together pay the record's own penalty.
     Found one = best_;
-    one.penalty = PenaltyOf(2 + static_cast<int>(value.size()), c_, e_), one.tried = tried;
-    if (best.gain < GainOfScore(one)) break;
+    one.gain.rank = static_cast<int>(value.size()), one.searched = 2, one.tried = tried;
+    one.penalty = PenaltyOf(one.gain.rank + one.searched, c_, e_);
+    if (best.gain < GainOfScore(one) - c_.record().generic_penalty) break;
     best_.searched = 2 * windows;
     best_.tried = std::pow(tried, windows);
     const auto with = [&](const std::vector<double>& last) {

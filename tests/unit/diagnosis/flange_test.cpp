@@ -1,6 +1,7 @@
 // diagnosis tests - forces at the flange of KDL's arm, and a torque over two positions, are named where they act.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <numbers>
 
@@ -32,11 +33,21 @@ class OnTheEr20 : public testing::Test {
       }
     }
   }
-  const Term* First() {
-    diagnosis_ = std::make_unique<Diagnosis>(arm_.model(), tests::Records(), std::vector<const Dataset*>{&log_},
+  const Term* First(const codegen::Catalogue& records = tests::Records()) {
+    diagnosis_ = std::make_unique<Diagnosis>(arm_.model(), records, std::vector<const Dataset*>{&log_},
                                              std::vector<const Dataset*>{});
     const auto& terms = diagnosis_->finding().terms;
     return terms.empty() ? nullptr : &terms[0];
+  }
+
+  static constexpr double kLength_s = 0.6;
+  void PushAt(const std::vector<double>& begin, double size_N) {
+    Push(0, [&](double t, const KDL::Vector&) {
+      double size = 0;
+      for (const double from : begin)
+        if (const double u = (t - from) / kLength_s; u > 0 && u < 1) size = size_N * std::sin(std::numbers::pi * u);
+      return KDL::Vector(0.6, -0.5, 0.62) * size;
+    });
   }
 
   SyntheticArm arm_;
@@ -59,21 +70,41 @@ TEST_F(OnTheEr20, AHoseToTheCeiling_IsNamedWithItsAnchorAndLength) {
   EXPECT_NEAR(t->amplitude[0], kStiffness_Npm, 4 * t->sd[0]);
 }
 
+// The middle of each push that a term names, in order.
+std::vector<double> Middles(const Term& t) {
+  std::vector<double> out;
+  for (std::size_t k = 0; k + 1 < t.eta.size(); k += 2) out.push_back((t.eta[k] + t.eta[k + 1]) / 2);
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
 TEST_F(OnTheEr20, TwoPushesAtTheFlange_AreOneContactThere) {
-  const double begin[] = {5.2, 13.1}, length = 0.6;
-  Push(0, [&](double t, const KDL::Vector&) {
-    double size = 0;
-    for (const double from : begin)
-      if (const double u = (t - from) / length; u > 0 && u < 1) size = 30 * std::sin(std::numbers::pi * u);
-    return KDL::Vector(0.6, -0.5, 0.62) * size;
-  });
+  const double begin[] = {5.2, 13.1};
+  PushAt({begin[0], begin[1]}, 30);
   const Term* t = First();
   ASSERT_NE(t, nullptr);
   ASSERT_EQ(t->record->name, "flange_contact");
-  ASSERT_EQ(t->eta.size(), 4U);  // on, off of each
-  std::vector<double> middle{(t->eta[0] + t->eta[1]) / 2, (t->eta[2] + t->eta[3]) / 2};
-  std::sort(middle.begin(), middle.end());
-  for (int k = 0; k < 2; ++k) EXPECT_NEAR(middle[static_cast<std::size_t>(k)], begin[k] + length / 2, 0.06);
+  const std::vector<double> middle = Middles(*t);
+  ASSERT_EQ(middle.size(), 2U);
+  for (int k = 0; k < 2; ++k) EXPECT_NEAR(middle[static_cast<std::size_t>(k)], begin[k] + kLength_s / 2, 0.06);
+}
+
+// One of them alone would not be seen.
+TEST_F(OnTheEr20, WeakPushesAtTheFlange_AreOneContactThere) {
+  const std::vector<double> begin{3.1, 7.2, 11.5, 16.3};
+  PushAt(begin, 5);
+  codegen::Catalogue records;
+  for (const char* name : {"flange_contact", "external_contact", "payload_step"})
+    records.insert({name, tests::Records().at(name)});
+  const Term* t = First(records);
+  ASSERT_NE(t, nullptr);
+  ASSERT_EQ(t->record->name, "flange_contact");
+  const std::vector<double> middle = Middles(*t);
+  EXPECT_GT(middle.size(), 1U);
+  for (const double at : middle)
+    EXPECT_TRUE(std::any_of(begin.begin(), begin.end(), [&](double from) {
+      return std::abs(from + kLength_s / 2 - at) < 0.2;
+    })) << at;
 }
 
 TEST_F(OnTheEr20, AProductOfTwoPositions_IsASurfaceOverThem) {

@@ -37,8 +37,6 @@ if(ARMCAL_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
   target_link_options(armcal_rules INTERFACE -fsanitize=address,undefined)
 endif()
 
-# Rooms are position-independent on the host: a Python module links them.
-
 # armcal_library(NAME [SOURCES ...] [LIBS ...]): a room of lib. C++17, no exceptions, no RTTI. Without sources: headers only.
 function(armcal_library name)
   cmake_parse_arguments(A "" "" "SOURCES;LIBS" ${ARGN})
@@ -47,16 +45,12 @@ function(armcal_library name)
     target_link_libraries(${name} PUBLIC armcal_lib_rules ${A_LIBS})
     target_compile_options(${name} PRIVATE -fno-exceptions -fno-rtti -fno-threadsafe-statics)
     set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)  # file by file, as it ships
-    if(NOT CMAKE_CROSSCOMPILING)
-      set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-    endif()
     target_compile_features(${name} PUBLIC cxx_std_17)
   else()
     add_library(${name} INTERFACE)
     target_link_libraries(${name} INTERFACE armcal_lib_rules ${A_LIBS})
     target_compile_features(${name} INTERFACE cxx_std_17)
   endif()
-  set_property(GLOBAL APPEND PROPERTY armcal_rooms ${name})
 endfunction()
 
 # armcal_headers(NAME HEADERS ... RULES ...): compiles headers once for all targets of these rules. A target takes them by REUSE_FROM.
@@ -77,11 +71,8 @@ function(armcal_host_library name)
     find_package(Eigen3 REQUIRED NO_MODULE)
     armcal_headers(armcal_host_headers HEADERS <Eigen/Dense> <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <random> <string> <vector>
                    RULES armcal_host_rules Eigen3::Eigen)
-    set_target_properties(armcal_host_headers PROPERTIES POSITION_INDEPENDENT_CODE ON)
   endif()
   target_precompile_headers(${name} REUSE_FROM armcal_host_headers)
-  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  set_property(GLOBAL APPEND PROPERTY armcal_rooms ${name})
 endfunction()
 
 # Tests are many, and nearly all take longer to compile than to run: optimised little. Oracles are in double. Linked last: lib's rules,
@@ -146,7 +137,6 @@ function(armcal_emitted_models name)
   add_library(${name} INTERFACE)
   add_dependencies(${name} ${name}_files)
   target_include_directories(${name} INTERFACE ${CMAKE_CURRENT_BINARY_DIR})
-  set_property(GLOBAL APPEND PROPERTY armcal_rooms ${name})
 endfunction()
 
 # armcal_add_rooms([FOLDER]): adds the folder's own CMakeLists.txt and those of its subfolders, as far as there are any.

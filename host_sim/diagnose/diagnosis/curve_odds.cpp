@@ -8,7 +8,6 @@
 
 namespace armcal::diagnosis {
 
-using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 

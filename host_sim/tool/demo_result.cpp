@@ -8,7 +8,7 @@
 
 #include "host_sim/data/report/axis.hpp"
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/diagnose/verdict/verdict_file.hpp"
 
 namespace armcal::tool {
 

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-#include "armcal/core/crc.hpp"
 #include "armcal/link/event_log.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/register_text.hpp"
+#include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/client/table_seal.hpp"
 #include "host_sim/tool/connect.hpp"
@@ -25,10 +25,8 @@ struct TableOptions {
   bool confirm = false, end = false;
 };
 
-std::string CrcText(std::uint32_t crc) { return fmt::format("{:08X}", crc); }
-
 ordered_json Told(const client::FlashReport& report) {
-  return {{"table_crc", CrcText(report.crc)},
+  return {{"table_crc", client::CrcText(report.crc)},
           {"readback_ok", true},
           {"generation", report.generation},
           {"store_sequence", report.store_sequence}};
@@ -36,38 +34,14 @@ ordered_json Told(const client::FlashReport& report) {
 
 // The table in force as a file, and back ------------------------------------------------------------------------------
 
-// What a backup holds: the words, and what they belong to.
 ordered_json Backup(client::DriveClient& drive) {
   const client::Identity id = drive.ReadIdentity();
   const auto words = client::ReadActiveTable(drive);
   const client::DriveStatus s = drive.ReadStatus();
-  const std::uint32_t crc = core::Crc32Words(words.data(), words.size());
   if (s.table_status != core::Status::kOk)
     throw client::RefusedError(
         fmt::format("{}: has no valid table: {}", drive.name(), client::StatusName(s.table_status)), 0, s.table_status);
-  return {{"armcal_backup", 1},
-          {"schema", CrcText(id.schema)},
-          {"serial_number", id.serial_number},
-          {"table_crc", CrcText(crc)},
-          {"words", words}};
-}
-
-std::vector<std::uint16_t> ReadBackup(const std::string& path) {
-  const auto json = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
-  const auto bad = [&](const char* what) {
-    return io::InputError(path + ": expected a file of armcal backup: " + what);
-  };
-  if (!json.is_object() || json.value("armcal_backup", ordered_json()) != 1 || !json.contains("words"))
-    throw bad("with \"armcal_backup\": 1 and \"words\"");
-  std::vector<std::uint16_t> words;
-  if (!json["words"].is_array()) throw bad("\"words\" is no list");
-  for (const auto& w : json["words"]) {
-    if (!w.is_number_unsigned() || w.get<std::uint64_t>() > 0xFFFF) throw bad("a word is no number from 0 to 65535");
-    words.push_back(w.get<std::uint16_t>());
-  }
-  if (json.value("table_crc", ordered_json()) != CrcText(core::Crc32Words(words.data(), words.size())))
-    throw bad("words and \"table_crc\" differ");
-  return words;
+  return client::BackupJson(words, id.schema, id.serial_number);
 }
 
 int RunBackup(const TableOptions& o) {
@@ -81,13 +55,13 @@ int RunBackup(const TableOptions& o) {
 }
 
 int RunRestore(const TableOptions& o) {
-  const std::vector<std::uint16_t> words = client::UnsealTable(ReadBackup(o.file));
+  const std::vector<std::uint16_t> words = client::UnsealTable(client::ReadBackup(o.file));
   const std::optional<client::Key> key = ReadKeyOption(o.key);
   TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   const client::FlashReport report = client::FlashTable(drive, words, {}, KeyOf(key));
   fmt::print("{}: {} registers stored, adopted and read back: CRC {}, generation {}, store sequence {}\n", drive.name(),
-             words.size(), CrcText(report.crc), report.generation, report.store_sequence);
+             words.size(), client::CrcText(report.crc), report.generation, report.store_sequence);
   WriteJson(o.json, Told(report));
   KeepTable(o.fleet, drive, "restore", Told(report), o.file);
   return kOk;
@@ -95,7 +69,7 @@ int RunRestore(const TableOptions& o) {
 
 int RunDiff(const TableOptions& o) {
   // The seal says who stored a table and when, and nothing about the arm.
-  const std::vector<std::uint16_t> words = client::UnsealTable(ReadBackup(o.file));
+  const std::vector<std::uint16_t> words = client::UnsealTable(client::ReadBackup(o.file));
   client::DriveClient drive = ConnectTo(o.connect);
   const auto active = client::UnsealTable(client::ReadActiveTable(drive));
   ordered_json differ = ordered_json::array();
@@ -120,7 +94,7 @@ int RunRollback(const TableOptions& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   const client::FlashReport report = client::Rollback(drive, KeyOf(key));
   fmt::print("{}: the older table is stored, adopted and read back: CRC {}, generation {}, store sequence {}\n",
-             drive.name(), CrcText(report.crc), report.generation, report.store_sequence);
+             drive.name(), client::CrcText(report.crc), report.generation, report.store_sequence);
   WriteJson(o.json, Told(report));
   KeepTable(o.fleet, drive, "rollback", Told(report));
   return kOk;
@@ -131,8 +105,8 @@ int RunTrial(const TableOptions& o) {
   client::DriveClient drive = ConnectTo(o.connect);
   if (o.confirm) {
     const client::FlashReport report = client::ConfirmTrial(drive);
-    fmt::print("{}: the table on trial is stored: CRC {}, store sequence {}\n", drive.name(), CrcText(report.crc),
-               report.store_sequence);
+    fmt::print("{}: the table on trial is stored: CRC {}, store sequence {}\n", drive.name(),
+               client::CrcText(report.crc), report.store_sequence);
     WriteJson(o.json, Told(report));
     KeepTable(o.fleet, drive, "trial --confirm", Told(report));
     return kOk;
@@ -142,7 +116,7 @@ int RunTrial(const TableOptions& o) {
   const client::DriveStatus s = drive.ReadStatus();
   fmt::print("{}: {}\n", drive.name(),
              left_s > 0 ? fmt::format("a table is on trial for {} s more", left_s) : "no table is on trial");
-  WriteJson(o.json, {{"on_trial", left_s > 0}, {"left_s", left_s}, {"table_crc", CrcText(s.active_crc)}});
+  WriteJson(o.json, {{"on_trial", left_s > 0}, {"left_s", left_s}, {"table_crc", client::CrcText(s.active_crc)}});
   return kOk;
 }
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "host_sim/client/drive_client.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/diagnose/verdict/verdict_file.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {

@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 seconds=${1:?how many seconds}
 shift
 targets=("$@")
-[[ ${#targets[@]} -gt 0 ]] || targets=(rtu tcp engine controller table vendor csv gzip robot mcap)
+[[ ${#targets[@]} -gt 0 ]] || targets=(rtu tcp engine controller table vendor csv gzip robot mcap json)
 mkdir -p build/fuzz
 
 # The readers are linked with the same toml++ library as armcal. In the header-only form of toml++ 3.3 an assert fails on a table
@@ -18,7 +18,8 @@ flags=(-std=c++20 -O2 -g -ffp-contract=off -fsanitize=address,undefined -fno-san
 wire=(tests/fuzz/wire_targets.cpp host_sim/machine/drive/vendor_block.cpp lib/armcal/link/*.cpp lib/armcal/table/*.cpp)
 readers=(tests/fuzz/reader_targets.cpp host_sim/data/files/*.cpp
   host_sim/data/bags/{recording,bag_folder,mapped_file,mcap,lz4,zstd,database,topic_table,definition,cdr,json_message}.cpp codegen/src/io/*.cpp
-  codegen/src/robot/{robot,payload,import_urdf,no_urdf}.cpp)
+  codegen/src/robot/{robot,payload,import_urdf,no_urdf}.cpp host_sim/client/table_backup.cpp
+  host_sim/diagnose/verdict/verdict_file.cpp)
 
 # Coverage leaves out what steers no search: the standard library, the checksum, the stand-ins of the tests.
 printf 'fun:%s\n' '_ZNSt*' '_ZNKSt*' '_ZSt*' '_ZN9__gnu_cxx*' '_ZNK9__gnu_cxx*' '_ZN6armcal4test*' '_ZN6armcal4core3crc*' \
@@ -41,14 +42,14 @@ done
 # The longest input of each target, in bytes. It holds what the target tells apart: a request has at most 253 bytes, and an action
 # less than ten beside it. Longer inputs repeat that, and cost their length.
 declare -A max_len=([rtu]=512 [tcp]=512 [engine]=512 [controller]=512 [table]=256 [vendor]=512 [csv]=512 [gzip]=512 [robot]=2048
-  [mcap]=2048)
+  [mcap]=2048 [json]=1024)
 # Freed memory is watched until 8 MB more are freed, which is many inputs. A report shows six callers of an allocation.
 export ASAN_OPTIONS=quarantine_size_mb=8:malloc_context_size=6${ASAN_OPTIONS:+:$ASAN_OPTIONS}
 
 for target in "${targets[@]}"; do
   part=wire libraries=()
   case $target in
-    csv | gzip | robot | mcap) part=readers libraries=(-lz -llz4 -lzstd -lsqlite3 $(pkg-config --libs tomlplusplus)) ;;
+    csv | gzip | robot | mcap | json) part=readers libraries=(-lz -llz4 -lzstd -lsqlite3 $(pkg-config --libs tomlplusplus)) ;;
   esac
   clang++ "${flags[@]}" -fsanitize=fuzzer -DARMCAL_FUZZ="${target^}" tests/fuzz/entry.cpp build/fuzz/$part/*.o \
     "${libraries[@]}" -o "build/fuzz/fuzz_$target"

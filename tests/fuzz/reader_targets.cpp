@@ -9,9 +9,11 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "codegen/src/robot/robot.hpp"
+#include "host_sim/client/table_backup.hpp"
 #include "host_sim/data/bags/recording.hpp"
 #include "host_sim/data/files/csv.hpp"
 #include "host_sim/data/files/files.hpp"
+#include "host_sim/diagnose/verdict/verdict_file.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace armcal::fuzz {
@@ -45,6 +47,15 @@ void Robot(const std::uint8_t* bytes, std::size_t count) {
 }
 void Mcap(const std::uint8_t* bytes, std::size_t count) {
   AsFile(bytes, count, [](const std::string& path) { (void)bags::ReadRecording(path, {}); });
+}
+
+void Json(const std::uint8_t* bytes, std::size_t count) {
+  AsFile(bytes, count, [](const std::string& path) {
+    const auto verdict = verdict::ReadVerdict(path);  // never bad input: a file without a verdict is a failed one
+    for (const auto& term : verdict.value("terms", nlohmann::ordered_json::array()))
+      (void)verdict::JointText(term.at("joint"));
+    (void)client::ReadBackup(path);
+  });
 }
 
 }  // namespace armcal::fuzz

@@ -26,9 +26,12 @@ void Csv(const std::uint8_t* bytes, std::size_t count);
 void Gzip(const std::uint8_t* bytes, std::size_t count);
 void Robot(const std::uint8_t* bytes, std::size_t count);
 void Mcap(const std::uint8_t* bytes, std::size_t count);
+// A verdict, and a backup of a table.
+void Json(const std::uint8_t* bytes, std::size_t count);
 
 inline constexpr Target kTargets[] = {
-    {"rtu", Rtu},       {"tcp", Tcp}, {"engine", Engine}, {"controller", Controller}, {"table", Table},
-    {"vendor", Vendor}, {"csv", Csv}, {"gzip", Gzip},     {"robot", Robot},           {"mcap", Mcap}};
+    {"rtu", Rtu},     {"tcp", Tcp},       {"engine", Engine}, {"controller", Controller},
+    {"table", Table}, {"vendor", Vendor}, {"csv", Csv},       {"gzip", Gzip},
+    {"robot", Robot}, {"mcap", Mcap},     {"json", Json}};
 
 }  // namespace armcal::fuzz

@@ -75,8 +75,8 @@ const Edges kEdges = {
     {"host_sim/diagnose/health", {kHost + "client"}},  // a drive's statistics -> a verdict
 
     // Client: what talks to a drive.
-    {"host_sim/client",        {kCode, kHost + "data/logs", kHost + "data/trajectory", kHost + "data/report",
-                                kLib + "core", kLib + "controller", kLib + "link"}},
+    {"host_sim/client",        {kCode, kHost + "data/files", kHost + "data/logs", kHost + "data/trajectory",
+                                kHost + "data/report", kLib + "core", kLib + "controller", kLib + "link"}},
 
     // Machine: the simulated arm, and lib running on a PC. The plant sees neither the generator nor lib: it is the truth
     // that the others are judged by.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::verdict {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "host_sim/diagnose/diagnosis/known_term.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/diagnose/verdict/verdict_file.hpp"
 #include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::verdict {

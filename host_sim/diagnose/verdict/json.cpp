@@ -1,4 +1,4 @@
-// verdict - writes one diagnosis as JSON, and reads such files and the effects in them.
+// verdict - writes one diagnosis as JSON, and reads the terms in such a file.
 #include "host_sim/diagnose/verdict/json.hpp"
 
 #include <fmt/format.h>
@@ -17,7 +17,6 @@
 
 namespace armcal::verdict {
 
-namespace fs = std::filesystem;
 using diagnosis::Term;
 using nlohmann::ordered_json;
 
@@ -237,13 +236,6 @@ bool IsAmong(const codegen::EffectUse& use, const std::vector<std::string>& effe
                      [&](const std::string& e) { return e == use.effect || e == word; });
 }
 
-bool IsVerdict(const ordered_json& j) {
-  if (!j.is_object() || !j.contains("verdict") || !j["verdict"].is_string()) return false;
-  if (j["verdict"] == "failed") return j.contains("error") && j["error"].is_string();
-  return (j["verdict"] == "none" || j["verdict"] == "effect") && j.contains("terms") && j["terms"].is_array() &&
-         j.contains("before_moving") && j.contains("after_moving");
-}
-
 }  // namespace
 
 std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::vector<std::string>& effects) {
@@ -288,33 +280,6 @@ diagnosis::KnownTerm ReadKnownTerm(const ordered_json& term, const codegen::Cata
         covariance(r, c) = number(rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)));
   } catch (const nlohmann::json::exception&) {
     throw io::InputError("expected a verdict with eta, amplitude and covariance of each term: diagnose anew");
-  }
-  return out;
-}
-
-std::string JointText(const ordered_json& joint) { return joint.is_string() ? joint.get<std::string>() : joint.dump(); }
-
-ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed"}, {"error", why}}; }
-
-ordered_json ReadVerdict(const fs::path& path) {
-  ordered_json j = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
-  return IsVerdict(j) ? j : FailedVerdict(path.filename().string() + " holds no verdict");
-}
-
-Verdicts ReadVerdicts(const std::vector<std::string>& paths) {
-  Verdicts out;
-  const auto add = [&](const fs::path& path) {
-    const std::string name = path.stem().string();
-    if (!out.emplace(name, ReadVerdict(path)).second)
-      throw io::InputError(path.string() + ": expected one verdict of the name " + name);
-  };
-  for (const std::string& p : paths) {
-    if (!fs::is_directory(p)) {
-      add(p);
-      continue;
-    }
-    for (const auto& e : fs::directory_iterator(p))
-      if (e.path().extension() == ".json") add(e.path());
   }
   return out;
 }

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "host_sim/diagnose/verdict/common_rows.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/diagnose/verdict/spread.hpp"
+#include "host_sim/diagnose/verdict/verdict_file.hpp"
 
 namespace armcal::verdict {
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "host_sim/data/report/page.hpp"
+#include "host_sim/diagnose/verdict/json_values.hpp"
 
 namespace armcal::verdict {
 
@@ -17,26 +18,27 @@ namespace {
 // Confirmed terms as "kind joint".
 std::string Terms(const ordered_json& verdict) {
   std::string text;
-  for (const auto& t : verdict["terms"])
-    text += (text.empty() ? "" : "; ") + t["kind"].get<std::string>() + " " + JointText(t["joint"]);
+  for (const auto& t : verdict.at("terms"))
+    text += (text.empty() ? "" : "; ") + t.at("kind").get<std::string>() + " " + JointText(t.at("joint"));
   return text;
 }
 
 report::Table FindingTable(const ordered_json& summary) {
   report::Table t{{"finding", "joint", "logs", "share %", "first in"}, {}};
-  for (const auto& f : summary["findings"])
-    t.rows.push_back({f["kind"], JointText(f["joint"]), std::to_string(f["logs"].size()),
-                      fmt::format("{:.0f}", 100.0 * static_cast<double>(f["logs"].size()) /
-                                                static_cast<double>(summary["verdicts"].size())),
-                      f["logs"][0]});
+  for (const auto& f : summary.at("findings"))
+    t.rows.push_back({f.at("kind"), JointText(f.at("joint")), std::to_string(f.at("logs").size()),
+                      fmt::format("{:.0f}", 100.0 * static_cast<double>(f.at("logs").size()) /
+                                                static_cast<double>(summary.at("verdicts").size())),
+                      f.at("logs").at(0)});
   return t;
 }
 
 // The largest share of a joint's error that the terms removed.
 std::string Gain(const ordered_json& verdict) {
   double best = 0;
-  for (std::size_t j = 0; j < verdict["before_moving"].size(); ++j) {
-    const double before = verdict["before_moving"][j], after = verdict["after_moving"][j];
+  for (std::size_t j = 0; j < verdict.at("before_moving").size(); ++j) {
+    const double before = NumberOf(verdict.at("before_moving").at(j)),
+                 after = NumberOf(verdict.at("after_moving").at(j));
     if (before > 0) best = std::max(best, 1 - after / before);
   }
   return fmt::format("{:.1f}", 100 * best);
@@ -44,17 +46,17 @@ std::string Gain(const ordered_json& verdict) {
 
 report::Table VerdictTable(const ordered_json& summary) {
   report::Table t{{"log", "verdict", "error removed %", "terms, or what is wrong"}, {}};
-  for (const auto& v : summary["verdicts"]) {
-    const bool failed = v["verdict"] == "failed", effect = v["verdict"] == "effect";
+  for (const auto& v : summary.at("verdicts")) {
+    const bool failed = v.at("verdict") == "failed", effect = v.at("verdict") == "effect";
     t.rows.push_back(
-        {v["name"], v["verdict"], effect ? Gain(v) : "-", failed ? v["error"].get<std::string>() : Terms(v)});
+        {v.at("name"), v.at("verdict"), effect ? Gain(v) : "-", failed ? v.at("error").get<std::string>() : Terms(v)});
   }
   return t;
 }
 
 std::string Headline(const ordered_json& s) {
-  return fmt::format("{} logs: {} with an effect, {} without, {} failed", s["verdicts"].size(), s["effect"].get<int>(),
-                     s["none"].get<int>(), s["failed"].get<int>());
+  return fmt::format("{} logs: {} with an effect, {} without, {} failed", s.at("verdicts").size(),
+                     s.at("effect").get<int>(), s.at("none").get<int>(), s.at("failed").get<int>());
 }
 
 }  // namespace
@@ -64,23 +66,23 @@ ordered_json SummaryJson(const Verdicts& verdicts) {
   s["verdicts"] = ordered_json::array();
   std::map<std::pair<std::string, std::string>, ordered_json> findings;  // by kind and joint
   for (const auto& [name, v] : verdicts) {
-    const std::string verdict = v["verdict"];
+    const std::string verdict = v.at("verdict");
     s[verdict] = s[verdict].get<int>() + 1;
     ordered_json row{{"name", name}, {"verdict", verdict}};
     if (verdict == "failed") {
-      row["error"] = v["error"];
+      row["error"] = v.at("error");
       s["verdicts"].push_back(row);
       continue;
     }
     row["terms"] = ordered_json::array();
-    for (const auto& t : v["terms"]) {
+    for (const auto& t : v.at("terms")) {
       if (!t.value("confirmed", true)) continue;
-      row["terms"].push_back({{"kind", t["kind"]}, {"joint", t["joint"]}, {"parameters", t["parameters"]}});
-      ordered_json& f = findings[{t["kind"].get<std::string>(), JointText(t["joint"])}];
-      if (f.is_null()) f = {{"kind", t["kind"]}, {"joint", t["joint"]}, {"logs", ordered_json::array()}};
+      row["terms"].push_back({{"kind", t.at("kind")}, {"joint", t.at("joint")}, {"parameters", t.at("parameters")}});
+      ordered_json& f = findings[{t.at("kind").get<std::string>(), JointText(t.at("joint"))}];
+      if (f.is_null()) f = {{"kind", t.at("kind")}, {"joint", t.at("joint")}, {"logs", ordered_json::array()}};
       f["logs"].push_back(name);
     }
-    row["before_moving"] = v["before_moving"], row["after_moving"] = v["after_moving"];
+    row["before_moving"] = v.at("before_moving"), row["after_moving"] = v.at("after_moving");
     s["verdicts"].push_back(row);
   }
   std::vector<ordered_json> sorted;
@@ -93,14 +95,14 @@ ordered_json SummaryJson(const Verdicts& verdicts) {
 
 std::string SummaryText(const ordered_json& s) {
   std::string text = report::Text(VerdictTable(s));
-  if (!s["findings"].empty()) text += "\n" + report::Text(FindingTable(s));
+  if (!s.at("findings").empty()) text += "\n" + report::Text(FindingTable(s));
   return text + Headline(s) + "\n";
 }
 
 void WriteSummaryPage(const fs::path& path, const ordered_json& s) {
   report::Page page("What the models of many arms lack", "One verdict a log; terms that held on its held-out log.");
-  page.Box(s["failed"] > 0 ? report::Tone::kWarning : report::Tone::kNeutral, Headline(s));
-  if (!s["findings"].empty()) {
+  page.Box(s.at("failed") > 0 ? report::Tone::kWarning : report::Tone::kNeutral, Headline(s));
+  if (!s.at("findings").empty()) {
     page.Section("What was found");
     page.Add(FindingTable(s));
   }

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/diagnose/verdict/verdict_file.hpp"
 
 namespace armcal::verdict {
 

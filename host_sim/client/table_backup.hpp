@@ -1,0 +1,23 @@
+// client - the file that keeps a drive's table: writes it as JSON, and reads it back.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace armcal::client {
+
+// Eight hexadecimal digits.
+std::string CrcText(std::uint32_t crc);
+
+// {"armcal_backup": 1, "schema", "serial_number", "table_crc", "words"}: a table and the drive that it comes from.
+nlohmann::ordered_json BackupJson(std::span<const std::uint16_t> words, std::uint32_t schema,
+                                  std::uint32_t serial_number);
+
+// The words of such a file. Throws io::InputError: it is another file, or its words and its checksum differ.
+std::vector<std::uint16_t> ReadBackup(const std::string& path);
+
+}  // namespace armcal::client

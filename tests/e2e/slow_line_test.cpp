@@ -125,7 +125,8 @@ TEST(LongSlowLine, PlainRecordsOfAMinute_AllArrive_EightTimes) { ForSeeds(8, Exp
 
 TEST(SlowLine, RecordsThatItCannotCarry_AreThinnedBeforeTheRecordingBegins) {
   Line line("slow_line_thinned", {90909, 0.004, 3e-5, 1});
-  const Outcome o = line.Record({"--decimation", "1"}, ":1000000", "2");
+  // The drive's ring holds most of these records, so a busy machine loses none; it holds an eighth of those asked for.
+  const Outcome o = line.Record({"--decimation", "1"}, ":1000000", "1.5");
   ASSERT_EQ(o.code, 0) << o.err << o.out;
   EXPECT_NE(o.out.find("cannot carry"), std::string::npos) << o.out;
   const auto json = line.Json();

@@ -71,6 +71,7 @@ class Clients {
     std::vector<std::uint8_t> pdu{
         16, static_cast<std::uint8_t>(first >> 8),   static_cast<std::uint8_t>(first),
         0,  static_cast<std::uint8_t>(words.size()), static_cast<std::uint8_t>(2 * words.size())};
+    pdu.reserve(pdu.size() + 2 * words.size());
     for (const std::uint16_t w : words)
       pdu.push_back(static_cast<std::uint8_t>(w >> 8)), pdu.push_back(static_cast<std::uint8_t>(w));
     Ask(pdu);

@@ -4,6 +4,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -28,8 +29,13 @@ using GzHandle = std::unique_ptr<gzFile_s, CloseGz>;
 // Text of numbers shrinks to a third or a fifth. A file made to fill the memory shrinks to a thousandth.
 constexpr std::size_t kExpansion = 60, kExpansionFree_bytes = std::size_t{16} << 20;
 
-// Small files are many: robot files, tables, and what a fuzzer makes.
-constexpr std::size_t kPortion_bytes = std::size_t{1} << 16;
+// What is read of a file at a time. Small files are many: robot files, tables, and what a fuzzer makes.
+std::size_t PortionOf(const fs::path& path) {
+  constexpr std::uintmax_t kLeast_bytes = 1 << 12, kMost_bytes = 1 << 16;
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(path, error);
+  return static_cast<std::size_t>(error ? kMost_bytes : std::clamp(size, kLeast_bytes, kMost_bytes));
+}
 
 // The text as a gzip file without name and time, so that equal texts give equal bytes.
 std::string Compressed(std::string_view text) {
@@ -65,7 +71,8 @@ std::string ReadWholeFile(const fs::path& path) {
   io::RequireFile(path);
   GzHandle in(gzopen(path.c_str(), "rb"));
   if (!in) throw io::InputError(path.string() + ": cannot be opened");
-  gzbuffer(in.get(), kPortion_bytes);
+  const std::size_t portion = PortionOf(path);
+  gzbuffer(in.get(), static_cast<unsigned>(portion));
   std::string content;
   std::size_t used = 0;
   for (;;) {
@@ -74,7 +81,7 @@ std::string ReadWholeFile(const fs::path& path) {
     if (used > most)
       throw io::InputError(path.string() + ": grows to more than " + std::to_string(kExpansion) +
                            " times its size when it is decompressed, which no log does");
-    content.resize(std::max(kPortion_bytes, used + used / 2));
+    content.resize(std::max(portion, used + used / 2));
     const int got = gzread(in.get(), content.data() + used,
                            static_cast<unsigned>(std::min<std::size_t>(content.size() - used, std::size_t{1} << 30)));
     int code = Z_OK;

@@ -10,7 +10,7 @@
 
 namespace armcal::client {
 
-// Eight hexadecimal digits.
+// A checksum or a schema as eight hexadecimal digits.
 std::string CrcText(std::uint32_t crc);
 
 // {"armcal_backup": 1, "schema", "serial_number", "table_crc", "words"}: a table and the drive that it comes from.

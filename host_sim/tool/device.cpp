@@ -13,6 +13,7 @@
 #include "armcal/link/seal.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/register_text.hpp"
+#include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/client/writer_seat.hpp"
 #include "host_sim/tool/command_line.hpp"
@@ -39,8 +40,6 @@ constexpr char kNameHelp[] = "name, as armcal map lists it; an element in bracke
 constexpr char kWhoMayWrite[] = "Without a key anyone who reaches the line may write within the ceilings.";
 constexpr char kSignedOnly[] = "Only tables that are signed with the drive's key are taken.";
 
-std::string Hex(std::uint32_t value) { return fmt::format("{:08X}", value); }
-
 // info ---------------------------------------------------------------------------------------------------------------
 
 int RunInfo(const DeviceOptions& o) {
@@ -54,11 +53,11 @@ int RunInfo(const DeviceOptions& o) {
   const auto word = [](const auto& list, std::size_t k) { return k < std::size(list) ? list[k] : "?"; };
   const auto state = static_cast<std::size_t>(s.transaction_state);
   fmt::print("{}: serial number {}, firmware {}, map {}.{}, schema {}\n", drive.name(), id.serial_number,
-             id.firmware_version, id.map_major, id.map_minor, Hex(id.schema));
+             id.firmware_version, id.map_major, id.map_minor, client::CrcText(id.schema));
   fmt::print("model: {} axes, {} parameters, {} columns; {} ticks a second, {} a sample\n", id.axes, id.parameters,
              id.columns, id.tick_rate_Hz, id.sample_ticks);
   fmt::print("table: {}; CRC {}, generation {}, stored as {}; slots {} and {}; feed-forward {}\n",
-             client::StatusName(s.table_status), Hex(s.active_crc), s.generation, s.store_sequence,
+             client::StatusName(s.table_status), client::CrcText(s.active_crc), s.generation, s.store_sequence,
              word(slots, s.slot_state[0]), word(slots, s.slot_state[1]), word(feed, s.feedforward_state));
   fmt::print("now: tick {}, transaction {}, axes enabled 0x{:X}, health {}, {} samples lost\n", s.tick,
              word(states, state), s.enabled_axes, s.health, s.sample_gaps);
@@ -66,7 +65,7 @@ int RunInfo(const DeviceOptions& o) {
                     {"serial_number", id.serial_number},
                     {"firmware_version", id.firmware_version},
                     {"map", fmt::format("{}.{}", id.map_major, id.map_minor)},
-                    {"schema", Hex(id.schema)},
+                    {"schema", client::CrcText(id.schema)},
                     {"axes", id.axes},
                     {"parameters", id.parameters},
                     {"columns", id.columns},
@@ -74,7 +73,7 @@ int RunInfo(const DeviceOptions& o) {
                     {"tick_rate_Hz", id.tick_rate_Hz},
                     {"sample_ticks", id.sample_ticks},
                     {"table_status", static_cast<int>(s.table_status)},
-                    {"table_crc", Hex(s.active_crc)},
+                    {"table_crc", client::CrcText(s.active_crc)},
                     {"generation", s.generation},
                     {"store_sequence", s.store_sequence},
                     {"slots", {word(slots, s.slot_state[0]), word(slots, s.slot_state[1])}},
@@ -268,9 +267,12 @@ int RunScan(const DeviceOptions& o) {
     try {
       client::DriveClient drive = ConnectTo(address);
       const client::Identity id = drive.ReadIdentity();
-      fmt::print("{}: serial number {}, schema {}, {} axes\n", address, id.serial_number, Hex(id.schema), id.axes);
-      found.push_back(
-          {{"address", address}, {"serial_number", id.serial_number}, {"schema", Hex(id.schema)}, {"axes", id.axes}});
+      fmt::print("{}: serial number {}, schema {}, {} axes\n", address, id.serial_number, client::CrcText(id.schema),
+                 id.axes);
+      found.push_back({{"address", address},
+                       {"serial_number", id.serial_number},
+                       {"schema", client::CrcText(id.schema)},
+                       {"axes", id.axes}});
     } catch (const client::LinkError&) {
     } catch (const client::RefusedError&) {
     }

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "armcal/link/event_log.hpp"
-#include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"

@@ -5,6 +5,7 @@
 
 #include "armcal/core/crc.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/data/report/progress.hpp"
 #include "host_sim/identify/calibration/table_ceilings.hpp"
@@ -92,7 +93,7 @@ int Flash(const FlashOptions& o) {
   else
     fmt::print("{}: {} registers stored, adopted and read back: CRC {:08X}, generation {}, store sequence {}\n",
                drive.name(), words.size(), report.crc, report.generation, report.store_sequence);
-  const nlohmann::ordered_json json{{"table_crc", fmt::format("{:08X}", report.crc)},
+  const nlohmann::ordered_json json{{"table_crc", client::CrcText(report.crc)},
                                     {"readback_ok", true},
                                     {"generation", report.generation},
                                     {"store_sequence", report.store_sequence},

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <ctime>
 
+#include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/diagnose/fleet/store.hpp"
 
@@ -28,9 +29,9 @@ std::time_t ChangeTime(const std::string& path) {
 
 void KeepOfDrive(const FleetOptions& o, client::DriveClient& drive, fleet::Kind kind, nlohmann::ordered_json json) {
   const client::Identity id = drive.ReadIdentity();
-  json["serial_number"] = id.serial_number, json["schema"] = fmt::format("{:08X}", id.schema);
+  json["serial_number"] = id.serial_number, json["schema"] = client::CrcText(id.schema);
   const std::string date = o.date.empty() ? Utc(std::time(nullptr)) : o.date,
-                    crc = fmt::format("{:08X}", drive.ReadStatus().active_crc);
+                    crc = client::CrcText(drive.ReadStatus().active_crc);
   fleet::Keep(o.database, kind, {{o.arm, date, crc, json.dump()}});
   fmt::print("kept in {}: {}\n", o.database, kind == fleet::Kind::kTable ? "a table" : "a health reading");
 }

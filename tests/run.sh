@@ -77,11 +77,12 @@ if [[ $scope == peers ]]; then
   peers_programs() { python3 -m venv build/peers/venv && build/peers/venv/bin/pip install -q --disable-pip-version-check -r tests/peers/requirements.txt; }
   step "peers packages" toolchains/install.sh peers || finish
   step "other people's programs" peers_programs || finish
-  step "build armcal" configure_and_build host --target armcal armcal-generate practice_robot judged_set judged_score || finish
+  step "build armcal" configure_and_build host --target armcal armcal-generate armcal_analysis practice_robot judged_set judged_score || finish
   step "exports in MuJoCo and Pinocchio" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
   step "excitations in MuJoCo" build/peers/venv/bin/python tests/peers/collisions_test.py build/host/armcal build/peers/collisions
   step "logs by other people's libraries" build/peers/venv/bin/python tests/peers/logs_test.py build/host/armcal build/peers/logs
-  step "the Python package" build/peers/venv/bin/pip install -q --disable-pip-version-check ./host_sim/python || finish
+  python_package() { build/peers/venv/bin/pip install -q --disable-pip-version-check -C "cmake.define.ARMCAL_BUILT=$PWD/build/host" ./host_sim/python; }
+  step "the Python package" python_package || finish
   step "its regressor and Pinocchio" build/peers/venv/bin/python tests/peers/python_test.py build/host/armcal build/peers/python
   step "packages of Conan, colcon, PlatformIO and Zephyr" build/peers/venv/bin/python tests/peers/packages_test.py . build/peers/packages
   if step "docs packages" toolchains/install.sh docs; then step "the site" cmake --build --preset host --target docs_site; fi

@@ -29,6 +29,10 @@ target_link_libraries(armcal_host_rules INTERFACE armcal_rules)
 target_compile_options(armcal_host_rules INTERFACE -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow)
 target_include_directories(armcal_host_rules INTERFACE ${ARMCAL_TOP})
 target_compile_features(armcal_host_rules INTERFACE cxx_std_20)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  # The compiler looks for memory to free from 1 GB on, not from 128 MB on. It takes up to 0.6 GB more then, and a tenth of the time less.
+  target_compile_options(armcal_host_rules INTERFACE "SHELL:--param ggc-min-heapsize=1000000")
+endif()
 
 if(ARMCAL_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
   # GCC's manual: with sanitizers -Wmaybe-uninitialized reports what is not there.
@@ -62,17 +66,35 @@ function(armcal_headers name)
   target_precompile_headers(${name} PRIVATE ${A_HEADERS})
 endfunction()
 
+# A Python module links the rooms of the host, too. Nothing from outside replaces their functions, so they are compiled as for a program.
+set(armcal_for_modules POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+
 # armcal_host_library(NAME SOURCES ... [LIBS ...]): a room of codegen/src or host_sim. C++20; includes from the top folder.
+# ARMCAL_BUILT: the build folder of the preset host, whose rooms are linked; empty: they are compiled.
+set(ARMCAL_BUILT "" CACHE PATH "build folder of the preset host, whose rooms are linked")
 function(armcal_host_library name)
   cmake_parse_arguments(A "" "" "SOURCES;LIBS" ${ARGN})
+  if(ARMCAL_BUILT)
+    file(RELATIVE_PATH room ${ARMCAL_TOP} ${CMAKE_CURRENT_SOURCE_DIR})
+    add_library(${name}_built STATIC IMPORTED GLOBAL)
+    set_target_properties(${name}_built PROPERTIES IMPORTED_LOCATION ${ARMCAL_BUILT}/${room}/lib${name}.a)
+    target_link_libraries(${name}_built INTERFACE armcal_host_rules ${A_LIBS})
+    # An empty library, because a room may set properties of its own that an imported library can't have.
+    file(GENERATE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp CONTENT "")
+    add_library(${name} STATIC ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+    target_link_libraries(${name} PUBLIC ${name}_built)
+    return()
+  endif()
   add_library(${name} STATIC ${A_SOURCES})
   target_link_libraries(${name} PUBLIC armcal_host_rules ${A_LIBS})
   if(NOT TARGET armcal_host_headers)
     find_package(Eigen3 REQUIRED NO_MODULE)
     armcal_headers(armcal_host_headers HEADERS <Eigen/Dense> <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <random> <string> <vector>
                    RULES armcal_host_rules Eigen3::Eigen)
+    set_target_properties(armcal_host_headers PROPERTIES ${armcal_for_modules})
   endif()
   target_precompile_headers(${name} REUSE_FROM armcal_host_headers)
+  set_target_properties(${name} PROPERTIES ${armcal_for_modules})
 endfunction()
 
 # Tests are many, and nearly all take longer to compile than to run: optimised little. Oracles are in double. Linked last: lib's rules,

@@ -41,9 +41,9 @@ for part in wire readers; do
   done
 done
 
-# The longest input of each target, in bytes. It holds what the target tells apart: a request has at most 253 bytes, and an action
-# less than ten beside it. Longer inputs repeat that, and cost their length.
-declare -A max_len=([rtu]=512 [tcp]=512 [engine]=512 [controller]=512 [table]=256 [vendor]=512 [csv]=512 [gzip]=512 [robot]=2048
+# The longest input of each target, in bytes. It holds what the target tells apart: an action takes less than ten bytes, but for a
+# request of random bytes. The engine's corpus has the longest of those. Longer inputs repeat that, and cost their length.
+declare -A max_len=([rtu]=512 [tcp]=512 [engine]=160 [controller]=160 [table]=256 [vendor]=512 [csv]=512 [gzip]=512 [robot]=2048
   [mcap]=2048 [json]=1024)
 # Freed memory is watched until 8 MB more are freed, which is many inputs. A report shows six callers of an allocation.
 export ASAN_OPTIONS=quarantine_size_mb=8:malloc_context_size=6${ASAN_OPTIONS:+:$ASAN_OPTIONS}

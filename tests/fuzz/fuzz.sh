@@ -42,7 +42,7 @@ for part in wire readers; do
 done
 
 # The longest input of each target, in bytes. It holds what the target tells apart: an action takes less than ten bytes, but for a
-# request of random bytes. The engine's corpus has the longest of those. Longer inputs repeat that, and cost their length.
+# request of random bytes. The corpus of engine and controller has the longest of those. Longer inputs repeat that, and cost their length.
 declare -A max_len=([rtu]=512 [tcp]=512 [engine]=160 [controller]=160 [table]=256 [vendor]=512 [csv]=512 [gzip]=512 [robot]=2048
   [mcap]=2048 [json]=1024)
 # Freed memory is watched until 8 MB more are freed, which is many inputs. A report shows six callers of an allocation.

@@ -8,6 +8,6 @@ bash toolchains/install.sh host
 echo "configuring and building (build/host)"
 cmake --preset host >build_host.txt 2>&1 || { cat build_host.txt; exit 1; }
 rm -f build_host.txt
-cmake --build --preset host --target armcal armcal-drive-er20_like armcal-estimate-er20_like -j 2 |
+cmake --build --preset host --target armcal armcal-drive-er20_like -j 2 |
   awk '/\[[0-9]+\/[0-9]+\]/ { split(substr($1, 2), n, "/"); share = int(10 * n[1] / (n[2] + 0)); if (share != last) { printf "  built %d0 %%\n", share; fflush(); last = share } next } { print }'
 exec build/host/armcal demo ${1:+--scenario "$1"}

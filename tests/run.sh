@@ -107,6 +107,7 @@ programs=(all)
 if [[ $scope == long ]]; then
   programs+=(long_tests)
   step "fleet packages" toolchains/install.sh fleet
+  step "packages for a fresh Debian" toolchains/install.sh fresh
 fi
 step "build host" configure_and_build host --target "${programs[@]}" || finish
 run_ctest "tests ($scope)" build/host "$labels"

@@ -18,8 +18,8 @@ install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs PATTERN finding
 
 if(TARGET armcal)
   set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)  # an installation needs its programs and no test
-  install(TARGETS armcal armcal-generate armcal-drive armcal-estimate-er20_like DESTINATION ${CMAKE_INSTALL_BINDIR})
-  add_custom_target(installed_programs DEPENDS armcal armcal-generate armcal-drive armcal-estimate-er20_like)
+  install(TARGETS armcal armcal-generate armcal-drive DESTINATION ${CMAKE_INSTALL_BINDIR})
+  add_custom_target(installed_programs DEPENDS armcal armcal-generate armcal-drive)
   install(DIRECTORY host_sim/scenarios DESTINATION ${home}/host_sim)
   set(pages ${PROJECT_BINARY_DIR}/pages)
   add_custom_command(OUTPUT ${pages}/armcal COMMAND armcal pages --out ${pages} DEPENDS armcal VERBATIM)
@@ -27,9 +27,9 @@ if(TARGET armcal)
   add_dependencies(installed_programs pages)
   install(DIRECTORY ${pages}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR})
   install(FILES ${pages}/armcal DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
-  # The simulated drive of a robot is compiled of these.
+  # The simulated drive of a robot and its estimators are compiled of these.
   install(FILES host_sim/client/vendor_registers.hpp DESTINATION ${home}/host_sim/client)
-  install(DIRECTORY host_sim/machine/drive DESTINATION ${home}/host_sim/machine PATTERN CMakeLists.txt EXCLUDE)
+  install(DIRECTORY host_sim/machine/drive host_sim/machine/estimate DESTINATION ${home}/host_sim/machine PATTERN CMakeLists.txt EXCLUDE)
 
   # `cpack -G DEB` in the build folder makes the Debian package: what `cmake --install` puts in place.
   set(CPACK_GENERATOR DEB)

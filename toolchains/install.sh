@@ -4,6 +4,7 @@
 #   toolchains/install.sh cross   compiler of the Cortex-M images
 #   toolchains/install.sh fuzz    clang with libFuzzer, for the long tests
 #   toolchains/install.sh fleet   Slurm and GNU parallel, for the long tests
+#   toolchains/install.sh fresh   debootstrap, for the long test of the Debian package
 #   toolchains/install.sh peers   Python, its headers, pip, a browser, colcon and stunnel, for tests/run.sh peers
 #   toolchains/install.sh docs    Sphinx and Doxygen, for the target docs_site
 # Does nothing when all is there. Needs root or sudo only when something is missing.
@@ -17,6 +18,7 @@ cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libs
   qemu-system-arm python3)
 fuzz_packages=(clang libclang-rt-dev)
 fleet_packages=(slurmctld slurmd slurm-client munge parallel)
+fresh_packages=(debootstrap)
 peers_packages=(python3 python3-dev python3-venv python3-pip chromium colcon python3-colcon-cmake python3-colcon-ros
   stunnel4 openssl)
 docs_packages=(python3 python3-sphinx python3-myst-parser doxygen)
@@ -26,9 +28,10 @@ case "${1:-}" in
   cross) wanted=("${cross_packages[@]}") ;;
   fuzz) wanted=("${fuzz_packages[@]}") ;;
   fleet) wanted=("${fleet_packages[@]}") ;;
+  fresh) wanted=("${fresh_packages[@]}") ;;
   peers) wanted=("${peers_packages[@]}") ;;
   docs) wanted=("${docs_packages[@]}") ;;
-  *) sed -n '2,9p' "$0" >&2; exit 2 ;;
+  *) sed -n '2,10p' "$0" >&2; exit 2 ;;
 esac
 
 missing=()

@@ -149,9 +149,10 @@ std::string Completion(const CLI::App& app) {
 
 }  // namespace
 
-std::string Version() {
-  return fmt::format("armcal {}.{}.{}", ARMCAL_VERSION >> 16, ARMCAL_VERSION >> 8 & 0xff, ARMCAL_VERSION & 0xff);
+std::string VersionText(std::uint32_t version) {
+  return fmt::format("armcal {}.{}.{}", version >> 16, version >> 8 & 0xff, version & 0xff);
 }
+std::string Version() { return VersionText(ARMCAL_VERSION); }
 
 std::string WrongUse(const CLI::App& app, int argc, const char* const* argv, const CLI::ParseError& error) {
   if (argc < 2) return "armcal: expected a verb; armcal --help lists them";

@@ -5,13 +5,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
 #include <type_traits>
 #include <vector>
 
 namespace armcal::tool {
 
-// "armcal 0.1.0"
+// "armcal 1.2.3" of 0x010203; and of this program.
+std::string VersionText(std::uint32_t version);
 std::string Version();
 
 // One line about a command line that could not be read. The first word that is no verb or no option comes before all

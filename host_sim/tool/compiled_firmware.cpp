@@ -1,4 +1,4 @@
-// tool - calls the compiler for the firmware of a robot. A folder of the cache is complete, or it is not there.
+// tool - compiles parts of a robot's firmware. A folder of the cache is complete, or it is not there.
 #include "host_sim/tool/compiled_firmware.hpp"
 
 #include <fcntl.h>
@@ -23,21 +23,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Folders of the checkout whose files are compiled or included; a file stands for itself.
-constexpr const char* kSources[] = {"lib/armcal",
-                                    "port/linux",
-                                    "host_sim/client/vendor_registers.hpp",
-                                    "host_sim/machine/drive/firmware.hpp",
-                                    "host_sim/machine/drive/firmware.cpp",
-                                    "host_sim/machine/drive/vendor_block.hpp",
-                                    "host_sim/machine/drive/vendor_block.cpp"};
+// Of a part: its name, and what is compiled or included, in the checkout. A folder stands for the files in it.
+struct Ingredients {
+  const char* name;
+  std::vector<const char*> sources;
+};
+Ingredients Of(FirmwarePart part) {
+  if (part == FirmwarePart::kEstimators)
+    return {"estimators",
+            {"lib/armcal", "host_sim/machine/estimate/estimators.hpp", "host_sim/machine/estimate/estimators.cpp"}};
+  return {"simulated drive",
+          {"lib/armcal", "port/linux", "host_sim/client/vendor_registers.hpp", "host_sim/machine/drive/firmware.hpp",
+           "host_sim/machine/drive/firmware.cpp", "host_sim/machine/drive/vendor_block.hpp",
+           "host_sim/machine/drive/vendor_block.cpp"}};
+}
+
 // As toolchains/armcal.cmake has them.
 constexpr const char* kOptions[] = {"-std=c++20",      "-O2",     "-DNDEBUG", "-ffp-contract=off",  "-fno-fast-math",
                                     "-fno-math-errno", "-shared", "-fPIC",    "-fvisibility=hidden"};
 
-std::vector<fs::path> Sources(const fs::path& home) {
+std::vector<fs::path> Sources(const fs::path& home, const std::vector<const char*>& names) {
   std::vector<fs::path> files;
-  for (const char* name : kSources) {
+  for (const char* name : names) {
     const fs::path path = home / name;
     if (fs::is_regular_file(path)) files.push_back(path);
     else if (!fs::is_directory(path))
@@ -68,7 +75,7 @@ fs::path Cache() {
   if (cache && fs::path(cache).is_absolute()) return fs::path(cache) / "armcal";
   const char* const home = std::getenv("HOME");
   if (home && fs::path(home).is_absolute()) return fs::path(home) / ".cache" / "armcal";
-  throw io::InputError("XDG_CACHE_HOME: not set, and neither is HOME; expected a folder for compiled drives");
+  throw io::InputError("XDG_CACHE_HOME: not set, and neither is HOME; expected a folder for compiled firmware");
 }
 
 // A program by its path or in PATH; empty if there is none.
@@ -85,21 +92,21 @@ fs::path Found(const std::string& program) {
   return {};
 }
 
-fs::path Compiler(const std::string& robot) {
+// what: for messages, as "simulated drive of robot er20_like".
+fs::path Compiler(const std::string& what) {
   const char* const chosen = std::getenv("CXX");
   const std::string name = chosen && *chosen ? chosen : "g++";
   if (const fs::path found = Found(name); !found.empty()) return found;
-  throw io::InputError(name + ": not found; the simulated drive of robot " + robot +
-                       " is compiled once, so install a C++20 compiler: apt install g++");
+  throw io::InputError(name + ": not found, expected a C++20 compiler for the " + what + ": apt install g++");
 }
 
 // Held by the one start that compiles; the system takes it back however that start ends.
 class Lock {
  public:
-  Lock(const fs::path& path, const std::string& robot) : file_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+  Lock(const fs::path& path, const std::string& what) : file_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
     if (file_ < 0) throw io::InputError(path.string() + ": cannot be written");
     if (flock(file_, LOCK_EX | LOCK_NB) == 0) return;
-    fmt::print(stderr, "armcal: waiting for another start that compiles the simulated drive of robot {}\n", robot);
+    fmt::print(stderr, "armcal: waiting for another start that compiles the {}\n", what);
     flock(file_, LOCK_EX);
   }
   ~Lock() { close(file_); }
@@ -109,12 +116,11 @@ class Lock {
   int file_;
 };
 
-void Compile(const codegen::GeneratedFiles& generated, const std::string& robot, const fs::path& home,
+void Compile(const codegen::GeneratedFiles& generated, const std::string& what, const fs::path& home,
              const std::vector<fs::path>& sources, const fs::path& folder) {
   const fs::path part = folder.string() + ".part", output = folder.string() + ".txt";
-  std::vector<std::string> words{Compiler(robot).string()};
-  fmt::print(stderr, "armcal: compiling the simulated drive of robot {}, once; it is kept in {}\n", robot,
-             folder.string());
+  std::vector<std::string> words{Compiler(what).string()};
+  fmt::print(stderr, "armcal: compiling the {}, once; kept in {}\n", what, folder.string());
   fs::remove_all(part);  // of a start that was killed
   codegen::WriteFiles(generated, part / "model");
   words.insert(words.end(), std::begin(kOptions), std::end(kOptions));
@@ -125,7 +131,7 @@ void Compile(const codegen::GeneratedFiles& generated, const std::string& robot,
     if (source.extension() == ".cpp") words.push_back(source.string());
   if (RunProgram(words, output.string()) != 0) {
     fs::remove_all(part);
-    throw io::InputError("the simulated drive of robot " + robot + " cannot be compiled, see " + output.string());
+    throw io::InputError("the " + what + " cannot be compiled, see " + output.string());
   }
   fs::remove(output);
   fs::rename(part, folder);
@@ -133,11 +139,12 @@ void Compile(const codegen::GeneratedFiles& generated, const std::string& robot,
 
 }  // namespace
 
-fs::path CompiledFirmware(const codegen::Model& model) {
+fs::path CompiledFirmware(const codegen::Model& model, FirmwarePart part) {
   const fs::path home = fs::absolute(codegen::Home());
-  const std::vector<fs::path> sources = Sources(home);
+  const Ingredients of = Of(part);
+  const std::vector<fs::path> sources = Sources(home, of.sources);
   const codegen::GeneratedFiles generated = codegen::Emit(model);
-  const std::string& robot = model.robot().name;
+  const std::string what = fmt::format("{} of robot {}", of.name, model.robot().name);
   Hash version;
   for (const char* option : kOptions) version.Add(option);
   for (const char* name : {"model.hpp", "selected_model.hpp"}) version.Add(generated.text.at(name));
@@ -150,11 +157,11 @@ fs::path CompiledFirmware(const codegen::Model& model) {
   if (fs::is_regular_file(firmware)) return firmware;
   try {
     fs::create_directories(cache);
-    const Lock lock(folder.string() + ".lock", robot);
-    if (!fs::is_regular_file(firmware)) Compile(generated, robot, home, sources, folder);
+    const Lock lock(folder.string() + ".lock", what);
+    if (!fs::is_regular_file(firmware)) Compile(generated, what, home, sources, folder);
   } catch (const fs::filesystem_error& e) {
     throw io::InputError(e.path1().string() + ": " + e.code().message() +
-                         "; expected a folder for compiled drives, see XDG_CACHE_HOME");
+                         "; expected a folder for compiled firmware, see XDG_CACHE_HOME");
   }
   return firmware;
 }

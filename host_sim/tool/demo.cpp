@@ -30,7 +30,7 @@ using Eigen::VectorXd;
 using nlohmann::ordered_json;
 
 struct DemoOptions {
-  std::string scenario = "stribeck", out = "build/demo", build = "build/host";
+  std::string scenario = "stribeck", out = "build/demo";
   int excite_s = 60;
 };
 
@@ -138,7 +138,7 @@ class Demo {
     Verb({"excite", "--robot", robot_, "--purpose", "test", "--seed", "2", "--starts", searches, "--seconds", most_s,
           "--out", File("test.csv")});
     Stage("start the simulated drive; flash the CAD table over Modbus");
-    StartDrive("", "truth_1.bin");
+    StartDrive(robot_, "truth_1.bin");
     Flash("table_cad.toml", robot_, "flash_cad.json");
     Stage("run and record the training motion; the host's estimator listens to the live trace");
     ListenAndRecord();  // the first motion after the table was adopted: host and drive start from the same state
@@ -173,9 +173,9 @@ class Demo {
                    : "no model can hold what was found; the table stays without it";
       } else {
         Stage("generate the new model, build the drive with it, restart it");
-        BuildDrive(final_robot);
+        Verb({"generate", "--robot", final_robot, "--out", File("generated")});
         drive_.reset();
-        StartDrive((fs::path(o_.build) / "armcal-drive-demo").string(), "truth_2.bin", final_robot);
+        StartDrive(final_robot, "truth_2.bin");
         after_truth = "truth_2.bin";
         path =
             "the model was generated anew, the drive built with it, restarted and flashed; values carried over by name";
@@ -241,11 +241,11 @@ class Demo {
       throw io::InputError(line + ": ended with code " + std::to_string(code) +
                            (log.empty() ? "" : ", see " + File(log)));
   }
-  void StartDrive(const std::string& program, const std::string& truth, const std::string& robot = "") {
-    std::vector<std::string> words{
-        tool_,    "simulate", "--scenario", scenario_.string(), "--robot",     robot.empty() ? robot_ : robot,
-        "--port", "0",        "--storage",  File("drive.nor"),  "--truth-log", File(truth)};
-    if (!program.empty()) words.insert(words.end(), {"--drive", program});
+  // Compiles the drive of a robot that armcal was not built with.
+  void StartDrive(const std::string& robot, const std::string& truth) {
+    const std::vector<std::string> words{tool_,         "simulate", "--scenario", scenario_.string(), "--robot",
+                                         robot,         "--port",   "0",          "--storage",        File("drive.nor"),
+                                         "--truth-log", File(truth)};
     drive_ = std::make_unique<Background>(words);
     fmt::print("{}\n", drive_->first_line());
     address_ = drive_->first_line().substr(drive_->first_line().rfind(' ') + 1);
@@ -270,16 +270,6 @@ class Demo {
     if (code != 0)
       throw io::InputError("armcal estimate ended with code " + std::to_string(code) + ", see " + File("estimate.txt"));
   }
-  void BuildDrive(const std::string& robot) {
-    Verb({"generate", "--robot", robot, "--out", File("generated")});
-    const std::string folder = fs::absolute(File("generated")).string();
-    const std::vector<std::vector<std::string>> commands{
-        {"cmake", "-S", Home().string(), "-B", o_.build, "-DARMCAL_MODEL=" + folder, "-DARMCAL_MODEL_NAME=demo"},
-        {"cmake", "--build", o_.build, "--target", "armcal-drive-demo"}};
-    for (const auto& c : commands)
-      if (RunProgram(c, File("build.txt")) != 0)
-        throw io::InputError("building the drive failed, see " + File("build.txt"));
-  }
 
   DemoOptions o_;
   std::string tool_, robot_ = "er20_like", address_;
@@ -298,8 +288,6 @@ void AddDemo(CLI::App& app, Action& action) {
   auto o = std::make_shared<DemoOptions>();
   verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->capture_default_str();
   verb->add_option("--out", o->out, "folder for everything that is made")->capture_default_str();
-  verb->add_option("--build", o->build, "build folder in which a drive with a new model is built")
-      ->capture_default_str();
   verb->add_option("--excite-seconds", o->excite_s, "at most, for each search of a trajectory")->capture_default_str();
   verb->callback([o, &action] { action = [o] { return Demo(*o).Run(); }; });
 }

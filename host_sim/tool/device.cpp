@@ -83,6 +83,11 @@ int RunInfo(const DeviceOptions& o) {
                     {"enabled_axes", s.enabled_axes},
                     {"health", s.health},
                     {"sample_gaps", s.sample_gaps}};
+  if (id.map_minor >= 6) {
+    const std::string version = VersionText(drive.ReadValue<link::reg::kLibraryVersion>());
+    json["library"] = version;
+    fmt::print("library: {}\n", version);
+  }
   if (id.map_minor >= 3) {
     const auto w = drive.Read<reg::kWritingBlock>();
     static const char* const seats[] = {"free", "this connection", "another connection"};

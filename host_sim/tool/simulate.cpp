@@ -29,7 +29,7 @@ std::vector<std::string> DriveFor(const codegen::Model& model) {
     if (program.first_line() == fmt::format("{:08X}", codegen::Schema(model))) return {own.string()};
   }
   if (!fs::is_regular_file(any)) throw io::InputError(any.string() + ": not there; build all of armcal");
-  return {any.string(), "--firmware", CompiledFirmware(model).string()};
+  return {any.string(), "--firmware", CompiledFirmware(model, FirmwarePart::kDrive).string()};
 }
 
 int RunSimulate(const SimulateOptions& o) {

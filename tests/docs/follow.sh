@@ -1,20 +1,25 @@
 #!/usr/bin/env bash
-# tests - does what a page of docs says, block by block, in a copy of the tree.
-#   follow.sh PAGE FOLDER ARMCAL
+# tests - does what a page of docs says, block by block, in a copy of the tree, or with an installed armcal in an empty folder.
+#   follow.sh PAGE FOLDER [ARMCAL]
 # A block whose first line is a comment with a path is that file; "sh" is run; "text" and "diff" are what the last "sh"
-# printed. FOLDER is emptied; ARMCAL stands for build/host/armcal. A program that a page leaves running is named by a file *.pid.
+# printed. FOLDER is emptied; ARMCAL stands for build/host/armcal. Without it FOLDER stays empty, and armcal is the one of the PATH.
+# A program that a page leaves running is named by a file *.pid.
 set -euo pipefail
-page=$(realpath "$1") folder=$(realpath -m "$2") armcal=$(realpath "$3") top=$PWD
+page=$(realpath "$1") folder=$(realpath -m "$2") armcal=${3:+$(realpath "$3")} top=$PWD
 
 rm -rf "$folder"
 # A page that fails leaves no drive behind.
-trap 'find "$folder/build" -name "*.pid" 2>/dev/null | while read -r pid; do kill "$(cat "$pid")" 2>/dev/null || true; done' EXIT
-mkdir -p "$folder/build/host" "$folder/blocks"
-cp -r "$top"/{codegen,lib,port,host_sim,toolchains,docs,CMakeLists.txt,LICENSE,package.xml,*.md} "$folder"
-ln -s "$armcal" "$folder/build/host/armcal"
+trap 'find "$folder" -name "*.pid" 2>/dev/null | while read -r pid; do kill "$(cat "$pid")" 2>/dev/null || true; done' EXIT
+mkdir -p "$folder/blocks"
 cd "$folder"
-export XDG_CACHE_HOME=$PWD/build/cache  # nothing is compiled yet
-git init -q . && git add codegen && git -c user.name=test -c user.email=test commit -qm before
+export XDG_CACHE_HOME=$PWD/cache  # nothing is compiled yet
+if [[ -n $armcal ]]; then
+  cp -r "$top"/{codegen,lib,port,host_sim,toolchains,docs,CMakeLists.txt,LICENSE,package.xml,*.md} .
+  mkdir -p build/host
+  ln -s "$armcal" build/host/armcal
+  export PATH=$PWD/build/host:$PATH
+  git init -q . && git add codegen && git -c user.name=test -c user.email=test commit -qm before
+fi
 
 # blocks/01.sh, blocks/02.toml, ...
 awk '/^```[a-z]/ { kind = substr($0, 4); name = sprintf("blocks/%02d.%s", ++n, kind); printf "" > name; next }

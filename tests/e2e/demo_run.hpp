@@ -8,10 +8,11 @@
 
 namespace armcal::tests {
 
-// Runs the demo into a fresh folder; `scenario` is a name or a file. Returns result.json, null if the run failed.
+// Runs the demo into a fresh folder; `scenario` is a name or a file. Returns result.json, null if the run failed. What
+// it compiles is kept for other tests, not in the user's cache.
 inline nlohmann::json RunDemo(const std::string& scenario, const fs::path& folder) {
-  const Outcome o = Tool({"demo", "--scenario", scenario, "--out", folder.string(), "--build", ARMCAL_BUILD_FOLDER,
-                          "--excite-seconds", "3"});
+  setenv("XDG_CACHE_HOME", ARMCAL_E2E_FOLDER "/cache", 1);
+  const Outcome o = Tool({"demo", "--scenario", scenario, "--out", folder.string(), "--excite-seconds", "3"});
   EXPECT_EQ(o.code, 0) << o.err << o.out;
   if (o.code != 0) return {};
   return ReadJson(folder / "result.json");

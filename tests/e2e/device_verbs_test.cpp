@@ -29,7 +29,8 @@ TEST_F(DeviceVerbs, Info_SaysWhatTheDriveIsAndWhoMayWrite) {
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_NE(o.out.find("Without a key anyone who reaches the line may write within the ceilings."), std::string::npos);
   EXPECT_EQ(Json()["axes"], 6);
-  EXPECT_EQ(Json()["map"], "1.5");
+  EXPECT_EQ(Json()["map"], "1.6");
+  EXPECT_EQ(Json()["library"].get<std::string>() + "\n", Tool({"--version"}).out);
   EXPECT_EQ(Json()["writer"], "free");
 }
 
@@ -137,7 +138,7 @@ TEST_F(DeviceVerbs, WatchScanAndMap_WriteWhatTheyShow) {
   const Outcome csv = Tool({"map", "--csv"});
   EXPECT_NE(csv.out.find("holding,337,1,u16,rw,learning_reset,,1 to 17"), std::string::npos);
   EXPECT_NE(Tool({"map", "--md"}).out.find("### Holding registers"), std::string::npos);
-  EXPECT_EQ(nlohmann::json::parse(Tool({"map", "--json"}).out)["map_minor"], 5);
+  EXPECT_EQ(nlohmann::json::parse(Tool({"map", "--json"}).out)["map_minor"], 6);
 }
 
 // Against a drive with a key: without the key nothing is stored, and with it all verbs go on as before.

@@ -214,7 +214,6 @@ TEST_F(Mistakes, OnTheCommandLine) {
       {"export --robot er20_like --format xml --out {}/x", {"--format xml"}, {"urdf, sdf, mjcf, yaml or c"}},
       {"export --robot er20_like --format urdf --out {}/x", {"names no URDF"}, {"expected --urdf FILE"}},
       {"estimate --robot er20_like", {"estimate"}, {"either --connect or --log"}},
-      {"estimate --robot puma560 --log {}/good.csv", {"no estimator", "puma560"}, {"there is one for", "er20_like"}},
       {"simulate --port 99999", {"--port 99999"}, {"an integer from 0 to 65535"}},
   });
 }

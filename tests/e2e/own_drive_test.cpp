@@ -1,4 +1,5 @@
-// end-to-end tests - the drive of a robot that armcal was not built with: compiled once, whatever goes wrong meanwhile.
+// end-to-end tests - drive and estimators of a robot that armcal was not built with: each is compiled once, whatever
+// goes wrong.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -31,9 +32,40 @@ class CompiledDrive : public OwnDrive {
   std::vector<std::string> Words(const std::string& storage) const {
     return {ARMCAL_TOOL, "simulate", "--robot", Robot(), "--port", "0", "--storage", Path(storage)};
   }
+  // The firmware's estimators on this PC: on the log, and on the drive's trace, where they end with the drive's bits.
+  void ExpectTheDrivesEstimates(const RunningDrive& drive) {
+    const std::vector<std::string> words{
+        "estimate", "--robot", Robot(), "--log", Path("motion_log.csv.gz"), "--json", Path("estimate.json")};
+    ExpectOneLine(Tool(words), 2, "no-such-compiler: not found");
+    unsetenv("CXX");
+    const Outcome estimated = Tool(words);
+    ASSERT_EQ(estimated.code, 0) << estimated.err;
+    EXPECT_NE(estimated.err.find("compiling the estimators of robot own, once"), std::string::npos) << estimated.err;
+    EXPECT_GT(ReadJson(Path("estimate.json")).at("samples").get<int>(), 1000);
+    setenv("CXX", "no-such-compiler", 1);
+    const Outcome flashed =
+        Tool({"flash", "--connect", drive.address(), "--robot", Robot(), "--table", Path("fit.toml")});
+    ASSERT_EQ(flashed.code, 0) << flashed.err;
+    const int out = open(Path("live.out").c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0644);
+    const pid_t live =
+        Start({ARMCAL_TOOL, "estimate", "--connect", drive.address(), "--robot", Robot(), "--json", Path("live.json")},
+              out, out);
+    close(out);
+    int status = 0;
+    while (ReadText(Path("live.out")).find("listening") == std::string::npos) {
+      ASSERT_EQ(waitpid(live, &status, WNOHANG), 0) << ReadText(Path("live.out"));
+      usleep(10000);
+    }
+    ASSERT_NO_FATAL_FAILURE(Recorded(drive, "motion"));
+    ASSERT_EQ(WaitFor(live), 0) << ReadText(Path("live.out"));
+    const nlohmann::json result = ReadJson(Path("live.json"));
+    EXPECT_TRUE(result.at("same_bits").get<bool>());
+    EXPECT_TRUE(result.at("same_bits_kalman").get<bool>());
+    EXPECT_GT(result.at("rows_used").get<int>(), 1000);
+  }
 };
 
-TEST_F(CompiledDrive, OfAScara_IsCompiledOnceAndMeasuresItsNoise) {
+TEST_F(CompiledDrive, OfAScara_IsCompiledOnceAndItsEstimatesAreTheDrives) {
   ASSERT_NO_FATAL_FAILURE(Imported(Scara()));
 
   setenv("CXX", "no-such-compiler", 1);
@@ -89,9 +121,11 @@ TEST_F(CompiledDrive, OfAScara_IsCompiledOnceAndMeasuresItsNoise) {
       {"excite", "--robot", Robot(), "--no-slow", "--starts", "2", "--seconds", "20", "--out", Path("motion.csv")});
   ASSERT_EQ(excited.code, 0) << excited.err;
   ASSERT_NO_FATAL_FAILURE(Recorded(drive, "motion"));
-  const Outcome fit =
-      Tool({"identify", "--robot", Robot(), "--train", Path("motion_log.csv.gz"), "--json", Path("fit.json")});
+  const Outcome fit = Tool({"identify", "--robot", Robot(), "--train", Path("motion_log.csv.gz"), "--json",
+                            Path("fit.json"), "--table-out", Path("fit.toml")});
   ASSERT_EQ(fit.code, 0) << fit.err;
+
+  ExpectTheDrivesEstimates(drive);
 }
 
 }  // namespace

@@ -6,16 +6,7 @@
 namespace armcal::tests {
 namespace {
 
-class RebuildPath : public testing::Test {
- protected:
-  // The build folder forgets the model of this test, whose files may be gone the next time somebody builds.
-  void TearDown() override {
-    EXPECT_EQ(RunProgram({"cmake", "-S", ".", "-B", ARMCAL_BUILD_FOLDER, "-UARMCAL_MODEL", "-UARMCAL_MODEL_NAME"}).code,
-              0);
-  }
-};
-
-TEST_F(RebuildPath, Stribeck_IsFoundGeneratedBuiltAndFlashed) {
+TEST(RebuildPath, Stribeck_IsFoundGeneratedBuiltAndFlashed) {
   const fs::path folder = FreshFolder("stribeck");
   const nlohmann::json result = RunDemo("stribeck", folder);
   ASSERT_FALSE(result.is_null());
@@ -26,7 +17,7 @@ TEST_F(RebuildPath, Stribeck_IsFoundGeneratedBuiltAndFlashed) {
 }
 
 // Written here, never shipped: whoever tuned the product on the shipped scenarios has not seen it.
-TEST_F(RebuildPath, AStrangersScenario_IsServedLikeTheShippedOnes) {
+TEST(RebuildPath, AStrangersScenario_IsServedLikeTheShippedOnes) {
   const fs::path folder = FreshFolder("stranger");
   const fs::path scenario = folder / "stranger.toml";
   std::ofstream(scenario) << R"(title = "churning in joint 4 of another arm"
@@ -50,7 +41,7 @@ exponent = 2.8
 // A base that is not level turns gravity for the whole arm; a drag with the ninth power of speed is in no record. (At
 // the joint's speed limit it is 30 N*m of the 150 that the axis has.) The joint is one that moves faster in training
 // than on the held-out log: a curve stays constant beyond the speeds that it was fitted to.
-TEST_F(RebuildPath, ATiltedBaseAndAnUnknownFriction_AreCompiledIn) {
+TEST(RebuildPath, ATiltedBaseAndAnUnknownFriction_AreCompiledIn) {
   const fs::path folder = FreshFolder("tilt_and_curve");
   const fs::path scenario = folder / "tilt_and_curve.toml";
   std::ofstream(scenario) << R"(title = "a base that does not stand level, and a seal that binds at speed"

@@ -10,13 +10,7 @@ struct Shipped {
   int joint;
 };
 
-class Scenario : public testing::TestWithParam<Shipped> {
- protected:
-  void TearDown() override {
-    EXPECT_EQ(RunProgram({"cmake", "-S", ".", "-B", ARMCAL_BUILD_FOLDER, "-UARMCAL_MODEL", "-UARMCAL_MODEL_NAME"}).code,
-              0);
-  }
-};
+class Scenario : public testing::TestWithParam<Shipped> {};
 
 TEST_P(Scenario, Effect_IsNamedFirstAtItsJointAndItsTorqueIsGone) {
   const Shipped& s = GetParam();

@@ -60,7 +60,7 @@ for target in "${targets[@]}"; do
   limits=(-timeout=10 -rss_limit_mb=1500 -artifact_prefix="build/fuzz/$target-")
   # First each input of the repository as it is, since the search cuts those that are longer.
   { "build/fuzz/fuzz_$target" "${limits[@]}" "tests/fuzz/corpus/$target"/* &&
-    "build/fuzz/fuzz_$target" "${limits[@]}" -max_total_time="$seconds" -max_len="${max_len[$target]}" -print_funcs=0 \
+    "build/fuzz/fuzz_$target" "${limits[@]}" -max_total_time="$seconds" -max_len="${max_len[$target]}" -print_funcs=0 -entropic=0 \
       -print_final_stats=1 "build/fuzz/corpus/$target" "tests/fuzz/corpus/$target"; } >"$log" 2>&1 ||
     { tail -n 40 "$log"; echo "$target: FAILED"; exit 1; }
   runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log" | tail -n 1)

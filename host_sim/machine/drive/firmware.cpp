@@ -51,9 +51,10 @@ class Compiled final : public Firmware {
     vendor_ = std::make_unique<VendorBlock>(motion, n);
     if (!core::IsOk(controller_.Record(raw_trace_)) || !core::IsOk(sample_trace_.Serve(controller_.map(), 1)) ||
         !core::IsOk(vendor_->Serve(controller_.map())))
-      return "drive: a block of registers does not fit the map";
+      return kNoRoom;
     controller_.template estimator<0>().SetObserver(&OnSample, this);
-    (void)controller_.Boot();  // its answer is served as table_status
+    if (controller_.Boot() == core::Status::kFull)  // any other answer is served as table_status
+      return kNoRoom;
     if (!access.serial.empty()) {
       if (!core::IsOk(line_.Open(access.serial))) return access.serial + ": expected a terminal that can be opened";
       modbus_.emplace(controller_.engine(), line_.serial(), port_linux::SteadyClock(tick_), kAddress, kSilence_ms);
@@ -134,6 +135,7 @@ class Compiled final : public Firmware {
   }
 
  private:
+  static constexpr const char* kNoRoom = "drive: a block of registers does not fit the map";
   static constexpr std::uint32_t kSectorBytes = 16384;
   static constexpr int kSlices = 200;  // of lib's work between two looks at the sockets
   static constexpr std::uint8_t kAddress = 1;

@@ -1,6 +1,8 @@
 // link - what each register of a drive answers, and what a write to it does.
 #include "armcal/link/device.hpp"
 
+#include "armcal/core/version.hpp"
+
 namespace armcal::link {
 
 using core::Status;
@@ -18,6 +20,7 @@ Status Device::ServeOwn() {
   using Values4 = Scratch<2 * reg::kScratchValues>;
   const Block blocks[] = {
       FilledBlock<reg::kIdentityBlock, &Device::FillIdentity>(this),
+      FilledBlock<reg::kLibraryVersion, &Device::FillVersion>(this),
       FilledBlock<reg::kStatusBlock, &Device::FillStatus>(this),
       FilledBlock<reg::kDoubtBlock, &Device::FillDoubt>(this),
       FilledBlock<reg::kWritingBlock, &Device::FillWriting>(this),
@@ -79,6 +82,8 @@ void Device::FillIdentity(Words<reg::kIdentityBlock>& w) {
   w.Set<reg::kSampleTicks>(identity_.sample_ticks);
   w.Set<reg::kPageDataWords>(reg::kMaxPageWords);
 }
+
+void Device::FillVersion(Words<reg::kLibraryVersion>& w) { w.Set<reg::kLibraryVersion>(std::uint32_t{ARMCAL_VERSION}); }
 
 void Device::FillStatus(Words<reg::kStatusBlock>& w) {
   const LastError& error = map_.last_error();

@@ -114,6 +114,7 @@ class Device {
   core::Status MayCommandLearning();
 
   void FillIdentity(Words<reg::kIdentityBlock>& w);
+  void FillVersion(Words<reg::kLibraryVersion>& w);
   void FillWriting(Words<reg::kWritingBlock>& w);
   void FillStatus(Words<reg::kStatusBlock>& w);
   void FillTable(Words<reg::kTableBlock>& w);

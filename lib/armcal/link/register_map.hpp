@@ -49,7 +49,7 @@ std::uint8_t ExceptionOf(core::Status status);
 // The blocks of a device, its sessions and its last refusal. Context of every call: background.
 class RegisterMap {
  public:
-  static constexpr int kMaxBlocks = 40;
+  static constexpr int kMaxBlocks = 48;
 
   // kFull; kOutOfRange: empty or beyond 0xFFFF; kBadAddress: overlaps another block of its kind.
   core::Status Add(const Block& block);

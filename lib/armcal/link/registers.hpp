@@ -120,7 +120,7 @@ inline constexpr std::uint16_t kVendor = 0x8000;
 
 // Values that never change.
 inline constexpr std::uint32_t kMagicValue = 0x41524D43;  // "ARMC"
-inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 5;
+inline constexpr std::uint16_t kMapMajorValue = 1, kMapMinorValue = 6;
 inline constexpr float kProbeFloatValue = 123456.789f;  // reads 123456.79 only with the right word order
 inline constexpr std::uint32_t kProbeU32Value = 0x12345678;
 
@@ -161,6 +161,8 @@ inline constexpr Register kTickRate = In(0x0016, 1, kU32, "tick_rate", "Hz", "co
 inline constexpr Register kSampleTicks = In(0x0018, 1, kU16, "sample_ticks", "", "control ticks of one estimator sample");
 inline constexpr Register kPageDataWords = In(0x0019, 1, kU16, "page_data_words", "", "most registers of one trace page's data");
 inline constexpr Span kIdentityBlock = Between(kMagic, kPageDataWords);
+// Outside of the block, so that what `overview` copies keeps its places.
+inline constexpr Register kLibraryVersion = In(0x001A, 1, kU32, "library_version", "", "of armcal in the firmware, a byte each for major, minor and patch: 0x010203 is 1.2.3");
 
 // Status: what the device does now, and the last request that it refused.
 inline constexpr Register kTransactionState = In(0x0040, 1, kU16, "transaction_state", "", "0 idle, 1 open, 2 loading, 3 checked, 4 committing, 5 active, 6 failed, 7 on trial");
@@ -308,7 +310,7 @@ inline constexpr Register kActiveTable = Hold(0x2000, kMaxTableWords, kU16, kRea
 // compiler finds an omission. For all others a test finds it.
 inline constexpr const Register* kDeclared[] = {
   &kMagic, &kMapMajor, &kMapMinor, &kLayoutCrc, &kSchema, &kFirmwareVersion, &kSerialNumber, &kProbeFloat, &kProbeU32, &kAxes,
-  &kParameters, &kColumns, &kTableWords, &kCapabilities, &kTickRate, &kSampleTicks, &kPageDataWords,
+  &kParameters, &kColumns, &kTableWords, &kCapabilities, &kTickRate, &kSampleTicks, &kPageDataWords, &kLibraryVersion,
   &kTransactionState, &kTransactionStatus, &kTableStatus, &kFeedForwardState, &kGeneration, &kTick, &kActiveCrc, &kCommandSequence,
   &kStoreSequence, &kSlotState, &kEnabledAxes, &kClampCount, &kSampleGaps, &kRequestCount, &kErrorException, &kErrorFunction,
   &kErrorAddress, &kErrorStatus, &kErrorRequest, &kUnlocked, &kHealth, &kRowsUsedA, &kRowsGatedA, &kRowsUsedB, &kRowsGatedB,

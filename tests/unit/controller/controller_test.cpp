@@ -249,6 +249,21 @@ TEST(Controller, AJointReset_IsAsUncertainAsBeforeIt) {
   }
 }
 
+TEST(Controller, WithBothFiltersAndTraces_HasRoomForEightBlocksOfTheIntegrator) {
+  const auto bench = std::make_unique<Bench<Forgetting, Block>>();
+  const auto raw = std::make_unique<controller::RawTrace<Model, 8192>>();
+  const auto words = [](void*, std::uint32_t channels) { return controller::SampleRecordWords<n>(channels); };
+  const auto samples = std::make_unique<link::TraceRing<>>(Model::kSampleTicks, words, nullptr);
+  ASSERT_EQ(bench->controller.Record(*raw), Status::kOk);
+  ASSERT_EQ(samples->Serve(bench->controller.map(), 1), Status::kOk);
+  for (int k = 0; k < 8; ++k) {
+    link::Block own{};
+    own.kind = link::RegisterKind::kInput;
+    own.first = static_cast<std::uint16_t>(reg::kVendor + k), own.count = 1;
+    EXPECT_EQ(bench->controller.map().Add(own), Status::kOk) << k;
+  }
+}
+
 TEST(Controller, ATraceThatAClientStarts_HoldsWhatTheTickWasGiven) {
   const auto bench = std::make_unique<Bench<Forgetting>>();
   const auto trace = std::make_unique<controller::RawTrace<Model, 8192>>();

@@ -102,8 +102,9 @@ TEST_F(Engine, Quantity_OutOfRange_Gets03_EvenWhereTheAddressIsWrongToo) {
 }
 
 TEST_F(Engine, Address_InAGapOrPastTheEnd_Gets02) {
-  EXPECT_EQ(Ask({4, 0, reg::kIdentityBlock.count, 0, 1}), (Bytes{0x84, 2}));
-  EXPECT_EQ(Ask({4, 0, reg::kIdentityBlock.count - 1, 0, 2}), (Bytes{0x84, 2})) << "runs into a gap";
+  constexpr std::uint8_t gap = SpanOf(reg::kLibraryVersion).end();
+  EXPECT_EQ(Ask({4, 0, gap, 0, 1}), (Bytes{0x84, 2}));
+  EXPECT_EQ(Ask({4, 0, gap - 1, 0, 2}), (Bytes{0x84, 2})) << "runs into a gap";
   EXPECT_EQ(Ask({3, 0xFF, 0xFF, 0, 2}), (Bytes{0x83, 2})) << "wraps";
   EXPECT_EQ(Ask({16, 0xFF, 0xFF, 0, 2, 4, 0, 0, 0, 0}), (Bytes{0x90, 2}));
   EXPECT_EQ(Ask({6, 0x07, 0, 0, 1}), (Bytes{0x86, 2}));

@@ -18,8 +18,8 @@ install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs PATTERN finding
 
 if(TARGET armcal)
   set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)  # an installation needs its programs and no test
-  install(TARGETS armcal armcal-generate armcal-drive DESTINATION ${CMAKE_INSTALL_BINDIR})
-  add_custom_target(installed_programs DEPENDS armcal armcal-generate armcal-drive)
+  install(TARGETS armcal armcal-generate armcal-drive armcal-drive-er20_like DESTINATION ${CMAKE_INSTALL_BINDIR})
+  add_custom_target(installed_programs DEPENDS armcal armcal-generate armcal-drive armcal-drive-er20_like)
   install(DIRECTORY host_sim/scenarios DESTINATION ${home}/host_sim)
   set(pages ${PROJECT_BINARY_DIR}/pages)
   add_custom_command(OUTPUT ${pages}/armcal COMMAND armcal pages --out ${pages} DEPENDS armcal VERBATIM)

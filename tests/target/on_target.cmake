@@ -44,7 +44,7 @@ set_tests_properties(Firmware_OverItsSerialLine_TakesATableAndLearns PROPERTIES 
 # The same firmware's storage, over the line: 200 round trips, and 50 power cuts during a save.
 add_test(NAME Firmware_StoredTables_SurvivePowerCuts
   COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/stored_tables.py ${ARMCAL_BOARD} $<TARGET_FILE:armcal_firmware>)
-set_tests_properties(Firmware_StoredTables_SurvivePowerCuts PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 1200 LABELS long)
+set_tests_properties(Firmware_StoredTables_SurvivePowerCuts PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 3600 LABELS long)
 
 # The same firmware on sectors that take two seconds to erase.
 add_test(NAME Firmware_WhileASectorIsErased_LosesNoSample

@@ -45,8 +45,9 @@ done
 # request of random bytes. The corpus of engine and controller has the longest of those. Longer inputs repeat that, and cost their length.
 declare -A max_len=([rtu]=512 [tcp]=512 [engine]=160 [controller]=160 [table]=256 [vendor]=512 [csv]=512 [gzip]=512 [robot]=2048
   [mcap]=2048 [json]=1024)
-# Freed memory is watched until 8 MB more are freed, which is many inputs. A report shows six callers of an allocation.
-export ASAN_OPTIONS=quarantine_size_mb=8:malloc_context_size=6${ASAN_OPTIONS:+:$ASAN_OPTIONS}
+# Freed memory is watched until 8 MB more are freed, which is many inputs. A report shows one caller of an allocation; run the input that it
+# names again, without these options, to see all.
+export ASAN_OPTIONS=quarantine_size_mb=8:malloc_context_size=1${ASAN_OPTIONS:+:$ASAN_OPTIONS}
 
 for target in "${targets[@]}"; do
   part=wire libraries=()

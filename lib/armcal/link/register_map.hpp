@@ -49,7 +49,7 @@ std::uint8_t ExceptionOf(core::Status status);
 // The blocks of a device, its sessions and its last refusal. Context of every call: background.
 class RegisterMap {
  public:
-  static constexpr int kMaxBlocks = 48;
+  static constexpr int kMaxBlocks = 48;  // at least eight of them are left to an integrator
 
   // kFull; kOutOfRange: empty or beyond 0xFFFF; kBadAddress: overlaps another block of its kind.
   core::Status Add(const Block& block);

@@ -185,7 +185,7 @@ def written_bytes(board, image, memory, folder, table, most):
             except socket.timeout:
                 break
             count += 1
-            debugger.socket.settimeout(3)
+            debugger.socket.settimeout(30)  # on a busy machine QEMU is silent for seconds; the save has ended if it is for longer
         return count
 
 

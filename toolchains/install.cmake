@@ -13,8 +13,12 @@ install(FILES package.xml DESTINATION ${home})  # where ROS looks for it
 install(FILES toolchains/armcalConfig.cmake DESTINATION ${home}/cmake)
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/armcalConfigVersion.cmake COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/armcalConfigVersion.cmake DESTINATION ${home}/cmake)
-install(FILES README.md CHANGELOG.md SPEC.md SECURITY.md DESIGN.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs PATTERN findings* EXCLUDE PATTERN site EXCLUDE)
+install(FILES README.md CHANGELOG.md CONTRIBUTING.md SPEC.md SECURITY.md DESIGN.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs PATTERN site EXCLUDE)
+foreach(page port/PORTING.md host_sim/scenarios/README.md toolchains/budgets.toml)  # what the pages link to
+  get_filename_component(folder ${page} DIRECTORY)
+  install(FILES ${page} DESTINATION ${CMAKE_INSTALL_DOCDIR}/${folder})
+endforeach()
 
 if(TARGET armcal)
   set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)  # an installation needs its programs and no test

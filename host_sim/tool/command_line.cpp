@@ -166,6 +166,8 @@ std::string WrongUse(const CLI::App& app, int argc, const char* const* argv, con
   constexpr std::string_view kConvert = "Could not convert: ";
   if (what.starts_with(kConvert))  // "Could not convert: --seed = abc"
     what = what.substr(kConvert.size()).replace(what.find(" = ") - kConvert.size(), 3, " ") + ": expected a number";
+  else if (what.find("received") != what.npos)  // "--robot: At Most 1 required but received 2"
+    what = what.substr(0, what.find(':')) + ": given more than once";
   else if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr)  // "--robot: 1 required TEXT missing"
     what = what.substr(0, what.find(':')) + ": expected a value behind it";
   else if (dynamic_cast<const CLI::ValidationError*>(&error) != nullptr)  // "--seconds: -3: expected a number from 0"

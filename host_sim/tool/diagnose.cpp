@@ -36,10 +36,11 @@ void Print(const analysis::Diagnosed& run, const DiagnoseOptions& o) {
                                   [](const auto& t) { return t["in_model"].template get<bool>(); });
     const bool confirmed = verdict::AnyConfirmed(*run.view.finding);
     fmt::print("new model: {} ({})\n", o.model_out,
-               !confirmed                              ? "the declared one: no term is confirmed"
-               : !held                                 ? "with what was found as comments: no model can hold it"
-               : json["model"]["by_table"].get<bool>() ? "a table switches it on"
-                                                       : "generate it and build the drive anew");
+               !confirmed ? "the declared one: no term is confirmed"
+               : !held    ? "with what was found as comments: no model can hold it"
+               : json["model"]["by_table"].get<bool>()
+                   ? "a table switches it on"
+                   : "build the drive with it; where there is none: armcal identify --robot " + o.model_out);
   }
 }
 

@@ -133,11 +133,12 @@ int Live(const EstimateOptions& o, const codegen::Model& model) {
   const std::unique_ptr<Estimators> port = EstimatorsFor(model);
   const std::vector<std::uint16_t> table = client::ReadActiveTable(drive);
   ThrowIf(port->Start(table.data(), static_cast<int>(table.size())));
+  const std::uint32_t before = drive.ReadValue<link::reg::kRowsUsedA>();
   client::TraceRequest request;
   request.channels = controller::kSampleAll;
   client::StartTrace(drive, 1, request);
   client::TraceReader reader(drive, 1, client::Gaps::kRefuse);
-  fmt::print("estimate: listening to {}\n", drive.name());
+  fmt::print("estimate: listening to {}; start the motion now\n", drive.name());
   std::fflush(stdout);
   client::TraceRecords page;
   std::vector<std::uint16_t> words;
@@ -176,10 +177,12 @@ int Live(const EstimateOptions& o, const codegen::Model& model) {
   PrintBodies(*port);
   fmt::print("{} samples, {} rows used; forgetting filter {} the drive's, Kalman filter {} the drive's\n", a.samples,
              used, same_a ? "bit for bit" : "DIFFERS from", same_b ? "bit for bit" : "DIFFERS from");
+  if (before > 0)
+    fmt::print("The drive had learnt from {} rows before this began. To compare bits, flash a table first.\n", before);
   if (!o.records.empty()) WriteRecords(o.records, table, ticks, words, drive_a, drive_sd);
   nlohmann::ordered_json json = Json(model, *port);
   json["drive_forgetting"] = drive_a, json["drive_kalman"] = drive_b;
-  json["rows_used"] = used, json["same_bits"] = same_a, json["same_bits_kalman"] = same_b;
+  json["rows_before"] = before, json["rows_used"] = used, json["same_bits"] = same_a, json["same_bits_kalman"] = same_b;
   WriteJson(o.json, json);
   return same_a ? kOk : kMismatch;
 }
@@ -231,7 +234,8 @@ void AddEstimate(CLI::App& app, Action& action) {
       "estimate",
       "run the firmware's estimators here, on the drive's live trace or on a log; for a robot that armcal was not "
       "built "
-      "with they are compiled once, with g++\nexample: armcal estimate --connect 127.0.0.1:1502 --robot er20_like");
+      "with they are compiled once, with g++\nexit code 5: the drive has other estimates\nexample: armcal estimate "
+      "--connect 127.0.0.1:1502 --robot er20_like");
   auto o = std::make_shared<EstimateOptions>();
   verb->add_option("--connect", o->connect,
                    "drive, HOST:PORT: every sample from now on, until it falls silent for two seconds");

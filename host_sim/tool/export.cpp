@@ -30,11 +30,14 @@ int Run(const ExportOptions& o) {
   const std::string source = o.given.table.empty() ? robot : o.given.table;
   const description::DescribedArm arm = description::Describe(model, ReadGiven(o.given, model), source);
   const description::Description d = Write(o, arm);
+  const std::filesystem::path urdf = o.urdf.empty() ? model.robot().urdf.path : std::filesystem::path(o.urdf);
+  if (std::error_code none; std::filesystem::equivalent(o.out, urdf, none))
+    throw io::InputError("--out " + o.out + ": is the URDF that is read; expected another file");
   files::WriteWholeFile(o.out, d.text);
   if (o.given.table.empty())
     fmt::print("values: those that {} states; --table takes what armcal identify found\n", robot);
   fmt::print("written: {} ({}, {} joints, schema {:08X})\n", o.out, o.format, arm.joint.size(), arm.schema);
-  if (!d.left_out.empty()) fmt::print("{} cannot hold, and does not have:\n", o.format);
+  if (!d.left_out.empty()) fmt::print("not in the file, because {} has no place for it:\n", o.format);
   for (const std::string& line : d.left_out) fmt::print("  {}\n", line);
   nlohmann::ordered_json json = ToJson(o.given, model);
   json["format"] = o.format, json["file"] = o.out, json["schema"] = arm.schema, json["left_out"] = d.left_out;

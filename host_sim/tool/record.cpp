@@ -75,7 +75,7 @@ int RunRecord(const client::RecordOptions& o) {
     tracking = RmsOf(
         log, [&](Eigen::Index k, int j) { return log.q(k, j) - log.qref(k, j); }, always);
     json["tracking_rms_rad"] = verdict::ToList(tracking);
-    table.header.push_back("tracking error rms / mrad");
+    table.header.push_back("tracking error rms / mrad (mm)");
   }
   const auto v_min = [&](int j) { return robot.joint[j].v_min_radps; };
   VectorXd residual;

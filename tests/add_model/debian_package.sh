@@ -25,6 +25,12 @@ armcal excite --robot er20_like --starts 1 --seconds 1 --out "$work/motion.csv"
 [[ -s $work/motion.csv ]]
 [[ -s $usr/share/man/man1/armcal-excite.1 && -s $usr/share/bash-completion/completions/armcal ]]
 [[ -s $usr/share/doc/armcal/README.md && -s $usr/share/doc/armcal/LICENSE ]]
+# Each link of a page to a file leads to one.
+find "$usr/share/doc/armcal" -name '*.md' | while read -r page; do
+  { grep -o '](\([^):#]*\)[)#]' "$page" || true; } | sed 's/^](//; s/[)#]$//' | while read -r link; do
+    [[ -z $link || -e $(dirname "$page")/$link ]] || { echo "$page: no $link" >>"$work/log"; exit 1; }
+  done
+done
 cmake -S "$here/consumer" -B "$work/consumer" -G Ninja -DWAY=package -DCMAKE_PREFIX_PATH="$usr" >>"$work/log" 2>&1
 cmake --build "$work/consumer" -j2 >>"$work/log" 2>&1
 "$work/consumer/consumer"

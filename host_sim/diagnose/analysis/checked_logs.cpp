@@ -42,7 +42,8 @@ std::vector<calibration::Dataset> CheckedLogs(const codegen::Model& model, const
   const std::vector<const calibration::Dataset*> data = calibration::Pointers(out);
   for (const std::string& note : calibration::CheckRows(model.robot(), data)) say(note);
   for (const std::string& note : calibration::CheckColumns(model, data)) say(note);
-  for (const calibration::Dataset* log : data) calibration::CheckAgainstModel(model, *log);
+  for (const calibration::Dataset* log : data)
+    for (const std::string& note : calibration::CheckAgainstModel(model, *log)) say(note);
   return out;
 }
 

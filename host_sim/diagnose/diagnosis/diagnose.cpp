@@ -61,9 +61,11 @@ std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chose
 }
 
 std::string ChanceText(const Term& term) {
+  constexpr double kMost = 15;  // a rarer chance tells a reader nothing more
   const auto power = [](double log_chance) { return -log_chance / std::numbers::ln10; };
-  return fmt::format("noise alone gains as much in one search of 10^{:.0f}, accepted from 10^{:.0f}",
-                     std::floor(power(term.log_chance)), power(kLogRare));
+  const double rare = std::floor(power(term.log_chance));
+  return fmt::format("noise alone gains as much in {} of 10^{:.0f} searches; the limit is one of 10^{:.0f}",
+                     rare > kMost ? "fewer than one" : "one", std::min(rare, kMost), power(kLogRare));
 }
 
 void WriteTerms(Diagnosis::Work& w, Finding& finding) {

@@ -347,7 +347,7 @@ void Selector::Sort(std::vector<Found>& ranked) {
            f.gain.gain > enough * curve.gain.gain;
   });
   if (simpler == ranked.end()) return;
-  refused_[curve.candidate] = fmt::format("names no cause, and this {} explains over {:.0f} % of what it explains",
+  refused_[curve.candidate] = fmt::format("it names no cause, and a {} explains over {:.0f} % of what it explains",
                                           simpler->candidate->is_curve() ? "curve" : "cause", 100 * enough);
   std::rotate(ranked.begin(), simpler, simpler + 1);
 }

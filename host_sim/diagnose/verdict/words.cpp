@@ -158,7 +158,10 @@ std::string WhyNotConfirmed(const Term& t, const codegen::Robot& robot) {
 std::string InTheModel(const Term& t, const codegen::Robot& robot) {
   if (!t.confirmed)
     return (t.refuted ? "left out; refuted on the held-out log: " : "left out; ") + WhyNotConfirmed(t, robot);
-  return t.record->on_target ? "yes, as an estimated effect" : "no model can hold it: " + t.record->remedy;
+  if (!t.record->on_target) return "no model can hold it: " + t.record->remedy;
+  return t.record->search.at_turns
+             ? "yes, with the values found here: it shows near turns and at rest, where filters do not learn"
+             : "yes, as an estimated effect";
 }
 
 }  // namespace armcal::verdict

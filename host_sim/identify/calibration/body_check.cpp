@@ -18,6 +18,7 @@ using Eigen::VectorXd;
 constexpr int kRows = 600;        // of a log: enough to tell columns apart
 constexpr double kExchanged = 2;  // by how much an exchange of two columns must cut the sum of log residual variances
 constexpr double kScale = 20;     // a torque this much larger or smaller than the bodies need is in another unit
+constexpr double kDoubtful = 4;  // a torque this much larger or smaller may be in another unit, or the bodies are wrong
 constexpr double kTelling =
     0.5;  // share of the torque without friction that the bodies must explain before its scale is judged
 constexpr double kTiny = 0.01;  // of the torque limit: a cable may need as much
@@ -90,8 +91,8 @@ class Checker {
 
 }  // namespace
 
-void CheckAgainstModel(const codegen::Model& model, const Dataset& data) {
-  if (!model.robot().has_prior) return;
+std::vector<std::string> CheckAgainstModel(const codegen::Model& model, const Dataset& data) {
+  if (!model.robot().has_prior) return {};
   const Checker checker(model, data);
   const double as_given = checker.Left(false, false, 0, 0);
   double least = as_given - kExchanged;
@@ -106,15 +107,23 @@ void CheckAgainstModel(const codegen::Model& model, const Dataset& data) {
     throw io::InputError(data.source + ": columns " + exchanged +
                          " seem to be exchanged; expected each in its joint's place");
   const std::vector<Match> match = checker.Compare(checker.signals(), checker.tau());
+  std::string doubtful;
   for (int j = 0; j < model.joints(); ++j) {
     const Match& m = match[static_cast<std::size_t>(j)];
     if (m.needed < kTiny * model.robot().joint[j].torque_limit_Nm || m.told < kTelling) continue;
-    if (m.scale > 1 / kScale && m.scale < kScale) continue;
+    if (m.scale > 1 / kDoubtful && m.scale < kDoubtful) continue;
+    if (m.scale > 1 / kScale && m.scale < kScale) {
+      doubtful += fmt::format("{}joint {} {:.2g}", doubtful.empty() ? "" : ", ", j + 1, m.scale);
+      continue;
+    }
     throw io::InputError(
         data.source + fmt::format(": joint {}: torque is {:.2g} times what the robot file's bodies need, expected N m "
                                   "(N) on the joint side with the sign of q",
                                   j + 1, m.scale));
   }
+  if (doubtful.empty()) return {};
+  return {data.source + ": torque as a multiple of what the robot file's bodies need: " + doubtful +
+          "; is it in N m? A motor current needs torque constant times gear ratio as scale in the channel map"};
 }
 
 }  // namespace armcal::calibration

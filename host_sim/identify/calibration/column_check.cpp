@@ -305,8 +305,10 @@ void CheckResting(const codegen::Model& model, const Dataset& log, const VectorX
 void RefuseChange(const codegen::Model& model, const std::vector<const Dataset*>& data) {
   const ColumnGain best = BestColumnChange(model, data);
   if (best.gain < (best.what.starts_with(kWholeJoints) ? kWholeGain : kClearGain)) return;
-  throw io::InputError(fmt::format("{}: {}: a fit leaves {:.1f} % of the torques' spread as given, {:.1f} % so",
-                                   Names(data), best.what, 100 * best.as_given, 100 * best.changed));
+  throw io::InputError(
+      fmt::format("{}: {}: with the columns as they are, a fit leaves {:.1f} % of the torques' spread unexplained; "
+                  "with this change {:.1f} %",
+                  Names(data), best.what, 100 * best.as_given, 100 * best.changed));
 }
 
 }  // namespace

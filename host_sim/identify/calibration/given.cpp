@@ -55,8 +55,10 @@ class ByName {
     }
     for (const auto& [name, value] : values_)
       if (value != 0)
-        throw io::InputError(fmt::format("{}: parameter {} is {:g}, expected no parameter that robot {} does not have",
-                                         source_, name, value, model_.robot().name));
+        throw io::InputError(
+            fmt::format("{}: parameter {} is {:g}, expected no parameter that robot {} does not have; a table goes "
+                        "with the model file that it was made for",
+                        source_, name, value, model_.robot().name));
   }
 
  private:

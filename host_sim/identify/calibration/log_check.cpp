@@ -65,7 +65,8 @@ std::vector<std::string> CheckGaps(const logs::Log& log) {
     missing += std::max(0.0, steps - static_cast<double>(log.line_of(k + 1) - log.line_of(k)));
   }
   if (missing == 0) return {};
-  const std::string text = fmt::format("{:.0f} samples are missing in {} gaps", missing, log.gaps.size());
+  const std::string text = missing == 1 ? "1 sample is missing"
+                                        : fmt::format("{:.0f} samples are missing, gaps: {}", missing, log.gaps.size());
   if (missing > kMissingShare * (missing + static_cast<double>(log.samples())))
     Fail(log, text + fmt::format(" ({:.0f} %), expected less than {:.0f} %",
                                  100 * missing / (missing + static_cast<double>(log.samples())), 100 * kMissingShare));
@@ -182,7 +183,8 @@ std::vector<std::string> CheckSpeedColumns(const codegen::Robot& robot, const lo
   std::vector<std::string> notes;
   std::vector<double> slope;
   for (int j = 0; j < log.joints; ++j) {
-    if (Quantile(Speeds(log, j).cwiseAbs(), 0.9) < robot.joint[j].v_min_radps) continue;
+    const double derived = Quantile(Speeds(log, j).cwiseAbs(), 0.9), logged = Quantile(log.qd.col(j).cwiseAbs(), 0.9);
+    if (std::max(derived, logged) < robot.joint[j].v_min_radps) continue;
     const SpeedMatch m = MatchSpeed(log, j);
     if (m.told < kTold) continue;
     slope.push_back(m.slope);
@@ -197,6 +199,11 @@ std::vector<std::string> CheckSpeedColumns(const codegen::Robot& robot, const lo
   const auto all_near = [&](double y) {
     return !slope.empty() && std::all_of(slope.begin(), slope.end(), [&](double s) { return near(s, y); });
   };
+  for (const double y : {kDegPerRad, 1 / kDegPerRad})
+    if (all_near(y))
+      Fail(log, fmt::format("the logged speeds are {:.3g} times those of the positions; expected q and qd both in rad "
+                            "or both in deg (units of the channel map)",
+                            1 / y));
   for (const double factor : {10.0, 100.0, 1e3, 1e6, 1e9})
     for (const double y : {factor, 1 / factor})
       if (all_near(y))

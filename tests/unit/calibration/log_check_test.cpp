@@ -23,7 +23,7 @@ class LogCheck : public testing::Test {
     try {
       if (const std::string lack = CheckSignals(arm_.model().robot(), log_).lack; !lack.empty())
         return "run.csv: " + lack;
-      CheckAgainstModel(arm_.model(), data_);
+      (void)CheckAgainstModel(arm_.model(), data_);
     } catch (const io::InputError& e) {
       return e.what();
     }
@@ -51,6 +51,22 @@ TEST_F(LogCheck, OfOneSecond_AsksForMore) {
 TEST_F(LogCheck, OfDegrees_NamesThem) {
   log_.q *= 57.29577951308232;
   ExpectRefused("degrees");
+}
+
+TEST_F(LogCheck, OfRadiansReadAsDegreesBesideSpeedsInRadians_NamesBoth) {
+  log_.qd = data_.s.qd;
+  EXPECT_EQ(Said(), "");
+  log_.q /= 57.29577951308232;
+  ExpectRefused("both in rad or both in deg");
+}
+
+TEST_F(LogCheck, OfAmperesReadAsNewtonMetres_AsksForTheUnit) {
+  EXPECT_TRUE(CheckAgainstModel(arm_.model(), data_).empty());
+  data_.tau /= 12;
+  const std::vector<std::string> notes = CheckAgainstModel(arm_.model(), data_);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("joint 1 0.0"), std::string::npos) << notes[0];  // a twelfth, within its noise
+  EXPECT_NE(notes[0].find("joint 2 0.0"), std::string::npos) << notes[0];
 }
 
 TEST_F(LogCheck, OfMillinewtons_NamesThem) {

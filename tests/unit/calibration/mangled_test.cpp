@@ -40,7 +40,7 @@ Said Judge(const codegen::Model& model, const std::vector<logs::Log>& read) {
     }
     for (const std::string& note : CheckColumns(model, Pointers(data))) said.notes += note + "\n";
     for (const std::string& note : CheckRows(model.robot(), Pointers(data))) said.notes += note + "\n";
-    for (const Dataset& d : data) CheckAgainstModel(model, d);
+    for (const Dataset& d : data) (void)CheckAgainstModel(model, d);
   } catch (const io::InputError& e) {
     said.refused = e.what();
   }

@@ -5,24 +5,17 @@
 set -euo pipefail
 build=$(realpath "$1") root=$(realpath -m "$2") here=$(dirname "$(realpath "$0")")
 [[ $EUID == 0 ]] && command -v debootstrap >/dev/null || { echo "needs root and debootstrap"; exit 77; }
-release=$(. /etc/os-release && echo "$VERSION_CODENAME")
-sources=$(grep -lsE '^(URIs:|deb) .*debian' /etc/apt/sources.list /etc/apt/sources.list.d/*.{list,sources} | head -n 1 || true)
-[[ -n $sources ]] || { echo "this machine names no Debian mirror"; exit 77; }
-mirror=$(grep -E '^(URIs:|deb) ' "$sources" | grep -om 1 'https\?://[^ ]*')
+# The mirror that this machine's apt uses, and its way there.
+mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Identifier: Packages' 'Codename: bookworm' 'Component: main' | head -n 1)
+[[ -n $mirror ]] || { echo "apt knows no mirror of Debian 12"; exit 77; }
 
-leave() { umount "$root/proc" 2>/dev/null || true; }
-trap leave EXIT
-leave
+trap 'umount "$root/proc" 2>/dev/null || true' EXIT
+umount "$root/proc" 2>/dev/null || true
 rm -rf --one-file-system "$root"
 mkdir -p "$root"
-debootstrap --variant=minbase "$release" "$root" "$mirror" >"$root.log" 2>&1 || { tail -n 20 "$root.log"; exit 1; }
-# The same mirror, and the same way to reach it.
-cp -rL /etc/apt/apt.conf.d /etc/apt/trusted.gpg.d "$root/etc/apt/"
-mkdir -p "$root/usr/share/keyrings"
-cp -rL /usr/share/keyrings/. "$root/usr/share/keyrings/"
-rm -f "$root/etc/apt/sources.list"
-cp -L "$sources" "$root/etc/apt/$([[ $sources == */sources.list ]] || echo sources.list.d/)"
-cp -L /etc/resolv.conf /etc/hosts "$root/etc/"
+debootstrap --variant=minbase bookworm "$root" "$mirror" >"$root.log" 2>&1 || { tail -n 20 "$root.log"; exit 1; }
+cp -r /etc/apt/apt.conf.d/. "$root/etc/apt/apt.conf.d"
+cp -L /etc/resolv.conf "$root/etc"
 mount -t proc proc "$root/proc"
 
 (cd "$build" && cpack -G DEB -B "$root/srv" >"$root.log" 2>&1) || { cat "$root.log"; exit 1; }

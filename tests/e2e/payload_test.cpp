@@ -98,7 +98,11 @@ TEST_F(Payload, GivesTheDrivesGainsIfKnown_AndItselfIfNot) {
       0);
 
   Refuse({"--with", without, "--without", without, "--payload", known}, "no load is seen");
-  Refuse({"--with", without, "--without", with}, "exchanged");
+  // The laden log does not fit the bodies of the file: a line asks for a load before the error.
+  const Outcome exchanged = Tool({"identify", "--robot", "er20_like", "--with", without, "--without", with});
+  EXPECT_EQ(exchanged.code, 2);
+  EXPECT_NE(exchanged.err.find("does the arm carry a load"), std::string::npos) << exchanged.err;
+  EXPECT_NE(exchanged.err.find("exchanged"), std::string::npos) << exchanged.err;
   Refuse({"--with", with, "--without", without, "--payload", Write("none.toml", "[payload]\n")}, "payload.mass_kg");
   Refuse({"--with", with, "--without", without, "--payload", (folder_ / "absent.toml").string()}, "absent.toml");
   Refuse({"--with", with, "--without", without, "--payload", known, "--ros-out", "x.json"}, "--ros-out");

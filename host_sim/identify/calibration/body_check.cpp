@@ -19,6 +19,7 @@ constexpr int kRows = 600;        // of a log: enough to tell columns apart
 constexpr double kExchanged = 2;  // by how much an exchange of two columns must cut the sum of log residual variances
 constexpr double kScale = 20;     // a torque this much larger or smaller than the bodies need is in another unit
 constexpr double kDoubtful = 4;  // a torque this much larger or smaller may be in another unit, or the bodies are wrong
+constexpr double kLaden = 50;    // no load makes a torque this much larger: it would be half the torque limit or more
 constexpr double kTelling =
     0.5;  // share of the torque without friction that the bodies must explain before its scale is judged
 constexpr double kTiny = 0.01;  // of the torque limit: a cable may need as much
@@ -108,22 +109,29 @@ std::vector<std::string> CheckAgainstModel(const codegen::Model& model, const Da
                          " seem to be exchanged; expected each in its joint's place");
   const std::vector<Match> match = checker.Compare(checker.signals(), checker.tau());
   std::string doubtful;
+  bool fits_nearer_base = false, laden = false;
   for (int j = 0; j < model.joints(); ++j) {
     const Match& m = match[static_cast<std::size_t>(j)];
     if (m.needed < kTiny * model.robot().joint[j].torque_limit_Nm || m.told < kTelling) continue;
-    if (m.scale > 1 / kDoubtful && m.scale < kDoubtful) continue;
-    if (m.scale > 1 / kScale && m.scale < kScale) {
-      doubtful += fmt::format("{}joint {} {:.2g}", doubtful.empty() ? "" : ", ", j + 1, m.scale);
+    if (m.scale > 1 / kDoubtful && m.scale < kDoubtful) {
+      fits_nearer_base = true;
       continue;
     }
-    throw io::InputError(
-        data.source + fmt::format(": joint {}: torque is {:.2g} times what the robot file's bodies need, expected N m "
-                                  "(N) on the joint side with the sign of q",
-                                  j + 1, m.scale));
+    // A load at the flange makes the torque of the outer joints large and hardly changes the inner ones.
+    const bool may_be_load = fits_nearer_base && m.scale > 1;
+    if (m.scale < 1 / kScale || m.scale > (may_be_load ? kLaden : kScale))
+      throw io::InputError(
+          data.source + fmt::format(": joint {}: torque is {:.2g} times what the robot file's bodies need, expected N "
+                                    "m (N) on the joint side with the sign of q",
+                                    j + 1, m.scale));
+    laden = laden || may_be_load;
+    doubtful += fmt::format("{}joint {} {:.2g}", doubtful.empty() ? "" : ", ", j + 1, m.scale);
   }
   if (doubtful.empty()) return {};
-  return {data.source + ": torque as a multiple of what the robot file's bodies need: " + doubtful +
-          "; is it in N m? A motor current needs torque constant times gear ratio as scale in the channel map"};
+  return {
+      data.source + ": torque as a multiple of what the robot file's bodies need: " + doubtful + "; " +
+      (laden ? "does the arm carry a load that the robot file lacks, or is the torque not in N m?" : "is it in N m?") +
+      " A motor current needs torque constant times gear ratio as scale in the channel map"};
 }
 
 }  // namespace armcal::calibration

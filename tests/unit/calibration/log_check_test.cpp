@@ -69,6 +69,22 @@ TEST_F(LogCheck, OfAmperesReadAsNewtonMetres_AsksForTheUnit) {
   EXPECT_NE(notes[0].find("joint 2 0.0"), std::string::npos) << notes[0];
 }
 
+TEST_F(LogCheck, OfATorqueThatIsTooLarge_AsksForALoadWhereAJointNearerTheBaseFits) {
+  data_.source = "run.csv";
+  data_.tau.col(1) *= 30;
+  const std::vector<std::string> notes = CheckAgainstModel(arm_.model(), data_);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("load"), std::string::npos) << notes[0];
+  data_.tau.col(0) *= 30;
+  ExpectRefused("joint 1: torque is");
+}
+
+TEST_F(LogCheck, OfATorqueThatIsTooSmall_RefusesWhateverTheOthersAre) {
+  data_.source = "run.csv";
+  data_.tau.col(1) /= 30;
+  ExpectRefused("joint 2: torque is");
+}
+
 TEST_F(LogCheck, OfMillinewtons_NamesThem) {
   log_.tau *= 1000;
   ExpectRefused("mN m");

@@ -1,5 +1,5 @@
 // tool - armcal export: writes an identified arm for other programs, and says what their format cannot hold.
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include "host_sim/identify/description/described_arm.hpp"
 #include "host_sim/tool/given.hpp"
@@ -28,7 +28,8 @@ int Run(const ExportOptions& o) {
   const codegen::Model model = GivenModel(o.given);
   const std::string robot = o.given.model.empty() ? o.given.robot : o.given.model;
   const std::string source = o.given.table.empty() ? robot : o.given.table;
-  const description::DescribedArm arm = description::Describe(model, ReadGiven(o.given, model), source);
+  const calibration::Given given = ReadGiven(o.given, model);
+  const description::DescribedArm arm = description::Describe(model, given, source);
   const description::Description d = Write(o, arm);
   const std::filesystem::path urdf = o.urdf.empty() ? model.robot().urdf.path : std::filesystem::path(o.urdf);
   if (std::error_code none; std::filesystem::equivalent(o.out, urdf, none))
@@ -37,10 +38,14 @@ int Run(const ExportOptions& o) {
   if (o.given.table.empty())
     fmt::print("values: those that {} states; --table takes what armcal identify found\n", robot);
   fmt::print("written: {} ({}, {} joints, schema {:08X})\n", o.out, o.format, arm.joint.size(), arm.schema);
+  if (!given.from_prior.empty())
+    fmt::print("the logs said little of {} parameters, which stay near the robot file's values: {}\n",
+               given.from_prior.size(), fmt::join(given.from_prior, ", "));
   if (!d.left_out.empty()) fmt::print("not in the file, because {} has no place for it:\n", o.format);
   for (const std::string& line : d.left_out) fmt::print("  {}\n", line);
   nlohmann::ordered_json json = ToJson(o.given, model);
   json["format"] = o.format, json["file"] = o.out, json["schema"] = arm.schema, json["left_out"] = d.left_out;
+  json["from_prior"] = given.from_prior;
   WriteJson(o.json, json);
   return kOk;
 }

@@ -371,6 +371,8 @@ class Complaints : public console_bridge::OutputHandler {
 
 urdf::ModelInterfaceSharedPtr Parse(const std::filesystem::path& path) {
   const std::string text = UrdfText(path);
+  if (const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n"); first == text.npos || text[first] != '<')
+    throw io::InputError(path.string() + ": expected a URDF, which is XML and begins with \"<\"");
   Complaints complaints;
   urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text);
   if (!model || !model->getRoot())

@@ -59,6 +59,7 @@ std::string QuantityOf(const Words& words) {
   if (HasAny(words, {"velocity", "velocities", "vel", "speed", "qd", "dq"})) return wanted ? "" : "qd";
   if (HasAny(words, {"position", "positions", "pos", "q", "angle", "angles", "qref"})) return wanted ? "qref" : "q";
   if (HasAny(words, {"temperature", "temperatures", "temp"})) return "temp";
+  if (HasAny(words, {"current", "currents", "cur", "iq", "amp", "amps", "ampere"})) return wanted ? "" : "current";
   return {};
 }
 
@@ -187,6 +188,18 @@ std::string List(const std::vector<std::string>& texts) {
   return "[" + out + "]";
 }
 
+// A torque from a current needs what the log does not hold: the lines stay comments.
+std::string CurrentLines(const Set& current) {
+  std::string scale;
+  for (std::size_t j = 0; j < current.joints(); ++j) scale += j == 0 ? "?" : ", ?";
+  return fmt::format(
+      "\n# [tau]: not recognised, but {0} may be motor currents. Write torque constant (N m per A) times gear ratio "
+      "of\n"
+      "# each joint as scale, and take away the marks of the four lines.\n"
+      "# [tau]\n# column = {0}\n# unit = \"N*m\"\n# scale = [{1}]\n",
+      Quoted(current.column), scale);
+}
+
 // Of the sets that fit q best, the largest one that has a torque with as many joints; else the largest.
 const Set* ChooseMain(const std::vector<Set>& sets) {
   const Set* best = nullptr;
@@ -227,9 +240,15 @@ Proposal Recognise(const Look& look, const std::string& source, const std::vecto
     }
     const bool needed = std::string(quantity) == "q" || std::string(quantity) == "tau";
     if (chosen == nullptr) {
-      if (needed)
-        out.missing.push_back(quantity),
-            out.map += fmt::format("\n# [{}]: not recognised\n# column = \"\"\n# unit = \"\"\n", quantity);
+      if (!needed) continue;
+      out.missing.push_back(quantity);
+      const auto current = std::find_if(sets.begin(), sets.end(), [&](const Set& set) {
+        return std::string(quantity) == "tau" && main != nullptr && set.quantity == "current" &&
+               set.joints() == main->joints() && set.names == main->names;
+      });
+      out.map += current == sets.end()
+                     ? fmt::format("\n# [{}]: not recognised\n# column = \"\"\n# unit = \"\"\n", quantity)
+                     : CurrentLines(*current);
       continue;
     }
     out.recognised.push_back(quantity);

@@ -9,6 +9,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/column_fit.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
 
 namespace armcal::calibration {
 
@@ -27,6 +28,10 @@ constexpr const char* kWholeJoints = "joints ";
 constexpr double kWholeGain = 4;
 constexpr double kWorse = 1.1;     // no torque may fit worse by more than this under a change that is right
 constexpr double kForeign = 1;     // a log whose sum of log variances is this much above that of all is looked at alone
+constexpr double kImpossible = 3;  // times the speed limit: no log is that fast
+// The unit of angles: two joints at least must move by this much, and their sum of log variances must fall by that
+// much. Of a log with one moving joint the wrong unit may fit better by 2.3.
+constexpr double kTurnedBy = 0.1, kUnitGain = 3;
 constexpr double kNothing = 0.95;  // of the spread left: the model explains nothing
 constexpr double kWhite = 0.75;    // mean square of steps over twice the variance; noise has 1
 constexpr double kOverNoise = 3;   // times the declared noise: a spread that is more than noise
@@ -75,9 +80,9 @@ std::vector<Named> Neighbours(const ColumnChange& from, int n) {
       add(fmt::format("{}{} and {} seem to be exchanged (q and tau)", kWholeJoints, i + 1, j + 1),
           [&](ColumnChange& c) { Exchange(c.q, i, j), Exchange(c.tau, i, j); });
     }
-    add(fmt::format("q{} seems to have the wrong sign", i + 1), [&](ColumnChange& c) { c.q_sign[at] *= -1; });
+    add(fmt::format("q{} seems to have the wrong sign", i + 1), [&](ColumnChange& c) { c.q_scale[at] *= -1; });
     add(fmt::format("q{0} and tau{0} seem to have the wrong sign", i + 1),
-        [&](ColumnChange& c) { c.q_sign[at] *= -1, c.tau_sign[at] *= -1; });
+        [&](ColumnChange& c) { c.q_scale[at] *= -1, c.tau_sign[at] *= -1; });
   }
   for (const double pace : {10.0, 100.0, 0.1, 0.01})
     add(fmt::format("time seems to be {:g} times too {}", pace > 1 ? pace : 1 / pace, pace > 1 ? "long" : "short"),
@@ -262,11 +267,10 @@ class Examiner {
     const std::string what = fmt::format(
         "friction of {:.3g} {} would drive the joint at every speed, where it must brake it; is the sign of "
         "tau{} or q{} right?",
-        drag.mean, Slides(j) ? "N" : "N m", j + 1, j + 1);
+        drag.mean, Slides(model_.robot().joint[j]) ? "N" : "N m", j + 1, j + 1);
     if (gain > kClearGain) Fail(j, what);
     return fmt::format("joint {}: suspect: {}", j + 1, what);
   }
-  bool Slides(int j) const { return model_.robot().joint[j].kinematics.type == codegen::JointType::kPrismatic; }
 
   const codegen::Model& model_;
   const std::vector<const Dataset*>& data_;
@@ -302,13 +306,65 @@ void CheckResting(const codegen::Model& model, const Dataset& log, const VectorX
   }
 }
 
-void RefuseChange(const codegen::Model& model, const std::vector<const Dataset*>& data) {
-  const ColumnGain best = BestColumnChange(model, data);
-  if (best.gain < (best.what.starts_with(kWholeJoints) ? kWholeGain : kClearGain)) return;
+[[noreturn]] void RefuseAs(const std::string& what, const std::vector<const Dataset*>& data, double as_given,
+                           double changed) {
   throw io::InputError(
       fmt::format("{}: {}: with the columns as they are, a fit leaves {:.1f} % of the torques' spread unexplained; "
                   "with this change {:.1f} %",
-                  Names(data), best.what, 100 * best.as_given, 100 * best.changed));
+                  Names(data), what, 100 * as_given, 100 * changed));
+}
+
+void RefuseChange(const codegen::Model& model, const std::vector<const Dataset*>& data) {
+  const ColumnGain best = BestColumnChange(model, data);
+  if (best.gain < (best.what.starts_with(kWholeJoints) ? kWholeGain : kClearGain)) return;
+  RefuseAs(best.what, data, best.as_given, best.changed);
+}
+
+// The log as it is if its revolute joints turn `scale` times as far.
+Dataset Turned(const codegen::Model& model, const Dataset& log, double scale) {
+  Dataset out = log;
+  for (int j = 0; j < model.joints(); ++j) {
+    if (!Slides(model.robot().joint[j])) out.s.q.col(j) *= scale, out.s.qd.col(j) *= scale, out.s.qdd.col(j) *= scale;
+    const double v_min = model.robot().joint[j].v_min_radps;
+    out.used.col(j) = (out.sound.col(j).array() != 0 && out.s.qd.col(j).array().abs() > v_min).cast<int>();
+  }
+  return out;
+}
+
+bool IsTooFast(const codegen::Model& model, const Dataset& log) {
+  for (int j = 0; j < model.joints(); ++j)
+    if (log.s.qd.col(j).cwiseAbs().maxCoeff() > kImpossible * model.robot().joint[j].speed_limit_radps) return true;
+  return false;
+}
+
+// A speed column would tell. Without one the torques do: gravity turns with the true angle. Rows are chosen in the unit
+// in which the arm is faster, since few move fast enough in the other one.
+void CheckAngleUnit(const codegen::Model& model, const Dataset& log) {
+  const int n = model.joints();
+  const auto fit = [n](const ColumnFit& rows, const ColumnChange& change) {
+    return rows.Fit(rows.Move(change), change);
+  };
+  for (const bool in_rad : {true, false}) {
+    const Dataset faster = in_rad ? Turned(model, log, kDegPerRad) : log;
+    const ColumnFit rows(model, {&faster}, kFullRows);
+    if (IsTooFast(model, faster) || rows.rows() < kRowsPerColumn * model.columns()) continue;
+    ColumnChange slower(n);
+    for (int j = 0; j < n; ++j)
+      if (!Slides(model.robot().joint[j])) slower.q_scale[static_cast<std::size_t>(j)] = 1 / kDegPerRad;
+    const ColumnChange fast(n);
+    const ColumnFitResult given = fit(rows, in_rad ? slower : fast), changed = fit(rows, in_rad ? fast : slower);
+    double gain = 0;
+    int moving = 0;
+    for (int j = 0; j < n; ++j) {
+      if (faster.s.q.col(j).maxCoeff() - faster.s.q.col(j).minCoeff() < kTurnedBy) continue;
+      gain += 2 * std::log(given.left[j] / changed.left[j]);
+      ++moving;
+    }
+    if (moving < 2 || gain < kUnitGain || !NoneWorse(given, changed, fast)) continue;
+    RefuseAs(in_rad ? "positions seem to be in rad, but are read as deg"
+                    : "positions seem to be in deg, but are read as rad",
+             {&log}, std::exp(0.5 * given.log_left / n), std::exp(0.5 * changed.log_left / n));
+  }
 }
 
 }  // namespace
@@ -325,7 +381,7 @@ std::vector<std::string> EquallyGood(const codegen::Model& model, const std::vec
   };
   for (int i = 0; i < n; ++i) {
     ColumnChange signs(n);
-    signs.q_sign[static_cast<std::size_t>(i)] = signs.tau_sign[static_cast<std::size_t>(i)] = -1;
+    signs.q_scale[static_cast<std::size_t>(i)] = signs.tau_sign[static_cast<std::size_t>(i)] = -1;
     add(signs, fmt::format("the sign of q{0} with tau{0}", i + 1));
     for (int j = i + 1; j < n; ++j) {
       ColumnChange joints(n);
@@ -345,6 +401,7 @@ std::vector<std::string> CheckColumns(const codegen::Model& model, const std::ve
   if (ColumnFit(model, data, kFullRows).rows() < kRowsPerColumn * model.columns()) return {};
   const Examiner all(model, data);
   for (const Dataset* log : data) {
+    CheckAngleUnit(model, *log);
     const VectorXd left = LeftOn(model, *log, all.result());
     CheckResting(model, *log, left);
     double above = 0;

@@ -25,22 +25,22 @@ MatrixXd GramOf(const MatrixXd& A) {
 }
 }  // namespace
 
-ColumnChange::ColumnChange(int joints) : q(joints), q_sign(joints, 1), tau_sign(joints, 1) {
+ColumnChange::ColumnChange(int joints) : q(joints), q_scale(joints, 1), tau_sign(joints, 1) {
   std::iota(q.begin(), q.end(), 0);
   tau = q;
 }
 
 bool ColumnChange::same_motion(const ColumnChange& other) const {
-  return q == other.q && q_sign == other.q_sign && pace == other.pace;
+  return q == other.q && q_scale == other.q_scale && pace == other.pace;
 }
 
 codegen::Signals ColumnChange::Moved(const codegen::Signals& signals) const {
   codegen::Signals out = signals;
   for (std::size_t j = 0; j < q.size(); ++j) {
     const auto to = static_cast<Eigen::Index>(j);
-    out.q.col(to) = q_sign[j] * signals.q.col(q[j]);
-    out.qd.col(to) = q_sign[j] * pace * signals.qd.col(q[j]);
-    out.qdd.col(to) = q_sign[j] * pace * pace * signals.qdd.col(q[j]);
+    out.q.col(to) = q_scale[j] * signals.q.col(q[j]);
+    out.qd.col(to) = q_scale[j] * pace * signals.qd.col(q[j]);
+    out.qdd.col(to) = q_scale[j] * pace * pace * signals.qdd.col(q[j]);
   }
   return out;
 }

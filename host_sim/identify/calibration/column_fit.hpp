@@ -7,10 +7,11 @@
 
 namespace armcal::calibration {
 
-// Which column of the log each joint reads, and with which sign. Time runs `pace` times as fast.
+// Which column of the log each joint reads, with which factor or sign. Time runs `pace` times as fast.
 struct ColumnChange {
-  std::vector<int> q, tau;            // [n] 0-based columns
-  std::vector<int> q_sign, tau_sign;  // [n] +1 or -1
+  std::vector<int> q, tau;      // [n] 0-based columns
+  std::vector<double> q_scale;  // [n] of positions, speeds and accelerations
+  std::vector<int> tau_sign;    // [n] +1 or -1
   double pace = 1;
 
   explicit ColumnChange(int joints);

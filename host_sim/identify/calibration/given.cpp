@@ -96,6 +96,9 @@ Given FromJson(const codegen::Model& model, const Json& json, const std::string&
   Values named = bodies                        ? NamesOf(json.at("table"), "mean")
                  : json.contains("parameters") ? NamesOf(json.at("parameters"), "value")
                                                : NamesOf(json.at("columns"), "value");
+  if (bodies)
+    for (const Json& row : json.at("table"))
+      if (row.value("from_prior", false)) given.from_prior.push_back(row.at("name").get<std::string>());
   if (json.contains("nonlinear"))
     for (const auto& [name, value] : NamesOf(json.at("nonlinear"), "value")) named[name] = value;
   ByName values(model, std::move(named), source);
@@ -136,9 +139,12 @@ Given GivenByTable(const codegen::Model& model, const TableFile& table, const st
     throw io::InputError(fmt::format("{}: {} joints, expected {} (robot {})", source, table.joint.size(),
                                      model.joints(), model.robot().name));
   Values all;
-  for (const TableRow& r : table.row) all[r.name] = r.state == "standby" ? 0 : r.mean;  // the drive takes it as zero
-  ByName values(model, all, source);
   Given given = Empty(model);
+  for (const TableRow& r : table.row) {
+    all[r.name] = r.state == "standby" ? 0 : r.mean;  // the drive takes it as zero
+    if (r.from_prior) given.from_prior.push_back(r.name);
+  }
+  ByName values(model, all, source);
   TakeBodies(model, values, given);
   values.Others(given);
   for (int j = 0; j < model.joints(); ++j)

@@ -11,10 +11,11 @@
 namespace armcal::calibration {
 
 struct Given {
-  Eigen::VectorXd x;                 // [columns + n] filter columns and torque gain deviations, as in Fit
-  Eigen::VectorXd bodies;            // [11 n] about the links' origins; empty: only base parameters are given
-  std::vector<double> eta;           // nonlinear parameters of the model
-  std::vector<std::string> missing;  // parameters that the file lacks: the robot file's value stands
+  Eigen::VectorXd x;                    // [columns + n] filter columns and torque gain deviations, as in Fit
+  Eigen::VectorXd bodies;               // [11 n] about the links' origins; empty: only base parameters are given
+  std::vector<double> eta;              // nonlinear parameters of the model
+  std::vector<std::string> missing;     // parameters that the file lacks: the robot file's value stands
+  std::vector<std::string> from_prior;  // parameters of which the identification's logs say little, see TableRow
 };
 
 // The robot file's own values: bodies, friction and effects as they are. InputError: prior = "none".

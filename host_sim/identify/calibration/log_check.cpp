@@ -25,7 +25,6 @@ constexpr double kOverTorque = 3;  // times the limit; smaller peaks above the r
 constexpr double kJumpSpeed = 3;   // times the speed limit between two samples
 constexpr double kStopAcceleration = 20;  // times the acceleration limit: no motor stops a joint that fast
 constexpr double kHeld_s = 0.1, kSilent_s = 0.5;
-constexpr double kDegPerRad = 57.29577951308232;
 
 [[noreturn]] void Fail(const logs::Log& log, const std::string& what) {
   throw io::InputError(log.source + ": " + what);
@@ -33,7 +32,6 @@ constexpr double kDegPerRad = 57.29577951308232;
 
 std::string Joint(int j) { return fmt::format("joint {}: ", j + 1); }
 
-bool Slides(const codegen::Joint& joint) { return joint.kinematics.type == codegen::JointType::kPrismatic; }
 const char* PositionUnit(const codegen::Joint& joint) { return Slides(joint) ? "m" : "rad"; }
 const char* TorqueUnit(const codegen::Joint& joint) { return Slides(joint) ? "N" : "N m"; }
 

@@ -1,6 +1,7 @@
 // calibration - checks that the samples of a log can be those of one run of this arm, in SI units.
 #pragma once
 
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,9 @@
 #include "host_sim/identify/calibration/dataset.hpp"
 
 namespace armcal::calibration {
+
+inline constexpr double kDegPerRad = 180 / std::numbers::pi;
+inline bool Slides(const codegen::Joint& joint) { return joint.kinematics.type == codegen::JointType::kPrismatic; }
 
 // What a log says beside its samples. No text names the file.
 struct SignalCheck {

@@ -113,7 +113,7 @@ std::vector<unsigned> UnseenSigns(const Faults& faults, int n) {
       ColumnChange change(n);
       for (int j = 0; j < n; ++j)
         if (set >> j & 1U)
-          change.q_sign[static_cast<std::size_t>(j)] = change.tau_sign[static_cast<std::size_t>(j)] = -1;
+          change.q_scale[static_cast<std::size_t>(j)] = change.tau_sign[static_cast<std::size_t>(j)] = -1;
       if (!faults.Unseen(change)) continue;
       found.push_back(set);
       basis.push_back(reduced(set));

@@ -81,7 +81,7 @@ TEST(ColumnChange, OfTheUnitOfTime_GivesTheDerivativesByTrueTime) {
   log.qdd << -9 * (3 * t).sin(), -t.sin();
   ColumnChange change(2);
   change.pace = 2;
-  change.q = {1, 0}, change.q_sign = {1, -1};
+  change.q = {1, 0}, change.q_scale = {1, -1};
   const codegen::Signals moved = change.Moved(log);
   EXPECT_LT((moved.q.col(1).array() + (6 * u).sin()).abs().maxCoeff(), 1e-12);
   EXPECT_LT((moved.qd.col(1).array() + 6 * (6 * u).cos()).abs().maxCoeff(), 1e-12);

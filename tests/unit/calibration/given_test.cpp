@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "tests/unit/calibration/synthetic_arm.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::calibration {
 namespace {
@@ -24,6 +27,20 @@ TEST(GivenByTable, TheTrueArm_PredictsWhatItsDrivesMeasure) {
   const Eigen::VectorXd left = Rms(d, d.tau - Predict(model, d, given.x, given.eta), true);
   EXPECT_NEAR(left[0] / (1.25 * arm.noise_Nm(0)), 1, 0.15);  // 4 / sqrt(2 x 500) and turns
   EXPECT_NEAR(left[1] / (0.5 * arm.noise_Nm(1)), 1, 0.15);
+}
+
+TEST(Given, ByTableAndByJson_NamesWhatTheLogsSaidLittleOf) {
+  const codegen::Model model(codegen::ReadRobot("codegen/robots/two_link.toml"), tests::Records());
+  TableFile table = DefaultTable(model);
+  nlohmann::json json{{"columns", nlohmann::json::array()}};
+  for (TableRow& row : table.row) {
+    row.from_prior = row.name == "m2" || row.name == "Fv1";
+    json["table"].push_back({{"name", row.name}, {"mean", row.mean}, {"from_prior", row.from_prior}});
+  }
+  const std::vector<std::string> expected{"m2", "Fv1"};
+  EXPECT_EQ(GivenByTable(model, table, "table.toml").from_prior, expected);
+  const files::test::TemporaryFolder folder;
+  EXPECT_EQ(GivenByFile(model, folder.Write("identified.json", json.dump())).from_prior, expected);
 }
 
 }  // namespace

@@ -118,6 +118,7 @@ inline std::vector<Mangled> SixAxisFaults() {
        },
        "expected at least"},
       {"degrees", [](Log& l) { l.q *= kDegree; }, "degrees"},
+      {"radians read as degrees", [](Log& l) { l.q /= kDegree; }, "in rad, but are read as deg"},
       {"torque in mN m", [](Log& l) { l.tau *= 1000; }, "mN m"},
       {"a torque that is zero", [](Log& l) { l.tau.col(1).setZero(); }, "joint 2: torque is zero"},
       {"a torque that stays the same", [](Log& l) { l.tau.col(4).setConstant(3.5); }, "joint 5: torque never changes"},

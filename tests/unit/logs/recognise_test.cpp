@@ -74,5 +74,24 @@ TEST(Recognise, WhatIsNotRecognised_IsLeftToTheUser) {
   EXPECT_NE(proposal.map.find("# [tau]: not recognised"), std::string::npos);
 }
 
+TEST(Recognise, MotorCurrents_AreOfferedAsAComment) {
+  const TemporaryFolder folder;
+  std::string text = "time,current_position_1,current_position_2,current1,current2,current_limit1\n";
+  for (int k = 0; k < 300; ++k) text += std::to_string(0.004 * k) + ",1," + std::to_string(k) + ",3,5,9\n";
+  const auto path = folder.Write("log.csv", text);
+  const Proposal proposal = Recognise(LookAt(path, {}), "log.csv", {});
+  EXPECT_EQ(proposal.missing, Texts{"tau"});
+  EXPECT_NE(proposal.map.find("[q]\ncolumn = \"current_position_{}\""), std::string::npos) << proposal.map;
+  // What is left to do: the marks away, and a number in the place of each question mark.
+  std::string map = proposal.map;
+  const std::size_t lines = map.find("# [tau]\n");
+  ASSERT_NE(lines, std::string::npos) << map;
+  for (std::size_t at; (at = map.find("# ", lines)) != map.npos;) map.erase(at, 2);
+  for (std::size_t at; (at = map.find('?', lines)) != map.npos;) map.replace(at, 1, "0.5");
+  const Log log = ReadLog(path, ReadChannelMap(folder.Write("map.toml", map)));
+  EXPECT_EQ(log.tau(0, 0), 1.5) << map;
+  EXPECT_EQ(log.tau(1, 1), 2.5) << map;
+}
+
 }  // namespace
 }  // namespace armcal::logs

@@ -86,7 +86,8 @@ void DriveClient::Connect() {
   if (line_) {
     if (const int got = SetSpeed(modbus_get_socket(fresh.get()), line_->baud);
         got == 0 || std::abs(got - line_->baud) > line_->baud / 50)
-      throw LinkError(fmt::format("{}: cannot run at {} baud, it offers {}", name_, line_->baud, got));
+      throw LinkError(fmt::format("{}: the adapter cannot run at {} baud{}", name_, line_->baud,
+                                  got == 0 ? "" : fmt::format(", it offers {}", got)));
     modbus_set_byte_timeout(fresh.get(), 0, kByteTimeout_us);
   }
   modbus_flush(fresh.get());  // a serial line may still hold the late answer to an earlier request
@@ -223,13 +224,15 @@ std::vector<float> DriveClient::ReadFloats(const link::Register& list, int count
 Identity DriveClient::ReadIdentity() {
   const auto w = Read<reg::kIdentityBlock>();
   if (const auto magic = w.Get<reg::kMagic>(); magic != reg::kMagicValue)
-    throw LinkError(fmt::format("{}: not an armcal drive (magic 0x{:08X})", name_, magic));
+    throw LinkError(fmt::format("{}: not an armcal drive (magic 0x{:08X}); are port and unit right?", name_, magic));
   if (const auto major = w.Get<reg::kMapMajor>(); major != reg::kMapMajorValue)
-    throw LinkError(fmt::format("{}: register map version {}, this tool speaks {}", name_, major, reg::kMapMajorValue));
+    throw LinkError(
+        fmt::format("{}: register map version {}, this tool speaks {}; use the armcal of the firmware's version", name_,
+                    major, reg::kMapMajorValue));
   if (const auto probe = w.Get<reg::kProbeU32>();
       probe != reg::kProbeU32Value || w.Get<reg::kProbeFloat>() != reg::kProbeFloatValue)
-    throw LinkError(
-        fmt::format("{}: word-order probe reads 0x{:08X}, expected 0x{:08X}", name_, probe, reg::kProbeU32Value));
+    throw LinkError(fmt::format("{}: word-order probe reads 0x{:08X}, expected 0x{:08X}; does a gateway swap words?",
+                                name_, probe, reg::kProbeU32Value));
   Identity id{};
   id.map_major = w.Get<reg::kMapMajor>();
   id.map_minor = w.Get<reg::kMapMinor>();

@@ -66,7 +66,7 @@ void WaitFor(DriveClient& drive, const char* what, Done done) {
     if (done()) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  throw LinkError(drive.name() + ": waited in vain for: " + what);
+  throw LinkError(drive.name() + ": nothing for ten seconds; expected: " + what);
 }
 
 std::string Describe(const Player& p) {
@@ -231,7 +231,9 @@ Recording Watch(DriveClient& drive, const RecordOptions& o, const codegen::Robot
       if (o.interrupted != nullptr && *o.interrupted) throw LinkError("interrupted");
       if (traces.Take(recording) > 0) last = Clock::now();
       if (Clock::now() - last > std::chrono::seconds(10))
-        throw LinkError(drive.name() + ": not a record for ten seconds: its tick stands still");
+        throw LinkError(
+            drive.name() +
+            ": no record for ten seconds; does its control loop run? armcal watch shows whether the tick rises");
       if (raw.ticks.empty()) continue;
       seconds = (raw.ticks.back() - raw.ticks.front()) / robot.tick_rate_Hz;
       progress.Set(std::min(1.0, seconds / o.seconds));
@@ -275,8 +277,9 @@ Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robo
   Recording recording = o.trajectory.empty() ? Watch(drive, o, robot) : Play(drive, o, robot);
   recording.failed_attempts = drive.failed_attempts();
   if (const std::uint32_t lost = recording.raw.lost + recording.samples.lost; lost > 0 && recording.cut.empty())
-    recording.cut =
-        fmt::format("{}: the drive lost {} trace records because the link was too slow", drive.name(), lost);
+    recording.cut = fmt::format(
+        "{}: {} trace records were lost: the link or this computer was too slow; --lean and --decimation ask for less",
+        drive.name(), lost);
   if (!recording.cut.empty()) {  // nothing is glued over a gap
     KeepLongestRun(recording.raw), KeepLongestRun(recording.samples);
     if (recording.raw.count() < logs::kMinSamples) throw LinkError(recording.cut + "; nothing is kept");

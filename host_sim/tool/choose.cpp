@@ -38,8 +38,8 @@ std::string Sentence(const choice::Choice& choice, std::size_t j) {
   if (!joint.differ)
     return fmt::format("joint {}: the laws do not differ on these logs; {} has the fewest parameters", j + 1, name);
   if (joint.chosen == joint.best) return fmt::format("joint {}: {} has the smallest error", j + 1, name);
-  return fmt::format("joint {}: {} has the fewest parameters of those that {} does not beat", j + 1, name,
-                     choice.laws[joint.best].name);
+  return fmt::format("joint {}: {} has the fewest parameters of the laws that are as good as the best one, {}", j + 1,
+                     name, choice.laws[joint.best].name);
 }
 
 void PrintChoice(const choice::Choice& choice, ordered_json& json) {
@@ -91,7 +91,7 @@ void PrintEffects(const choice::Choice& choice) {
       if (choice.joint[j].chosen == l) joints += (joints.empty() ? "" : ", ") + std::to_string(j + 1);
     if (!joints.empty()) text += fmt::format("[[effect]]\nname = \"{}\"\njoints = [{}]\n", choice.laws[l].name, joints);
   }
-  if (!text.empty()) fmt::print("\nin the robot file:\n{}", text);
+  if (!text.empty()) fmt::print("\nadd to the robot file:\n{}", text);
 }
 
 void PrintTests(const std::vector<std::vector<choice::HeldOut>>& tests, const std::vector<calibration::Dataset>& logs,

@@ -97,7 +97,8 @@ fs::path Compiler(const std::string& what) {
   const char* const chosen = std::getenv("CXX");
   const std::string name = chosen && *chosen ? chosen : "g++";
   if (const fs::path found = Found(name); !found.empty()) return found;
-  throw io::InputError(name + ": not found, expected a C++20 compiler for the " + what + ": apt install g++");
+  throw io::InputError(name + ": not found, expected a C++20 compiler for the " + what + ": " +
+                       (chosen && *chosen ? "the variable CXX names it" : "apt install g++"));
 }
 
 // Held by the one start that compiles; the system takes it back however that start ends.

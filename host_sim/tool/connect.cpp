@@ -76,7 +76,8 @@ calibration::TableFile LayoutOf(client::DriveClient& drive, const codegen::Model
   const client::Identity id = drive.ReadIdentity();
   if (id.schema != layout.schema)
     throw client::RefusedError(
-        fmt::format("{}: runs schema {:08X}, robot {} has {:08X}: generate and build the drive for this robot file",
+        fmt::format("{}: runs schema {:08X}, robot {} has {:08X}: is this the robot file that the drive was built for? "
+                    "If the file was changed, generate and build the drive again",
                     drive.name(), id.schema, model.robot().name, layout.schema),
         0, core::Status::kWrongSchema);
   return layout;

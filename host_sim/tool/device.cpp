@@ -38,6 +38,7 @@ struct DeviceOptions {
 
 constexpr char kNameHelp[] = "name, as armcal map lists it; an element in brackets, from 0";
 constexpr char kWhoMayWrite[] = "Without a key anyone who reaches the line may write within the ceilings.";
+constexpr char kNobodyMayWrite[] = "The board refuses all writing now.";
 constexpr char kSignedOnly[] = "Only tables that are signed with the drive's key are taken.";
 
 // info ---------------------------------------------------------------------------------------------------------------
@@ -59,8 +60,10 @@ int RunInfo(const DeviceOptions& o) {
   fmt::print("table: {}; CRC {}, generation {}, stored as {}; slots {} and {}; feed-forward {}\n",
              client::StatusName(s.table_status), client::CrcText(s.active_crc), s.generation, s.store_sequence,
              word(slots, s.slot_state[0]), word(slots, s.slot_state[1]), word(feed, s.feedforward_state));
-  fmt::print("now: tick {}, transaction {}, axes enabled 0x{:X}, health {}, {} samples lost\n", s.tick,
-             word(states, state), s.enabled_axes, s.health, s.sample_gaps);
+  fmt::print(
+      "now: tick {}, transaction {}, axes enabled 0x{:X}, health {}, {} samples refused because the estimator was "
+      "behind\n",
+      s.tick, word(states, state), s.enabled_axes, s.health, s.sample_gaps);
   ordered_json json{{"address", drive.name()},
                     {"serial_number", id.serial_number},
                     {"firmware_version", id.firmware_version},
@@ -104,7 +107,7 @@ int RunInfo(const DeviceOptions& o) {
     json["signing"] = method == link::SealMethod::kNone ? "none" : method == link::SealMethod::kHmac ? "hmac" : "own";
     json["signing_counter"] = w.Get<reg::kSigningCounter>();
     if (method != link::SealMethod::kNone) who_may_write = kSignedOnly;
-    if (w.Get<reg::kWritingAllowed>() == 0) fmt::print("the board refuses all writing now\n");
+    if (w.Get<reg::kWritingAllowed>() == 0) who_may_write = kNobodyMayWrite;
     if (w.Get<reg::kTrialLeft>() != 0) fmt::print("a table is on trial for {} s more\n", w.Get<reg::kTrialLeft>());
   }
   fmt::print("{}\n", who_may_write);
@@ -236,8 +239,8 @@ int RunWatch(const DeviceOptions& o) {
     ordered_json json{{"tick", s.tick},           {"generation", s.generation},
                       {"health", s.health},       {"enabled_axes", s.enabled_axes},
                       {"clamped", s.clamp_count}, {"sample_gaps", s.sample_gaps}};
-    fmt::print("tick {}  generation {}  health {}  enabled 0x{:X}  clamped {}  lost {}\n", s.tick, s.generation,
-               s.health, s.enabled_axes, s.clamp_count, s.sample_gaps);
+    fmt::print("tick {}  generation {}  health {}  enabled 0x{:X}  clamped {}  refused samples {}\n", s.tick,
+               s.generation, s.health, s.enabled_axes, s.clamp_count, s.sample_gaps);
     if (monitor) {
       const auto rms = drive.ReadFloats(reg::kResidualRms, id.axes), nis = drive.ReadFloats(reg::kConsistency, id.axes);
       fmt::print("  residual / N*m {:>9.3f}\n  consistency    {:>9.3f}\n", fmt::join(rms, " "), fmt::join(nis, " "));
@@ -264,6 +267,7 @@ int RunMap(const DeviceOptions& o) {
 // Units of a serial line, or ports of a host.
 int RunScan(const DeviceOptions& o) {
   ordered_json found = ordered_json::array();
+  std::string last_failure;
   const bool serial = IsSerialLine(o.connect);
   if (o.from > o.to) throw io::InputError(fmt::format("--from {}: expected at most --to {}", o.from, o.to));
   for (int k = o.from; k <= o.to; ++k) {
@@ -278,11 +282,13 @@ int RunScan(const DeviceOptions& o) {
                        {"serial_number", id.serial_number},
                        {"schema", client::CrcText(id.schema)},
                        {"axes", id.axes}});
-    } catch (const client::LinkError&) {
-    } catch (const client::RefusedError&) {
+    } catch (const client::LinkError& error) {
+      last_failure = error.what();
+    } catch (const client::RefusedError& error) {
+      last_failure = error.what();
     }
   }
-  if (found.empty()) fmt::print("no drive found\n");
+  if (found.empty()) fmt::print("no drive answered; the last failure was: {}\n", last_failure);
   WriteJson(o.json, found);
   return found.empty() ? kLink : kOk;
 }
@@ -318,18 +324,21 @@ void AddDevice(CLI::App& app, Action& action) {
   verb->add_option("value", o->value, "number; integers also as 0x1F")->required();
   o = options();
   verb = Add(app, action, "watch",
-             "show state, residuals and consistency once a second, until Ctrl-C\nexample: armcal watch --connect "
+             "show state, residuals and consistency (normalised innovation squared) once a second, until "
+             "Ctrl-C\nexample: armcal watch --connect "
              "127.0.0.1:1502",
              o, RunWatch);
-  verb->add_option("--count", o->count, "so many times (default: until Ctrl-C)")->check(Between(1, 1000000));
+  verb->add_option("--count", o->count, "number of readings (default: until Ctrl-C)")->check(Between(1, 1000000));
   o = options();
-  verb = Add(app, action, "scan",
-             "find drives: units of a serial line, or ports of a host\nexit code 3: none\nexample: armcal scan "
-             "/dev/ttyUSB0 --to 10\nexample: armcal scan 192.168.0.10 --from 502 --to 502",
-             o, RunScan, false);
+  verb = Add(
+      app, action, "scan",
+      "find drives: units 1 to 247 of a serial line (115200 baud, even parity), or ports of a host\nexit code 3: no "
+      "drive answered\nexample: armcal scan "
+      "/dev/ttyUSB0 --to 10\nexample: armcal scan 192.168.0.10 --from 502 --to 502",
+      o, RunScan, false);
   verb->add_option("line", o->connect, "serial line or host")->required();
   verb->add_option("--from", o->from, "first unit or port")->capture_default_str()->check(Between(1, 65535));
-  verb->add_option("--to", o->to, "last one")->capture_default_str()->check(Between(1, 65535));
+  verb->add_option("--to", o->to, "last unit or port")->capture_default_str()->check(Between(1, 65535));
   o = options();
   verb = app.add_subcommand("map", "print the register map of this version\nexample: armcal map --csv > registers.csv");
   auto* json =

@@ -23,7 +23,7 @@ void Print(const analysis::Diagnosed& run, const DiagnoseOptions& o) {
   const nlohmann::ordered_json& json = run.json;
   fmt::print("{}", verdict::DiagnosisText(run.view));
   report::Table table{
-      {"joint", "before", "after", "before, moving", "after, moving", "noise floor", "smallest effect seen"}, {}};
+      {"joint", "before", "after", "before, moving", "after, moving", "noise floor", "smallest detectable effect"}, {}};
   for (int j = 0; j < run.model->joints(); ++j) {
     std::vector<std::string> row{std::to_string(j + 1)};
     for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor", "smallest_detectable"})
@@ -40,7 +40,7 @@ void Print(const analysis::Diagnosed& run, const DiagnoseOptions& o) {
                : !held    ? "with what was found as comments: no model can hold it"
                : json["model"]["by_table"].get<bool>()
                    ? "a table switches it on"
-                   : "build the drive with it; where there is none: armcal identify --robot " + o.model_out);
+                   : "build the drive with it; without a drive: armcal identify --robot " + o.model_out);
   }
 }
 

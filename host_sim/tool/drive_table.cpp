@@ -114,7 +114,9 @@ int RunTrial(const TableOptions& o) {
   const int left_s = drive.ReadIdentity().map_minor < client::kMinorOfLayout2 ? 0 : drive.ReadValue<reg::kTrialLeft>();
   const client::DriveStatus s = drive.ReadStatus();
   fmt::print("{}: {}\n", drive.name(),
-             left_s > 0 ? fmt::format("a table is on trial for {} s more", left_s) : "no table is on trial");
+             left_s > 0
+                 ? fmt::format("a table is on trial for {} s more", left_s)
+                 : fmt::format("no table is on trial; the table in force has CRC {}", client::CrcText(s.active_crc)));
   WriteJson(o.json, {{"on_trial", left_s > 0}, {"left_s", left_s}, {"table_crc", client::CrcText(s.active_crc)}});
   return kOk;
 }

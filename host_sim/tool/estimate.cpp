@@ -234,7 +234,8 @@ void AddEstimate(CLI::App& app, Action& action) {
       "estimate",
       "run the firmware's estimators here, on the drive's live trace or on a log; for a robot that armcal was not "
       "built "
-      "with they are compiled once, with g++\nexit code 5: the drive has other estimates\nexample: armcal estimate "
+      "with they are compiled once, with g++\nexit code 5: the drive's forgetting filter has other estimates\nexample: "
+      "armcal estimate "
       "--connect 127.0.0.1:1502 --robot er20_like");
   auto o = std::make_shared<EstimateOptions>();
   verb->add_option("--connect", o->connect,

@@ -264,7 +264,7 @@ void AddExcite(CLI::App& app, Action& action) {
                    "train: 4 periods and slow moves; test: another series, 2 periods, few slow moves")
       ->check(OneOf({"train", "test"}))
       ->capture_default_str();
-  verb->add_option("--seed", o->seed, "of the random starts")->capture_default_str();
+  verb->add_option("--seed", o->seed, "of the random starting points")->capture_default_str();
   verb->add_option("--periods", o->periods, "Fourier periods to play (default: by purpose)")->check(Between(1, 100));
   verb->add_option("--period", o->period_s, "length of a period in seconds")
       ->check(Between(1.0, 1000.0))
@@ -277,10 +277,11 @@ void AddExcite(CLI::App& app, Action& action) {
                        "condition: cond(K); d-optimal: det(K'K); friction: accuracy of friction, low speeds included")
           ->check(OneOf({"condition", "d-optimal", "friction"}))
           ->capture_default_str();
-  auto* separate = verb->add_option("--separate", o->separate,
-                                    "effects to tell apart: record, record:joint or record:joint-joint, ...")
-                       ->delimiter(',')
-                       ->excludes(criterion);
+  auto* separate =
+      verb->add_option("--separate", o->separate,
+                       "effects to tell apart: NAME, NAME:JOINT or NAME:JOINT-JOINT, ..., names as in docs/effects.md")
+          ->delimiter(',')
+          ->excludes(criterion);
   verb->add_option("--from", o->from, "with --separate: verdict (diagnose --json) with what was found of them")
       ->needs(separate);
   verb->add_option("--search", o->search, "gradient, or the survey's genetic algorithm")

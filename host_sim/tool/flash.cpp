@@ -1,5 +1,6 @@
 // tool - armcal flash: brings a table file into the drive. armcal verify: tells whether this table is in force.
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 #include <algorithm>
 #include <cmath>
 
@@ -31,18 +32,24 @@ struct ToFlash {
   calibration::TableFile file;
 };
 
-// The words that the file means for this drive. Parameters that the data hardly determined keep the drive's value
-// unless forced.
-std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptions& o, const ToFlash& read,
-                                    calibration::TableFile& sent, std::vector<std::string>& missing) {
+// What the file means for this drive.
+struct Sending {
+  std::vector<std::uint16_t> words;
+  calibration::TableFile table;      // of the words
+  std::vector<std::string> missing;  // parameters that the file lacks: the drive's values stand
+  std::vector<std::string> kept;  // friction and effects that rest on the prior: the drive's values stand unless forced
+};
+
+Sending SendingOf(client::DriveClient& drive, const FlashOptions& o, const ToFlash& read) {
   const auto& [model, file] = read;
   const calibration::TableFile layout = LayoutOf(drive, model);
   if (file.joint.size() != layout.joint.size())
     throw io::InputError(
         fmt::format("{}: {} joints, the drive has {}", o.table, file.joint.size(), layout.joint.size()));
   const calibration::TableFile active = calibration::DecodeTable(client::ReadActiveTable(drive), layout);
-  sent = active;
-  missing = calibration::CarryOver(file, sent);
+  Sending out{{}, active, {}, {}};
+  calibration::TableFile& sent = out.table;
+  out.missing = calibration::CarryOver(file, sent);
   std::copy(std::begin(file.forgetting), std::end(file.forgetting), sent.forgetting);
   sent.bumpless = file.bumpless;
   sent.blend_ms = file.blend_ms;
@@ -50,14 +57,15 @@ std::vector<std::uint16_t> WordsFor(client::DriveClient& drive, const FlashOptio
     calibration::TableRow& row = sent.row[k];
     if (!row.from_prior || static_cast<int>(k) < model.body_parameters()) continue;  // bodies are one physical set
     row.mean = o.force ? row.free_mean : active.row[k].mean;
+    if (!o.force) out.kept.push_back(row.name);
   }
-  std::vector<std::uint16_t> words = calibration::EncodeTable(sent);
-  if (words[2] > 1 && drive.ReadIdentity().map_minor < client::kMinorOfLayout2)
+  out.words = calibration::EncodeTable(sent);
+  if (out.words[2] > 1 && drive.ReadIdentity().map_minor < client::kMinorOfLayout2)
     throw io::InputError(
         fmt::format("{}: gate_sigma: {} does not know it; expected a drive of map 1.{} or newer, or a "
                     "table without this key",
                     o.table, drive.name(), client::kMinorOfLayout2));
-  return words;
+  return out;
 }
 
 int Flash(const FlashOptions& o) {
@@ -65,39 +73,37 @@ int Flash(const FlashOptions& o) {
   const ToFlash read(o);
   TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
-  calibration::TableFile sent;
-  std::vector<std::string> missing;
-  const auto words = WordsFor(drive, o, read, sent, missing);
-  if (const std::string beyond = calibration::BeyondCeiling(read.model, sent); !beyond.empty())
+  const Sending sending = SendingOf(drive, o, read);
+  if (const std::string beyond = calibration::BeyondCeiling(read.model, sending.table); !beyond.empty())
     throw io::InputError(fmt::format("{}: {}, by [ceilings] of {}", o.table, beyond, o.robot));
-  for (const std::string& name : missing) fmt::print("not in {}, kept as in the drive: {}\n", o.table, name);
+  for (const std::string& name : sending.missing) fmt::print("not in {}, kept as in the drive: {}\n", o.table, name);
   int kept = 0;
-  for (const auto& row : sent.row) kept += row.from_prior;
+  for (const auto& row : sending.table.row) kept += row.from_prior;
   if (kept)
-    fmt::print("{} of {} parameters rest on the prior{}\n", kept, sent.row.size(),
+    fmt::print("{} of {} parameters rest on the prior{}\n", kept, sending.table.row.size(),
                o.force ? " (forced)" : "; friction and effects among them keep the drive's value");
   if (o.dry_run) {
-    fmt::print("dry run: {} registers would be sent, nothing was\n", words.size());
+    fmt::print("dry run: {} registers would be sent, nothing was\n", sending.words.size());
     return kOk;
   }
   client::FlashReport report;
   {
     report::Progress progress("flash");
     const auto show = [&](double share) { progress.Set(share); };
-    report = o.trial ? client::TryTable(drive, words, o.limit_s, show, KeyOf(key))
-                     : client::FlashTable(drive, words, show, KeyOf(key));
+    report = o.trial ? client::TryTable(drive, sending.words, o.limit_s, show, KeyOf(key))
+                     : client::FlashTable(drive, sending.words, show, KeyOf(key));
   }
   if (o.trial)
     fmt::print("{}: {} registers on trial for {} s, not stored, and read back: CRC {:08X}, generation {}\n",
-               drive.name(), words.size(), o.limit_s, report.crc, report.generation);
+               drive.name(), sending.words.size(), o.limit_s, report.crc, report.generation);
   else
     fmt::print("{}: {} registers stored, adopted and read back: CRC {:08X}, generation {}, store sequence {}\n",
-               drive.name(), words.size(), report.crc, report.generation, report.store_sequence);
+               drive.name(), sending.words.size(), report.crc, report.generation, report.store_sequence);
   const nlohmann::ordered_json json{{"table_crc", client::CrcText(report.crc)},
                                     {"readback_ok", true},
                                     {"generation", report.generation},
                                     {"store_sequence", report.store_sequence},
-                                    {"registers", words.size()},
+                                    {"registers", sending.words.size()},
                                     {"trial_s", o.trial ? o.limit_s : 0},
                                     {"from_prior", kept}};
   WriteJson(o.json, json);
@@ -108,9 +114,8 @@ int Flash(const FlashOptions& o) {
 int Verify(const FlashOptions& o) {
   const ToFlash read(o);
   client::DriveClient drive = ConnectTo(o.connect);
-  calibration::TableFile wanted;
-  std::vector<std::string> missing;
-  const auto words = WordsFor(drive, o, read, wanted, missing);
+  const Sending sending = SendingOf(drive, o, read);
+  const calibration::TableFile& wanted = sending.table;
   const auto active = client::ReadActiveTable(drive);
   const calibration::TableFile is = calibration::DecodeTable(active, wanted);
   int differ = 0;
@@ -121,10 +126,14 @@ int Verify(const FlashOptions& o) {
       fmt::print("{}: drive {:.9g} {}, file {:.9g} {}\n", is.row[k].name, is.row[k].mean, is.row[k].state,
                  wanted.row[k].mean, wanted.row[k].state);
     }
-  const bool same = calibration::EncodeTable(is) == words;
+  const bool same = calibration::EncodeTable(is) == sending.words;
   fmt::print("{}: {}\n", drive.name(),
              same ? "the table in force is this file's"
                   : fmt::format("differs in {} parameters{}", differ, differ ? "" : " (joint settings or flags)"));
+  if (!sending.missing.empty())
+    fmt::print("not in {}, so not compared: {}\n", o.table, fmt::join(sending.missing, ", "));
+  if (!sending.kept.empty())
+    fmt::print("rest on the prior, so not compared (--force compares them): {}\n", fmt::join(sending.kept, ", "));
   WriteJson(o.json, {{"same", same}, {"differ", differ}});
   return same ? kOk : kMismatch;
 }
@@ -135,7 +144,9 @@ CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std
   verb->add_option("--robot", o->robot, "robot file or name: the model the drive was built for")->required();
   verb->add_option("--table", o->table, "table file (TOML) of armcal identify")->required();
   verb->add_option("--json", o->json, "write the result here");
-  verb->add_flag("--force", o->force, "send also what the data hardly determine");
+  verb->add_flag(
+      "--force", o->force,
+      "take friction and effects that rest on the prior from the table, too; without it the drive's values count");
   return verb;
 }
 

@@ -61,7 +61,7 @@ std::string Sentence(const JointHealth& h) {
       text += (i > 0 ? ", and " : "") + TermText(h.looks_like.terms[i]);
   }
   if (h.onset)
-    text += ", since " +
+    text += ", for about " +
             Ago(h.elapsed_s - h.onset->at_s, h.elapsed_s - h.onset->latest_s, h.elapsed_s - h.onset->earliest_s);
   return text + fmt::format("; residual {:.3g} N*m, at the adoption {:.3g}, torque noise {:.3g}", h.rms_now_Nm,
                             h.rms_then_Nm, h.sigma_Nm);

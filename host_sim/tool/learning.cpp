@@ -41,8 +41,9 @@ void Report(client::DriveClient& drive, const client::Identity& id, const Learni
     const bool consistent = (status.health >> filter & 1) == 0;
     json["filters"].push_back({{"rows_used", used}, {"rows_gated", gated}, {"consistent", consistent}});
     fmt::print("filter {}: {} rows used since the adoption, {} not; {}\n", "AB"[filter], used, gated,
-               consistent ? "innovations as large as it believes"
-                          : "innovations larger than it believes: the arm has changed, or does what the model lacks");
+               used == 0    ? "too early to judge"
+               : consistent ? "innovations as large as expected"
+                            : "innovations larger than expected: the arm has changed, or does what the model lacks");
   }
   const std::vector<float> squared = drive.ReadFloats(reg::kConsistency, id.axes);
   json["consistency"] = squared;
@@ -72,7 +73,7 @@ void AddLearning(CLI::App& app, Action& action) {
   auto o = std::make_shared<LearningOptions>();
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   auto* hold = verb->add_flag("--hold", o->hold, "samples no longer change the estimates");
-  verb->add_flag("--resume", o->resume, "they do again")->excludes(hold);
+  verb->add_flag("--resume", o->resume, "samples change the estimates again")->excludes(hold);
   verb->add_option("--reset", o->reset, "a joint from 1, or bodies: what was known of it no longer counts");
   verb->add_option("--json", o->json, "write the drive's answer here");
   verb->callback([o, &action] { action = [o] { return RunLearning(*o); }; });

@@ -4,8 +4,10 @@
 #include <fcntl.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <set>
 
@@ -38,6 +40,7 @@ std::string ProgramFor(const std::string& stem, const std::string& robot, const 
   const std::filesystem::path beside = std::filesystem::path(OwnProgram()).parent_path() / (stem + "-" + robot);
   const std::string program = chosen.empty() ? beside.string() : chosen;
   if (std::filesystem::is_regular_file(program)) return program;
+  if (!chosen.empty()) throw io::InputError("--program " + chosen + ": no such file");
   std::set<std::string> built;
   for (const auto& e : std::filesystem::directory_iterator(beside.parent_path()))
     if (const std::string name = e.path().filename().string(); name.starts_with(stem + "-"))
@@ -70,7 +73,7 @@ int RunProgram(const std::vector<std::string>& words, const std::string& log) {
 
 Background::Background(const std::vector<std::string>& words) {
   int ends[2];
-  if (pipe(ends) != 0) throw io::InputError("pipe: none to be had");
+  if (pipe(ends) != 0) throw io::InputError(std::string("cannot open a pipe: ") + std::strerror(errno));
   child_ = fork();
   if (child_ == 0) {
     dup2(ends[1], 1);
@@ -84,7 +87,7 @@ Background::Background(const std::vector<std::string>& words) {
   while (read(pipe_, &c, 1) == 1 && c != '\n') first_line_ += c;
   if (c != '\n') {
     const int code = Wait();
-    throw io::InputError(words[0] + ": ended at once with code " + std::to_string(code) +
+    throw io::InputError(words[0] + ": ended before it was ready, with code " + std::to_string(code) +
                          (first_line_.empty() ? "" : ": " + first_line_));
   }
 }

@@ -102,7 +102,8 @@ int RunRecord(const client::RecordOptions& o) {
              partial ? "a part of the recording" : "none lost", report::Text(table));
   if (recording.unknown > 0)
     fmt::print(
-        "{} positions of packed records could not be told and are marked stale: the arm moved too fast for them\n",
+        "{} positions of packed records could not be told and are marked stale: the arm moved too fast for them, or "
+        "the part between two gaps is too short\n",
         recording.unknown);
   if (!partial) {
     WriteJson(o.json, json);
@@ -111,7 +112,7 @@ int RunRecord(const client::RecordOptions& o) {
   json["error"] = recording.cut;
   json["exit_code"] = static_cast<int>(kPartial);
   WriteJson(o.json, json);
-  fmt::print(stderr, "armcal: {}; what came before is in {}\n", recording.cut, out);
+  fmt::print(stderr, "armcal: {}; the longest part without a gap is in {}\n", recording.cut, out);
   return kPartial;
 }
 
@@ -128,8 +129,11 @@ void AddRecord(CLI::App& app, Action& action) {
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--robot", o->robot, "robot file or name")->required();
   verb->add_option("--trajectory", o->trajectory, "trajectory of armcal excite, for a drive that plays it");
-  verb->add_option("--seconds", o->seconds, "instead: so long, whatever the arm does")->check(Between(1.0, 86400.0));
-  verb->add_flag("--lean", o->lean, "position, current and flags only, for a serial line; packed if the drive can");
+  verb->add_option("--seconds", o->seconds,
+                   "record for this many seconds whatever the arm does, instead of a trajectory")
+      ->check(Between(1.0, 86400.0));
+  verb->add_flag("--lean", o->lean,
+                 "position, current and flags only, for a serial line; packed records if the drive has them");
   verb->add_option("--out", o->out, "log to write (.csv or .csv.gz)")->required();
   verb->add_option("--samples", o->samples,
                    "also write the drive's processed samples, with the committed model's torque as tauff");

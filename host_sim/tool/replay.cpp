@@ -203,7 +203,7 @@ void AddReplay(CLI::App& app, Action& action) {
   verb->add_option("logs", o->logs, "log(s) whose torque is the input")->required();
   AddLogFormat(*verb, o->format);
   verb->add_option("--start-samples", o->start_samples,
-                   "the state at the start is a parabola through this many samples")
+                   "initial position and speed come from a parabola through this many samples")
       ->check(Between(3, 1000000));
   verb->add_option("--step", o->step_s, "longest step of the simulation (s)")->check(Between(1e-6, 1.0));
   verb->add_option("--refine", o->refine,
@@ -216,7 +216,7 @@ void AddReplay(CLI::App& app, Action& action) {
                    "length of a run (s); default: chosen by blocks of the training logs that are left out in turn")
       ->check(AboveZero());
   verb->add_option("--tries", o->refinement.tries, "starting points")->check(Between(1, 1000));
-  verb->add_option("--seed", o->refinement.seed, "of what is drawn");
+  verb->add_option("--seed", o->refinement.seed, "of the random draws");
   verb->add_option("--refits", o->refits, "refit that often on blocks drawn anew, each time from drawn starting points")
       ->check(Between(0, 1000));
   AddCutoff(*verb, o->cutoff_Hz);

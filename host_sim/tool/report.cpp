@@ -20,7 +20,7 @@ WritePage PageOf(const ordered_json& json) {
   if (json.contains("closed")) return &WriteDemoPage;
   if (json.contains("findings") && json.contains("verdicts")) return &verdict::WriteSummaryPage;
   if (json.contains("terms")) return &verdict::WriteDiagnosisPage;
-  if (json.contains("columns")) return &verdict::WriteIdentificationPage;
+  if (json.contains("columns") && json.contains("exogeneity")) return &verdict::WriteIdentificationPage;
   return nullptr;
 }
 
@@ -50,7 +50,8 @@ void AddReport(CLI::App& app, Action& action) {
     std::string result, out;
   };
   auto o = std::make_shared<Options>();
-  verb->add_option("result", o->result, "what --json of diagnose or identify wrote, or a demo's result.json")
+  verb->add_option("result", o->result,
+                   "what --json of diagnose or identify (without --method) wrote, or a demo's result.json")
       ->required();
   verb->add_option("--out", o->out, "the page to write")->required();
   verb->callback([o, &action] { action = [o] { return RunReport(o->result, o->out); }; });

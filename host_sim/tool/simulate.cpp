@@ -70,7 +70,7 @@ void AddSimulate(CLI::App& app, Action& action) {
   verb->add_option("--truth-log", o->truth_log,
                    "what the torque sensors would read without noise, for the report's floor");
   verb->add_option("--key", o->key, "file with a key: the drive then takes only tables that are signed with it");
-  verb->add_flag("--real-time", o->real_time, "one virtual second a second (default: as fast as the host follows)");
+  verb->add_flag("--real-time", o->real_time, "run in real time (default: as fast as this computer can)");
   verb->callback([o, &action] { action = [o] { return RunSimulate(*o); }; });
 }
 

@@ -2,6 +2,7 @@
 #include "codegen/src/robot/urdf.hpp"
 
 #include <console_bridge/console.h>
+#include <sys/wait.h>
 #include <urdf_parser/urdf_parser.h>
 
 #include <array>
@@ -427,14 +428,23 @@ std::string Quoted(const std::string& text) {
   return out + "'";
 }
 
-// What the program xacro makes of a file; empty if it is not there or fails.
-std::string Expanded(const std::filesystem::path& path) {
+constexpr int kNoProgram = 127;  // what a shell ends with
+
+// What a command prints, and the code it ends with.
+std::pair<std::string, int> OutputOf(const std::string& command) {
   std::string text;
-  FILE* pipe = popen(("xacro " + Quoted(path.string()) + " 2>/dev/null").c_str(), "r");
-  if (!pipe) return text;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (!pipe) return {text, kNoProgram};
   std::array<char, 4096> block;
   for (std::size_t n = 0; (n = std::fread(block.data(), 1, block.size(), pipe)) > 0;) text.append(block.data(), n);
-  return pclose(pipe) == 0 ? text : std::string();
+  const int status = pclose(pipe);
+  return {text, WIFEXITED(status) ? WEXITSTATUS(status) : 1};
+}
+
+std::string LastLine(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  const auto at = text.rfind('\n');
+  return at == text.npos ? text : text.substr(at + 1);
 }
 
 }  // namespace
@@ -446,8 +456,12 @@ std::string UrdfText(const std::filesystem::path& path) {
   text << in.rdbuf();
   const bool macros = path.extension() == ".xacro" || text.str().find("<xacro:") != std::string::npos;
   if (!macros) return text.str();
-  const std::string expanded = Expanded(path);
-  if (!expanded.empty()) return expanded;
+  const std::string xacro = "xacro " + Quoted(path.string());
+  const auto [expanded, code] = OutputOf(xacro + " 2>/dev/null");
+  if (code == 0 && !expanded.empty()) return expanded;
+  if (code != kNoProgram)
+    throw io::InputError(path.string() +
+                         ": xacro cannot expand it: " + LastLine(OutputOf(xacro + " 2>&1 >/dev/null").first));
   std::filesystem::path urdf = path;
   if (path.extension() == ".xacro") urdf.replace_extension(path.stem().extension() == ".urdf" ? "" : ".urdf");
   else urdf.replace_filename("expanded.urdf");

@@ -195,7 +195,7 @@ std::string CurrentLines(const Set& current) {
   return fmt::format(
       "\n# [tau]: not recognised, but {0} may be motor currents. Write torque constant (N m per A) times gear ratio "
       "of\n"
-      "# each joint as scale, and take away the marks of the four lines.\n"
+      "# each joint as scale, and take away the # before the four lines.\n"
       "# [tau]\n# column = {0}\n# unit = \"N*m\"\n# scale = [{1}]\n",
       Quoted(current.column), scale);
 }

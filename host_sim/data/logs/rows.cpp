@@ -87,7 +87,7 @@ class Chooser {
     while (end > begin && missing(end - 1)) --end;
     std::vector<char> ends = Unmarked(), between = Unmarked();
     for (Index i = 0; i < size(); ++i) ends[static_cast<std::size_t>(i)] = i < begin || i >= end;
-    Drop(ends, "no number, at the end of the log, from line");
+    Drop(ends, "no number, at an end of the log, from line");
     between = Unmarked();
     Index count = 0, first = -1;
     for (Index i = 0; i < size(); ++i)
@@ -196,7 +196,7 @@ class Chooser {
     if (begin >= end) return;  // nothing changes at all; the checks of each joint say so
     std::vector<char> filler = Unmarked();
     for (Index i = 0; i < size(); ++i) filler[static_cast<std::size_t>(i)] = i < begin || i >= end;
-    Drop(filler, "positions and torques stay the same to the last digit up to the log's end, from line");
+    Drop(filler, "positions and torques stay the same to the last digit at an end of the log, from line");
   }
 
   void LeaveOutZeros() {

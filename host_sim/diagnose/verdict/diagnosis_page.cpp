@@ -67,9 +67,9 @@ void AddVerdict(report::Page& page, const ordered_json& json) {
                                     [](const ordered_json& term) { return Holds(term, "confirmed", true); });
     page.Box(report::Tone::kWarning, fmt::format("The model lacks {} effect{}", sure, sure == 1 ? "" : "s"), causes);
   } else if (causes.empty() && json.at("too_short").empty()) {
-    page.Box(report::Tone::kGood, "Nothing is missing",
+    page.Box(report::Tone::kGood, "No missing effect was found in these logs",
              "No effect of the catalogue improves the declared model by more than chance would. What these logs would "
-             "have shown is in the table of errors: smallest effect seen.");
+             "have shown is in the table of errors: smallest detectable effect.");
   } else {
     page.Box(report::Tone::kNeutral, "Verdict: " + headline, causes);
   }
@@ -133,7 +133,7 @@ void AddErrorTable(report::Page& page, const ordered_json& json) {
                                    {"before_moving", "before, moving"},
                                    {"after_moving", "after, moving"},
                                    {"noise_floor", "noise floor (estimate)"},
-                                   {"smallest_detectable", "smallest effect seen"}})
+                                   {"smallest_detectable", "smallest detectable effect"}})
     table.header.emplace_back(title), columns.push_back(Numbers(json.at(key)));
   for (std::size_t j = 0; j < columns[0].size(); ++j) {
     std::vector<std::string> row{JointTitle(json, static_cast<int>(j) + 1).substr(6), json.at("torque_units").at(j)};

@@ -106,8 +106,8 @@ HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::Matri
   return CompareHeldOut({{&test, predicted}}, band_Hz);
 }
 
-void PrintHeldOut(const HeldOutError& e, const std::string& name) {
-  report::Table t{{"joint", "error rms", "moving", "moving / torque %", "NRMSE", "R2"}, {}, "held out: " + name};
+void PrintError(const HeldOutError& e, const std::string& of) {
+  report::Table t{{"joint", "error rms", "moving", "moving / torque %", "NRMSE", "R2"}, {}, of};
   const auto add = [](std::vector<std::string>& row, const ErrorFigures& f, int j) {
     for (const double v : {f.rms[j], f.rms_moving[j]}) row.push_back(fmt::format("{:.4g}", v));
     row.push_back(fmt::format("{:.2f}", 100 * f.relative[j]));
@@ -164,13 +164,14 @@ std::string ExogeneityText(const Exogeneity& e, const std::string& otherwise) {
   // What the motion itself took up of the torque's error is in its smoothed positions, too.
   const char* shown =
       e.instruments == calibration::kSmoothedPositions ? ", which show noise of the derivation alone" : "";
-  std::string text = fmt::format("regressors free of the torque's error (instruments: {}{}):", e.instruments, shown);
+  std::string text = fmt::format(
+      "exogeneity: are the regressors free of the torque's error? (instruments: {}{}):", e.instruments, shown);
   const char* separator = " ";
   for (const auto& [result, list] : joints)
     text += fmt::format("{}{} on joint {}", separator, result, list), separator = "; ";
   text += "\n";
   if (e.passed()) return text;
-  return text + "  least squares is biased where it fails: " + Remedy(e) + "; or " + otherwise + "\n";
+  return text + "  on joints that fail, least squares is biased: " + Remedy(e) + "; or " + otherwise + "\n";
 }
 
 nlohmann::ordered_json ToJson(const Exogeneity& e) {

@@ -34,7 +34,7 @@ struct Predicted {
 // All logs as one record; each is filtered by itself. InputError: a band from half a log's sample rate on.
 HeldOutError CompareHeldOut(const std::vector<Predicted>& logs, double band_Hz);
 HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::MatrixXd& predicted, double band_Hz);
-void PrintHeldOut(const HeldOutError& e, const std::string& name);
+void PrintError(const HeldOutError& e, const std::string& of);
 nlohmann::ordered_json ToJson(const HeldOutError& e);
 std::vector<double> ToList(const Eigen::VectorXd& v);
 

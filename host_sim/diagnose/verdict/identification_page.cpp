@@ -33,14 +33,19 @@ std::vector<double> Percent(const ordered_json& json) {
 }
 
 void AddFit(report::Page& page, const ordered_json& json) {
-  const std::vector<double> percent = Percent(json);
+  std::vector<double> percent = Percent(json);
+  std::string rest;  // a joint that does not move has no error there
+  for (std::size_t j = 0; j < percent.size(); ++j)
+    if (percent[j] == 0) rest += fmt::format("{}{}", rest.empty() ? "" : ", ", j + 1);
+  if (std::erase(percent, 0) > 0 && percent.empty()) percent = {0};
   const auto [least, most] = std::minmax_element(percent.begin(), percent.end());
   const bool physical = !json.contains("physical") || json["physical"] == true;
   const bool sound = physical && IsHeldOut(json) && json.at("exogeneity").at("passed") == true;
   page.Box(sound ? report::Tone::kGood : report::Tone::kNeutral,
            fmt::format("The model leaves {} to {} % of a joint's torque {}", report::Number(*least, 2),
                        report::Number(*most, 2), IsHeldOut(json) ? "on the held-out log" : "on a training log"),
-           fmt::format("RMS of measured minus predicted torque over RMS of the torque, where the joint moves.{}",
+           fmt::format("RMS of measured minus predicted torque over RMS of the torque, where the joint moves.{}{}",
+                       rest.empty() ? "" : " Not judged, because they do not move: joints " + rest + ".",
                        physical ? "" : " Some of the bodies cannot exist."));
   page.Section("What to do next");
   std::vector<std::string> steps;

@@ -72,8 +72,8 @@ std::string CauseText(const DiagnosisView& v, std::size_t term) {
     torque.cwiseQuotient(after.cwiseMax(1e-300)).maxCoeff(&main);
     const char* unit = Unit(v.model->robot(), static_cast<int>(main));
     out += fmt::format(
-        ": {:.3g} {} RMS of joint {} on the held-out log, where the declared model leaves {:.3g} {} and "
-        "the model with all terms {:.3g} {}",
+        ": {:.3g} {} RMS of joint {} on the held-out log; the error there is {:.3g} {} with the declared model and "
+        "{:.3g} {} with all terms",
         torque[main], unit, main + 1, before[main], unit, after[main], unit);
     if (t.record->search.at_turns) out += "; it shows near turns and at rest, where a joint that sticks looks the same";
     out += InPhase(t, v.motion);
@@ -161,7 +161,7 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
       lags = std::max(lags, c.lags);
     }
     out.push_back(
-        fmt::format("the torque as the joints made it: the logs show it through {} and late, time constant / delay "
+        fmt::format("the torque before it was filtered: the logged one passed {} and a delay, time constant / delay "
                     "in ms {} (joints 1 to {}); predictions pass the same before they are compared",
                     lags == 1 ? "a low-pass" : "two equal low-passes", each, n));
   }

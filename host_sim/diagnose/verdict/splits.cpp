@@ -184,8 +184,10 @@ Agreed Agree(const Verdicts& splits, const Comparison& comparison) {
       if (!here) {
         const bool confirmed = term["confirmed"].get<bool>();
         out.does_not.push_back({held_out, term["kind"], joint,
-                                confirmed ? "does not lower the held-out error"
-                                          : term.value("unconfirmed", std::string("refuted by the held-out run"))});
+                                term.value("training_only", false)
+                                    ? "an event of the training log, which the held-out log cannot show"
+                                : confirmed ? "does not lower the held-out error"
+                                            : term.value("unconfirmed", std::string("refuted by the held-out run"))});
         continue;
       }
       Agreement a{Kinds(term), joint, term["signals"].get<Strings>(), {*here}, 0, {}, {}};
@@ -193,7 +195,11 @@ Agreed Agree(const Verdicts& splits, const Comparison& comparison) {
       for (const auto& [name, other] : splits) {
         std::optional<Distance> apart;
         if (name == held_out || Extend(a, name, other, comparison.traces, apart)) continue;
-        missing.push_back(fmt::format("{} with {} held out", apart ? OtherForm(*apart) : "not found", name));
+        missing.push_back(fmt::format("{} with {} held out",
+                                      apart                          ? OtherForm(*apart)
+                                      : other["verdict"] == "failed" ? "no verdict"
+                                                                     : "not found",
+                                      name));
       }
       if (!missing.empty()) {
         out.does_not.push_back({held_out, term["kind"], a.joint, fmt::format("{}", fmt::join(missing, "; "))});

@@ -122,7 +122,10 @@ report::Plot TermPlot(const Verdicts& splits, const Agreement& a) {
 const char* const kTermCaption =
     "Means over bins of the held-out run: what the rest of the model leaves, and the term as the other runs gave it.";
 
-std::string Headline(const Agreed& agreed) {
+std::string Headline(const Verdicts& splits, const Agreed& agreed) {
+  const auto failed =
+      std::count_if(splits.begin(), splits.end(), [](const auto& v) { return v.second["verdict"] == "failed"; });
+  if (failed > 0) return fmt::format("no term can be claimed: {} of {} splits have no verdict", failed, splits.size());
   if (agreed.holds.empty()) return "no term holds on every split";
   return fmt::format("{} on every split", agreed.holds.size() == 1 ? "one term holds" : "terms that hold");
 }
@@ -130,7 +133,7 @@ std::string Headline(const Agreed& agreed) {
 }  // namespace
 
 std::string SplitsText(const Verdicts& splits, const Agreed& agreed) {
-  std::string text = report::Text(ErrorTable(splits)) + "\n" + Headline(agreed) + "\n";
+  std::string text = report::Text(ErrorTable(splits)) + "\n" + Headline(splits, agreed) + "\n";
   for (const Agreement& a : agreed.holds)
     text += "\n" + Title(a) + "\n" + report::Text(HoldsTable(a)) + "\n" + report::Text(SpreadTable(a));
   if (!agreed.holds.empty()) text += std::string("\n") + kSpreadCaption + "\n";
@@ -172,7 +175,7 @@ void WritePictures(const fs::path& folder, const Verdicts& splits, const Agreed&
 void WriteSplitsPage(const fs::path& path, const std::string& robot, const Verdicts& splits, const Agreed& agreed) {
   report::Page page("What holds whatever run is held out: " + robot,
                     "Each run held out once; terms found on the others, the model fitted to them.");
-  page.Box(agreed.holds.empty() ? report::Tone::kNeutral : report::Tone::kWarning, Headline(agreed));
+  page.Box(agreed.holds.empty() ? report::Tone::kNeutral : report::Tone::kWarning, Headline(splits, agreed));
   for (const Agreement& a : agreed.holds) {
     page.Section(Title(a));
     page.Add(HoldsTable(a));

@@ -34,13 +34,14 @@ std::string Headline(const diagnosis::Finding& f) {
     return "none. Nothing was searched: too few rows of the training logs are left; longer logs show more";
   if (f.terms.empty())
     return "none. Nothing is missing that these logs could show; what they would have shown is in the table: smallest "
-           "effect seen";
+           "detectable effect";
   const auto any = [&](auto is) { return std::any_of(f.terms.begin(), f.terms.end(), is); };
   if (!AnyConfirmed(f) && any([](const Term& t) { return t.in_fit; }))
     return "none confirmed. The held-out log repeats a training trajectory: terms are found on this trajectory only";
   if (!AnyConfirmed(f) && any([](const Term& t) { return t.not_held_out; }))
     return "none. What the training logs suggested did not hold on the held-out log";
-  if (!AnyConfirmed(f)) return "none. What the training logs suggested they do not determine";
+  if (!AnyConfirmed(f))
+    return "none. The training logs suggest terms, but do not determine their parameters; longer logs show more";
   const bool of_the_arm =
       std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed && !t.training_only; });
   return of_the_arm ? "effect" : "effect, in the training log only: it says nothing about the arm";
@@ -82,7 +83,7 @@ std::string Parameters(const Term& t) {
 std::string ScoreText(const Term& t) { return fmt::format("{:.0f} ({})", t.score, diagnosis::ChanceText(t)); }
 
 std::string FoldText(const Term& t) {
-  if (t.training_only) return "not asked blocks that it was not fitted to: an event of one part is in no other";
+  if (t.training_only) return "not judged on blocks that it was not fitted to: an event of one block is in no other";
   return fmt::format("improves {} of {} blocks of the training log that it was not fitted to",
                      (t.folds.array() > 0).count(), t.folds.size());
 }

@@ -56,9 +56,9 @@ class ByName {
     for (const auto& [name, value] : values_)
       if (value != 0)
         throw io::InputError(
-            fmt::format("{}: parameter {} is {:g}, expected no parameter that robot {} does not have; a table goes "
-                        "with the model file that it was made for",
-                        source_, name, value, model_.robot().name));
+            fmt::format("{}: robot {} has no parameter {}, which is {:g} here; expected the robot file that the table "
+                        "was made for (--robot or --model)",
+                        source_, model_.robot().name, name, value));
   }
 
  private:

@@ -152,6 +152,27 @@ void DriveClient::Request(const std::string& what, const std::function<int(_modb
   }
 }
 
+namespace {
+
+// What a person can do about a refusal; empty where the reason says it.
+const char* Remedy(core::Status status) {
+  switch (status) {
+    case core::Status::kAxisEnabled:
+      return "; disable all axes, then repeat";
+    case core::Status::kSeatTaken:
+      return "; close it, or wait until it has asked for nothing for 10 s";
+    case core::Status::kForbidden:
+      return "; allow it at the board";
+    case core::Status::kBusy:
+    case core::Status::kTooSoon:
+      return "; repeat later";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
 // Asks the drive for its own reason. If it does not answer, there is only the exception.
 void DriveClient::Refused(const std::string& what, int exception) {
   link::Words<reg::kErrorBlock> w;
@@ -159,7 +180,7 @@ void DriveClient::Refused(const std::string& what, int exception) {
       modbus_read_input_registers(connection_.get(), reg::kErrorBlock.first, w.size(), w.data()) == w.size() &&
       w.Get<reg::kErrorException>() == exception;
   const auto status = static_cast<core::Status>(told ? w.Get<reg::kErrorStatus>() : 0);
-  const std::string reason = told ? StatusName(status) : "no reason given";
+  const std::string reason = told ? StatusName(status) + Remedy(status) : "no reason given";
   throw RefusedError(fmt::format("{}: {} refused: {} (exception {:02})", name_, what, reason, exception), exception,
                      status);
 }

@@ -51,13 +51,14 @@ bool Continue(const std::vector<Anchor>& anchors, std::int64_t* p, std::size_t f
   const Anchor &a = anchors[0], &b = anchors[1];
   const auto steps = static_cast<std::int64_t>(b.record - a.record);
   const std::int64_t off = wrap32((b.position - a.position) - (p[b.record] - p[a.record]));
-  if (off % (steps * kTurn) != 0) throw LinkError("packed records contradict each other");
+  if (off % (steps * kTurn) != 0) throw LinkError("packed records contradict each other; record again");
   const std::int64_t turns = off / steps;
   const std::int64_t start = a.position - p[a.record];
   for (std::size_t k = first; k < last; ++k)
     p[k] += start + (static_cast<std::int64_t>(k) - static_cast<std::int64_t>(a.record)) * turns;
   for (const Anchor& each : anchors)
-    if (wrap32(p[each.record] - each.position) != 0) throw LinkError("packed records contradict each other");
+    if (wrap32(p[each.record] - each.position) != 0)
+      throw LinkError("packed records contradict each other; record again");
   return true;
 }
 

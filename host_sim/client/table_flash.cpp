@@ -180,10 +180,10 @@ class Flash {
       if (w.Get<reg::kRefusedStatus>() != static_cast<std::uint16_t>(error.status) ||
           w.Get<reg::kRefusedWord>() == core::Refusal::kNoWord)
         throw;
-      throw RefusedError(
-          fmt::format("{}; word {} of the table is {:.9g}, expected at most or at least {:.9g}", error.what(),
-                      w.Get<reg::kRefusedWord>(), w.Get<reg::kRefusedValue>(), w.Get<reg::kRefusedBound>()),
-          error.exception, error.status);
+      const float value = w.Get<reg::kRefusedValue>(), bound = w.Get<reg::kRefusedBound>();
+      throw RefusedError(fmt::format("{}; word {} of the table is {:.9g}, expected {} {:.9g}", error.what(),
+                                     w.Get<reg::kRefusedWord>(), value, value > bound ? "at most" : "at least", bound),
+                         error.exception, error.status);
     }
   }
 

@@ -54,6 +54,23 @@ int ExceptionCode(int error) {
   return code >= 1 && code < MODBUS_EXCEPTION_MAX ? code : 0;
 }
 
+// What a person can do about a refusal; empty where the reason says it.
+const char* Remedy(core::Status status) {
+  switch (status) {
+    case core::Status::kAxisEnabled:
+      return "; disable all axes, then repeat";
+    case core::Status::kSeatTaken:
+      return "; close it, or wait until it has asked for nothing for 10 s";
+    case core::Status::kForbidden:
+      return "; allow it at the board";
+    case core::Status::kBusy:
+    case core::Status::kTooSoon:
+      return "; repeat later";
+    default:
+      return "";
+  }
+}
+
 }  // namespace
 
 DriveClient::DriveClient(std::string name, int unit, std::function<_modbus*()> open)
@@ -151,27 +168,6 @@ void DriveClient::Request(const std::string& what, const std::function<int(_modb
       throw LinkError(fmt::format("{} (tried {} times)", failure, attempt + 1));
   }
 }
-
-namespace {
-
-// What a person can do about a refusal; empty where the reason says it.
-const char* Remedy(core::Status status) {
-  switch (status) {
-    case core::Status::kAxisEnabled:
-      return "; disable all axes, then repeat";
-    case core::Status::kSeatTaken:
-      return "; close it, or wait until it has asked for nothing for 10 s";
-    case core::Status::kForbidden:
-      return "; allow it at the board";
-    case core::Status::kBusy:
-    case core::Status::kTooSoon:
-      return "; repeat later";
-    default:
-      return "";
-  }
-}
-
-}  // namespace
 
 // Asks the drive for its own reason. If it does not answer, there is only the exception.
 void DriveClient::Refused(const std::string& what, int exception) {

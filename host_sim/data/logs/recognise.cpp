@@ -25,6 +25,8 @@ struct Set {
   std::size_t joints() const { return columns.size(); }
 };
 
+bool OfSameJoints(const Set& a, const Set& b) { return a.joints() == b.joints() && a.names == b.names; }
+
 bool IsInUnitsOfRos(const Set& set) {
   return set.sight->type.ends_with("/JointState") || set.sight->type.ends_with("/DynamicJointState");
 }
@@ -206,7 +208,7 @@ const Set* ChooseMain(const std::vector<Set>& sets) {
   const auto rank = [&sets](const Set& q) {
     int partner = 0;
     for (const Set& other : sets)
-      if (other.quantity == "tau" && other.joints() == q.joints() && other.names == q.names)
+      if (other.quantity == "tau" && OfSameJoints(other, q))
         partner = std::max(partner, other.sight == q.sight ? 2 : 1);
     return std::pair(partner, q.joints());
   };
@@ -233,8 +235,7 @@ Proposal Recognise(const Look& look, const std::string& source, const std::vecto
     const Set* chosen = std::string(quantity) == "q" ? main : nullptr;
     const Set* rival = nullptr;
     for (const Set& set : sets) {
-      if (main == nullptr || set.quantity != quantity || set.joints() != main->joints() || set.names != main->names)
-        continue;
+      if (main == nullptr || set.quantity != quantity || !OfSameJoints(set, *main)) continue;
       if (chosen == nullptr || (chosen->sight != main->sight && set.sight == main->sight)) chosen = &set;
       if (chosen != &set && rival == nullptr) rival = &set;
     }
@@ -243,10 +244,9 @@ Proposal Recognise(const Look& look, const std::string& source, const std::vecto
       if (!needed) continue;
       out.missing.push_back(quantity);
       const auto current = std::find_if(sets.begin(), sets.end(), [&](const Set& set) {
-        return std::string(quantity) == "tau" && main != nullptr && set.quantity == "current" &&
-               set.joints() == main->joints() && set.names == main->names;
+        return set.quantity == "current" && main != nullptr && OfSameJoints(set, *main);
       });
-      out.map += current == sets.end()
+      out.map += std::string(quantity) != "tau" || current == sets.end()
                      ? fmt::format("\n# [{}]: not recognised\n# column = \"\"\n# unit = \"\"\n", quantity)
                      : CurrentLines(*current);
       continue;

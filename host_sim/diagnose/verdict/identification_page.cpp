@@ -33,11 +33,15 @@ std::vector<double> Percent(const ordered_json& json) {
 }
 
 void AddFit(report::Page& page, const ordered_json& json) {
-  std::vector<double> percent = Percent(json);
+  std::vector<double> percent;
   std::string rest;  // a joint that does not move has no error there
-  for (std::size_t j = 0; j < percent.size(); ++j)
-    if (percent[j] == 0) rest += fmt::format("{}{}", rest.empty() ? "" : ", ", j + 1);
-  if (std::erase(percent, 0) > 0 && percent.empty()) percent = {0};
+  int joint = 0;
+  for (const double v : Percent(json)) {
+    ++joint;
+    if (v == 0) rest += fmt::format("{}{}", rest.empty() ? "" : ", ", joint);
+    else percent.push_back(v);
+  }
+  if (percent.empty()) percent = {0};
   const auto [least, most] = std::minmax_element(percent.begin(), percent.end());
   const bool physical = !json.contains("physical") || json["physical"] == true;
   const bool sound = physical && IsHeldOut(json) && json.at("exogeneity").at("passed") == true;

@@ -331,9 +331,13 @@ Dataset Turned(const codegen::Model& model, const Dataset& log, double scale) {
   return out;
 }
 
-bool IsTooFast(const codegen::Model& model, const Dataset& log) {
-  for (int j = 0; j < model.joints(); ++j)
-    if (log.s.qd.col(j).cwiseAbs().maxCoeff() > kImpossible * model.robot().joint[j].speed_limit_radps) return true;
+// scale: of the speeds of revolute joints.
+bool IsTooFast(const codegen::Model& model, const Dataset& log, double scale) {
+  for (int j = 0; j < model.joints(); ++j) {
+    const codegen::Joint& joint = model.robot().joint[j];
+    const double fastest = (Slides(joint) ? 1 : scale) * log.s.qd.col(j).cwiseAbs().maxCoeff();
+    if (fastest > kImpossible * joint.speed_limit_radps) return true;
+  }
   return false;
 }
 
@@ -345,9 +349,11 @@ void CheckAngleUnit(const codegen::Model& model, const Dataset& log) {
     return rows.Fit(rows.Move(change), change);
   };
   for (const bool in_rad : {true, false}) {
-    const Dataset faster = in_rad ? Turned(model, log, kDegPerRad) : log;
+    if (IsTooFast(model, log, in_rad ? kDegPerRad : 1)) continue;
+    const Dataset turned = in_rad ? Turned(model, log, kDegPerRad) : Dataset();
+    const Dataset& faster = in_rad ? turned : log;
     const ColumnFit rows(model, {&faster}, kFullRows);
-    if (IsTooFast(model, faster) || rows.rows() < kRowsPerColumn * model.columns()) continue;
+    if (rows.rows() < kRowsPerColumn * model.columns()) continue;
     ColumnChange slower(n);
     for (int j = 0; j < n; ++j)
       if (!Slides(model.robot().joint[j])) slower.q_scale[static_cast<std::size_t>(j)] = 1 / kDegPerRad;

@@ -7,7 +7,7 @@ from conan.tools.cmake import CMake, CMakeToolchain, cmake_layout
 from conan.tools.files import copy, load
 
 TOP = ["CMakeLists.txt", "LICENSE", "*.md", "package.xml"]
-FOLDERS = ["lib", "codegen/robots", "codegen/effects", "codegen/generated", "port", "toolchains", "docs"]
+FOLDERS = ["lib", "codegen/robots", "codegen/effects", "codegen/generated", "port", "host_sim/scenarios", "toolchains", "docs"]  # what toolchains/install.cmake reads
 
 
 class Armcal(ConanFile):

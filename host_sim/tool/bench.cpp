@@ -48,6 +48,16 @@ void Print(const nlohmann::ordered_json& result) {
   }
 }
 
+// What the program says when it ends with a code: {} if its model is another arm's.
+std::string WhyFailed(const nlohmann::ordered_json& result, int code, const std::string& robot) {
+  if (result.is_object() && result.empty())
+    return "its model is not that of " + robot + "; build it for this robot file";
+  if (result.is_object() && result.contains("estimates_differ"))
+    return fmt::format("its three ways of least squares differ by {:.1g} of the estimate, which is too much",
+                       result["estimates_differ"].get<double>());
+  return fmt::format("ended with code {} and no result", code);
+}
+
 int RunBench(const BenchOptions& o) {
   const codegen::Robot robot = codegen::ReadRobot(RobotPath(o.robot));
   const std::string program = ProgramFor("armcal-bench", robot.name, o.program, "bench program");
@@ -59,9 +69,8 @@ int RunBench(const BenchOptions& o) {
   std::string rest;
   const int code = bench.Wait(&rest);
   const auto result = nlohmann::ordered_json::parse(bench.first_line() + rest, nullptr, false);
-  if (code != 0 || result.is_discarded())
-    throw io::InputError(program + ": ended with code " + std::to_string(code) + "; its model is not that of " +
-                         robot.name);
+  if (code != 0 || !result.is_object())
+    throw io::InputError(fmt::format("{}: {}", program, WhyFailed(result, code, robot.name)));
   Print(result);
   WriteJson(o.json, result);
   return kOk;

@@ -50,6 +50,28 @@ TEST_F(Report, OfADiagnosis_IsMadeAgain_UnlessTheFileLacksSomething) {
   EXPECT_FALSE(fs::exists(Path("old.html")));
 }
 
+// The verdict is green only if every joint was judged and least squares could be trusted.
+TEST_F(Report, NothingMissing_IsGreenOnlyIfAllWasJudged) {
+  ASSERT_EQ(Run("diagnose", "two_link").code, 0);
+  nlohmann::json json = ReadJson(Path("result.json"));
+  json["verdict"] = "none", json["terms"] = json["too_short"] = json["at_rest"] = nlohmann::json::array();
+  json["exogeneity"]["passed"] = true;
+  const auto page = [&](const nlohmann::json& of) {
+    std::ofstream(Path("edited.json")) << of;
+    EXPECT_EQ(Tool({"report", Path("edited.json"), "--out", Path("edited.html")}).code, 0);
+    return ReadText(Path("edited.html"));
+  };
+  const std::string green = "box good";
+  EXPECT_NE(page(json).find(green), std::string::npos);
+  nlohmann::json rested = json, biased = json;
+  rested["at_rest"] = {2}, biased["exogeneity"]["passed"] = false;
+  const std::string of_rested = page(rested), of_biased = page(biased);
+  EXPECT_EQ(of_rested.find(green), std::string::npos);
+  EXPECT_NE(of_rested.find("at rest in the training logs: joints 2."), std::string::npos);
+  EXPECT_EQ(of_biased.find(green), std::string::npos);
+  EXPECT_NE(of_biased.find("an effect may be hidden"), std::string::npos);
+}
+
 TEST_F(Report, OfAnIdentification_IsMadeAgain) {
   const Outcome o = Run("identify", "two_link");
   ASSERT_EQ(o.code, 0) << o.err;

@@ -67,9 +67,18 @@ void AddVerdict(report::Page& page, const ordered_json& json) {
                                     [](const ordered_json& term) { return Holds(term, "confirmed", true); });
     page.Box(report::Tone::kWarning, fmt::format("The model lacks {} effect{}", sure, sure == 1 ? "" : "s"), causes);
   } else if (causes.empty() && json.at("too_short").empty()) {
-    page.Box(report::Tone::kGood, "No missing effect was found in these logs",
-             "No effect of the catalogue improves the declared model by more than chance would. What these logs would "
-             "have shown is in the table of errors: smallest detectable effect.");
+    std::string words =
+        "No effect of the catalogue improves the declared model by more than chance would. What these logs would "
+        "have shown is in the table of errors: smallest detectable effect.";
+    // A page made again from a file of an older armcal has no such key.
+    const ordered_json rested = json.value("at_rest", ordered_json::array());
+    if (!rested.empty())
+      words += fmt::format(" Not judged, because they were at rest in the training logs: joints {}.",
+                           fmt::join(rested.get<std::vector<int>>(), ", "));
+    const bool biased = Holds(json.at("exogeneity"), "passed", false);
+    if (biased) words += " On some joints least squares is biased, so an effect may be hidden: see Exogeneity.";
+    page.Box(rested.empty() && !biased ? report::Tone::kGood : report::Tone::kNeutral,
+             "No missing effect was found in these logs", words);
   } else {
     page.Box(report::Tone::kNeutral, "Verdict: " + headline, causes);
   }

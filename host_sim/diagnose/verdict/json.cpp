@@ -221,6 +221,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["exogeneity"] = ToJson(v.exogeneity);
   j["too_short"] = nlohmann::ordered_json::array();
   for (const int joint : f.too_short) j["too_short"].push_back(joint + 1);
+  j["at_rest"] = nlohmann::ordered_json::array();
+  for (const int joint : Rested(v)) j["at_rest"].push_back(joint + 1);
   j["held_out_text"] = MotionText(v.motion);
   j["exogeneity_text"] = ExogeneityText(v.exogeneity, kLacksMore);
   j["declared_parameters"] = DeclaredJson(v);

@@ -128,6 +128,17 @@ std::vector<std::string> PayloadText(const DiagnosisView& v) {
   return out;
 }
 
+std::vector<int> Rested(const DiagnosisView& v) {
+  std::vector<int> out;
+  if (!v.train || v.train->empty()) return out;
+  for (int j = 0; j < v.model->joints(); ++j) {
+    double samples = 0, moving = 0;
+    for (const calibration::Dataset& d : *v.train) moving += d.moving.col(j).sum(), samples += d.samples();
+    if (moving < kStands * samples) out.push_back(j);
+  }
+  return out;
+}
+
 std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   std::vector<std::string> out;
   if (!v.train || v.train->empty()) return out;
@@ -135,18 +146,16 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   std::string band, left_out;
   const VectorXd reach_Hz = LookedAtTo_Hz(v);
   double saved_Hz = INFINITY;
-  std::vector<int> standing;
   for (int j = 0; j < n; ++j) {
-    double used = 0, samples = 0, moving = 0;
+    double used = 0, samples = 0;
     for (const calibration::Dataset& d : *v.train) {
       if (j < d.saved_Hz.size()) saved_Hz = std::min(saved_Hz, d.saved_Hz[j]);
       const auto& turned = v.finding->at_turns;
       const bool all = std::find(turned.begin(), turned.end(), j) != turned.end();
-      used += (all ? d.sound : d.used).col(j).sum(), moving += d.moving.col(j).sum(), samples += d.samples();
+      used += (all ? d.sound : d.used).col(j).sum(), samples += d.samples();
     }
     band += fmt::format("{}{:.3g}", j == 0 ? "" : ", ", reach_Hz[j]);
     left_out += fmt::format("{}{:.0f}", j == 0 ? "" : ", ", 100 * (1 - used / std::max(samples, 1.0)));
-    if (moving < kStands * samples) standing.push_back(j);
   }
   if ((*v.train)[0].cutoff_Hz.size() == n)
     out.push_back(fmt::format(
@@ -171,9 +180,9 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
       fmt::format("rows at rest, near a turn and beside gaps: {} % of the samples of joints 1 to {}; presliding "
                   "and breakaway show there",
                   left_out, n));
-  if (!standing.empty())
+  if (const std::vector<int> rested = Rested(v); !rested.empty())
     out.push_back(
-        fmt::format("joint{} {}: at rest in the training logs", standing.size() > 1 ? "s" : "", JointGroup(standing)));
+        fmt::format("joint{} {}: at rest in the training logs", rested.size() > 1 ? "s" : "", JointGroup(rested)));
   if (const auto& few = v.finding->too_short; !few.empty())
     out.push_back(
         fmt::format("effects on joint{} {}: too few rows of the training logs are left; longer logs show more",

@@ -69,6 +69,9 @@ std::string Sentence(const DiagnosisView& v, std::size_t term);
 // What the held-out log carries and the training logs do not, a line each; empty if nothing is named.
 std::vector<std::string> PayloadText(const DiagnosisView& v);
 
+// Joints, counted from 0, that did not move in the training logs: a diagnosis says nothing of their own effects.
+std::vector<int> Rested(const DiagnosisView& v);
+
 // What this diagnosis could not see, a line each: the band, rows left out, joints that stood, a search that was cut
 // off.
 std::vector<std::string> NotLookedAt(const DiagnosisView& v);

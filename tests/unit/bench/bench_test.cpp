@@ -67,7 +67,7 @@ TEST(Bench, AnotherArmsKinematics_AreNotCompared) {
   text.replace(at, 11, "a_m = 0.270");
   std::ofstream(folder / "other.toml") << text;
   ExpectOneLine(Tool({"bench", "--quick", "--robot", (folder / "other.toml").string()}), 2,
-                "its model is not that of er20_like");
+                "its model is not that of er20_like; build it for this robot file");
 }
 
 }  // namespace

@@ -22,10 +22,11 @@ namespace {
 void Print(const analysis::Diagnosed& run, const DiagnoseOptions& o) {
   const nlohmann::ordered_json& json = run.json;
   fmt::print("{}", verdict::DiagnosisText(run.view));
-  report::Table table{
-      {"joint", "before", "after", "before, moving", "after, moving", "noise floor", "smallest detectable effect"}, {}};
+  report::Table table{{"joint", "unit", "before", "after", "before, moving", "after, moving", "noise floor",
+                       "smallest detectable effect"},
+                      {}};
   for (int j = 0; j < run.model->joints(); ++j) {
-    std::vector<std::string> row{std::to_string(j + 1)};
+    std::vector<std::string> row{std::to_string(j + 1), json["torque_units"][j]};
     for (const char* key : {"before", "after", "before_moving", "after_moving", "noise_floor", "smallest_detectable"})
       row.push_back(json[key][j].is_null() ? "-" : fmt::format("{:.4g}", json[key][j].get<double>()));
     table.rows.push_back(row);

@@ -24,8 +24,9 @@ int RunEvaluate(const EvaluateOptions& o) {
   const LogReader read(model, o.format, o.cutoff_Hz);
   const std::vector<calibration::Dataset> logs = read.All(o.logs);
   const analysis::Evaluated result = analysis::Evaluate(model, given, logs, o.band_Hz);
-  for (std::size_t k = 0; k < logs.size(); ++k) verdict::PrintError(result.each[k], logs[k].source);
-  if (result.together) verdict::PrintError(*result.together, fmt::format("all {} logs as one record", logs.size()));
+  for (std::size_t k = 0; k < logs.size(); ++k) verdict::PrintError(result.each[k], model.robot(), logs[k].source);
+  if (result.together)
+    verdict::PrintError(*result.together, model.robot(), fmt::format("all {} logs as one record", logs.size()));
   nlohmann::ordered_json json = ToJson(o.given, model);
   json.update(result.json);
   WriteJson(o.json, json);

@@ -128,7 +128,7 @@ int RunMethod(const MethodOptions& o) {
     const verdict::HeldOutError e = verdict::CompareHeldOut(
         test, calibration::Predict(model, test, x, {s.z.data() + columns, static_cast<std::size_t>(unknowns)}),
         o.band_Hz);
-    verdict::PrintError(e, "held out: " + o.test);
+    verdict::PrintError(e, model.robot(), "held out: " + o.test);
     json["test"] = o.test;
     json["held_out"] = verdict::ToJson(e);
     const auto logs = calibration::Pointers(train);
@@ -380,7 +380,7 @@ int RunIdentify(const IdentifyOptions& o) {
   if (!o.test.empty()) {
     const calibration::Dataset test = read.One(o.test);
     const analysis::Identified::OnLog held_out = found.Compare(test, true, o.band_Hz);
-    verdict::PrintError(held_out.error, "held out: " + o.test);
+    verdict::PrintError(held_out.error, model.robot(), "held out: " + o.test);
     json["test"] = o.test;
     json.update(held_out.json);
     AddMotion(calibration::CompareMotion(model, found.all, calibration::Pointers(train), test), json);

@@ -106,8 +106,12 @@ HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::Matri
   return CompareHeldOut({{&test, predicted}}, band_Hz);
 }
 
-void PrintError(const HeldOutError& e, const std::string& of) {
-  report::Table t{{"joint", "error rms", "moving", "moving / torque %", "NRMSE", "R2"}, {}, of};
+const char* TorqueUnit(const codegen::Joint& joint) {
+  return joint.kinematics.type == codegen::JointType::kPrismatic ? "N" : "N m";
+}
+
+void PrintError(const HeldOutError& e, const codegen::Robot& robot, const std::string& of) {
+  report::Table t{{"joint", "unit", "error rms", "moving", "moving / torque %", "NRMSE", "R2"}, {}, of};
   const auto add = [](std::vector<std::string>& row, const ErrorFigures& f, int j) {
     for (const double v : {f.rms[j], f.rms_moving[j]}) row.push_back(fmt::format("{:.4g}", v));
     row.push_back(fmt::format("{:.2f}", 100 * f.relative[j]));
@@ -119,7 +123,7 @@ void PrintError(const HeldOutError& e, const std::string& of) {
     for (const char* title : {"rms", "moving", "%", "NRMSE", "R2"})
       t.header.push_back(fmt::format("{}{}", *title == 'r' ? fmt::format("below {:g} Hz: ", e.band_Hz) : "", title));
   for (int j = 0; j < e.full.rms.size(); ++j) {
-    t.rows.push_back({std::to_string(j + 1)});
+    t.rows.push_back({std::to_string(j + 1), TorqueUnit(robot.joint[static_cast<std::size_t>(j)])});
     add(t.rows.back(), e.full, j);
     if (band) add(t.rows.back(), e.band, j);
   }

@@ -11,6 +11,9 @@
 
 namespace armcal::verdict {
 
+// "N m", or "N" of a joint that slides.
+const char* TorqueUnit(const codegen::Joint& joint);
+
 // Per joint [n]. rms: over scored samples; rms_moving, relative (error / torque): over those where the joint moves.
 // nrmse: rms(error) / std(torque) over every sample of the record, as the public benchmarks define it; R2 is one minus
 // its square.
@@ -34,7 +37,8 @@ struct Predicted {
 // All logs as one record; each is filtered by itself. InputError: a band from half a log's sample rate on.
 HeldOutError CompareHeldOut(const std::vector<Predicted>& logs, double band_Hz);
 HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::MatrixXd& predicted, double band_Hz);
-void PrintError(const HeldOutError& e, const std::string& of);
+// The table of a terminal, a row a joint.
+void PrintError(const HeldOutError& e, const codegen::Robot& robot, const std::string& of);
 nlohmann::ordered_json ToJson(const HeldOutError& e);
 std::vector<double> ToList(const Eigen::VectorXd& v);
 

@@ -124,10 +124,8 @@ nlohmann::ordered_json DeclaredJson(const DiagnosisView& v) {
 
 void AddRobot(ordered_json& json, const codegen::Robot& robot) {
   json["robot"] = robot.name, json["robot_title"] = robot.title;
-  for (const codegen::Joint& joint : robot.joint) {
-    json["joint_names"].push_back(joint.name);
-    json["torque_units"].push_back(joint.kinematics.type == codegen::JointType::kPrismatic ? "N" : "N m");
-  }
+  for (const codegen::Joint& joint : robot.joint)
+    json["joint_names"].push_back(joint.name), json["torque_units"].push_back(TorqueUnit(joint));
 }
 
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
@@ -138,7 +136,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["headline"] = Headline(f);
   AddRobot(j, v.model->robot());
   j["terms"] = nlohmann::ordered_json::array();
-  for (std::size_t n = 0; n < f.terms.size(); ++n) {
+  for (const std::size_t n : OrderOfTerms(v)) {
     const Term& t = f.terms[n];
     nlohmann::ordered_json term{
         {"kind", t.record->kind}, {"record", t.record->name}, {"class", codegen::Word(t.record->effect_class)}};

@@ -17,8 +17,10 @@ namespace {
 
 constexpr double kStands = 0.01;  // of the samples: a joint that moves less has told nothing
 
-const char* Unit(const codegen::Robot& robot, int j) {
-  return robot.joint[j].kinematics.type == codegen::JointType::kPrismatic ? "N" : "N m";
+// [n] RMS of the term over RMS of the error that all terms leave, where the joint moves.
+VectorXd OverError(const DiagnosisView& v, std::size_t term) {
+  return calibration::Rms(*v.test, v.term_torque[term], true)
+      .cwiseQuotient(calibration::Rms(*v.test, v.held_out->after, true).cwiseMax(1e-300));
 }
 
 // "on joint 5, over the motion of joint 1". torque: [n] RMS of the term.
@@ -52,6 +54,18 @@ std::string InPhase(const Term& t, const calibration::HeldOutMotion& motion) {
 
 }  // namespace
 
+std::vector<std::size_t> OrderOfTerms(const DiagnosisView& v) {
+  std::vector<std::size_t> order;
+  std::vector<double> size;
+  for (std::size_t k = 0; k < v.finding->terms.size(); ++k)
+    order.push_back(k), size.push_back(OverError(v, k).maxCoeff());
+  const auto confirmed = [&](std::size_t k) { return v.finding->terms[k].confirmed; };
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return confirmed(a) != confirmed(b) ? confirmed(a) : size[a] > size[b];
+  });
+  return order;
+}
+
 std::string WhatToDo(const Term& t) {
   if (t.training_only || (!t.record->on_target && t.confirmed)) return t.record->remedy;
   if (!t.confirmed && t.in_fit) return "hold out a log of another trajectory to confirm it";
@@ -69,8 +83,8 @@ std::string CauseText(const DiagnosisView& v, std::size_t term) {
     Eigen::Index main = 0;
     const VectorXd after = calibration::Rms(*v.test, v.held_out->after, true),
                    before = calibration::Rms(*v.test, v.held_out->before, true);
-    torque.cwiseQuotient(after.cwiseMax(1e-300)).maxCoeff(&main);
-    const char* unit = Unit(v.model->robot(), static_cast<int>(main));
+    OverError(v, term).maxCoeff(&main);
+    const char* unit = TorqueUnit(v.model->robot().joint[static_cast<std::size_t>(main)]);
     out += fmt::format(
         ": {:.3g} {} RMS of joint {} on the held-out log; the error there is {:.3g} {} with the declared model and "
         "{:.3g} {} with all terms",

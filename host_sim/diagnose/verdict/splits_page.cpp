@@ -67,16 +67,17 @@ report::Table DoesNotTable(const Agreed& agreed) {
 
 // One row a run and joint that moves.
 report::Table ErrorTable(const Verdicts& splits) {
-  report::Table t{{"held out", "joint", "before", "after", "before / torque %", "after / torque %"}, {}};
+  report::Table t{{"held out", "joint", "unit", "before", "after", "before / torque %", "after / torque %"}, {}};
   for (const auto& [name, v] : splits) {
     if (v["verdict"] == "failed") {
-      t.rows.push_back({name + ": " + v["error"].get<std::string>(), "-", "-", "-", "-", "-"});
+      t.rows.push_back({name + ": " + v["error"].get<std::string>(), "-", "-", "-", "-", "-", "-"});
       continue;
     }
     for (std::size_t j = 0; j < v["before_moving"].size(); ++j) {
       const double before = v["before_moving"][j], after = v["after_moving"][j], torque = v["torque_moving"][j];
-      t.rows.push_back({name, std::to_string(j + 1), report::Number(before, 4), report::Number(after, 4),
-                        fmt::format("{:.1f}", 100 * before / torque), fmt::format("{:.1f}", 100 * after / torque)});
+      t.rows.push_back({name, std::to_string(j + 1), v["torque_units"][j], report::Number(before, 4),
+                        report::Number(after, 4), fmt::format("{:.1f}", 100 * before / torque),
+                        fmt::format("{:.1f}", 100 * after / torque)});
     }
   }
   return t;

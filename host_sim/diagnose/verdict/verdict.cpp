@@ -74,7 +74,7 @@ Dependence DependenceOf(const DiagnosisView& v, std::size_t term) {
 std::string DiagnosisText(const DiagnosisView& v) {
   std::string out = "verdict: " + Headline(*v.finding) + "\n";
   for (const std::string& line : PayloadText(v)) out += "  " + line + "\n";
-  for (std::size_t k = 0; k < v.finding->terms.size(); ++k) {
+  for (const std::size_t k : OrderOfTerms(v)) {
     const Term& t = v.finding->terms[k];
     out += fmt::format("  {}, joint {}{}: {}\n", t.record->kind, JointName(t), Remark(t), t.record->title);
     out += fmt::format("    {}\n", Sentence(v, k));

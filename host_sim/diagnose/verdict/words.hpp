@@ -57,6 +57,10 @@ inline constexpr const char* kNoMotion = "armcal excite cannot search a motion f
 // "joint 3 is predicted worse with it than by the declared model: 0.412 instead of 0.398 N m"; of one not confirmed.
 std::string WhyNotConfirmed(const diagnosis::Term& t, const codegen::Robot& robot);
 
+// The order in which terms are shown: confirmed ones first, and of these the one with the most torque, measured by the
+// error that all terms leave on its joint of the held-out log.
+std::vector<std::size_t> OrderOfTerms(const DiagnosisView& v);
+
 // What, on which joint, over which other one, and how much of the held-out error.
 std::string CauseText(const DiagnosisView& v, std::size_t term);
 

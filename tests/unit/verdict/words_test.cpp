@@ -58,6 +58,20 @@ TEST(Sentence, SaysWhatWhereHowMuchAndWhatToDo) {
   EXPECT_TRUE(s.ends_with("put it in the model (--model-out).")) << s;
 }
 
+// Three copies of the term that was found: one a tenth as large, one twice as large but not confirmed.
+TEST(Verdict, TheLargestConfirmedTermIsShownFirst) {
+  const Diagnosed d(81);
+  ASSERT_EQ(d.view.finding->terms.size(), 1u);
+  diagnosis::Finding finding = *d.view.finding;
+  finding.terms.insert(finding.terms.end(), 2, finding.terms[0]);
+  finding.terms[2].confirmed = false;
+  DiagnosisView view = d.view;
+  view.finding = &finding;
+  const Eigen::MatrixXd torque = d.view.term_torque[0];
+  view.term_torque = {0.1 * torque, torque, 2 * torque};
+  EXPECT_EQ(OrderOfTerms(view), (std::vector<std::size_t>{1, 0, 2}));
+}
+
 TEST(Verdict, OnARepeatedTrajectory_ConfirmsNothing_AndWritesNothing) {
   const Diagnosed d(80);
   ASSERT_EQ(d.view.finding->terms.size(), 1u);

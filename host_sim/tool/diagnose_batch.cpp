@@ -43,7 +43,7 @@ std::string Reason(const fs::path& log, int code) {
 nlohmann::ordered_json Diagnose(const DiagnosisCase& c, const DiagnoseOptions& one, const BatchOptions& batch) {
   const auto file = [&](const char* end) { return (fs::path(batch.out) / (c.name + end)).string(); };
   if (batch.resume && fs::is_regular_file(file(".json")))
-    if (const auto kept = verdict::ReadVerdict(file(".json")); kept["verdict"] != "failed") return kept;
+    if (const auto kept = verdict::ReadVerdict(file(".json")); !verdict::Failed(kept)) return kept;
   for (const char* end : {".json", ".html", ".toml", ".log"}) fs::remove(file(end));
   std::string why = c.train.empty()   ? "no train log"
                     : c.test.empty()  ? "no test log"
@@ -212,7 +212,7 @@ std::vector<DiagnosisCase> MakeSplits(const std::vector<std::string>& groups, co
 verdict::Comparison CompareSplits(const DiagnoseOptions& one, const std::vector<DiagnosisCase>& cases,
                                   const verdict::Verdicts& verdicts) {
   verdict::Comparison out;
-  if (std::all_of(verdicts.begin(), verdicts.end(), [](const auto& v) { return v.second["verdict"] == "failed"; }))
+  if (std::all_of(verdicts.begin(), verdicts.end(), [](const auto& v) { return verdict::Failed(v.second); }))
     return out;
   const codegen::Catalogue catalogue = LoadCatalogue();
   const codegen::Model model(codegen::ReadRobot(RobotPath(one.robot)), catalogue);
@@ -220,7 +220,7 @@ verdict::Comparison CompareSplits(const DiagnoseOptions& one, const std::vector<
   std::vector<calibration::Dataset> runs;
   std::map<std::vector<std::string>, int> group;  // by training runs
   for (const DiagnosisCase& c : cases) {
-    if (verdicts.at(c.name)["verdict"] == "failed") continue;
+    if (verdict::Failed(verdicts.at(c.name))) continue;
     runs.push_back(read.One(c.test[0]));
     out.group[c.name] = group.try_emplace(c.train, static_cast<int>(group.size())).first->second;
   }
@@ -245,7 +245,7 @@ int RunSplits(const DiagnoseOptions& one, const BatchOptions& options) {
     fmt::print("report: {}\n", one.report);
   }
   for (const auto& [name, v] : verdicts)
-    if (v["verdict"] == "failed") return kPartial;
+    if (verdict::Failed(v)) return kPartial;
   return kOk;
 }
 

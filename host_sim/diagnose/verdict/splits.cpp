@@ -196,9 +196,9 @@ Agreed Agree(const Verdicts& splits, const Comparison& comparison) {
         std::optional<Distance> apart;
         if (name == held_out || Extend(a, name, other, comparison.traces, apart)) continue;
         missing.push_back(fmt::format("{} with {} held out",
-                                      apart                          ? OtherForm(*apart)
-                                      : other["verdict"] == "failed" ? "no verdict"
-                                                                     : "not found",
+                                      apart           ? OtherForm(*apart)
+                                      : Failed(other) ? "no verdict"
+                                                      : "not found",
                                       name));
       }
       if (!missing.empty()) {

@@ -69,7 +69,7 @@ report::Table DoesNotTable(const Agreed& agreed) {
 report::Table ErrorTable(const Verdicts& splits) {
   report::Table t{{"held out", "joint", "unit", "before", "after", "before / torque %", "after / torque %"}, {}};
   for (const auto& [name, v] : splits) {
-    if (v["verdict"] == "failed") {
+    if (Failed(v)) {
       t.rows.push_back({name + ": " + v["error"].get<std::string>(), "-", "-", "-", "-", "-", "-"});
       continue;
     }
@@ -93,7 +93,7 @@ std::size_t CommonPrefix(const Verdicts& splits) {
 report::Bars ErrorBars(const Verdicts& splits) {
   report::Bars bars{{"error, held out", "", "RMS error / RMS torque, %", kWidth_px}, {}, {}, {}};
   for (const auto& [name, v] : splits) {
-    if (v["verdict"] == "failed") continue;
+    if (Failed(v)) continue;
     for (const char* when : {"before", "after"}) {
       bars.series.push_back(fmt::format("{}: {}", name.substr(CommonPrefix(splits)), when));
       bars.value.emplace_back();
@@ -124,8 +124,7 @@ const char* const kTermCaption =
     "Means over bins of the held-out run: what the rest of the model leaves, and the term as the other runs gave it.";
 
 std::string Headline(const Verdicts& splits, const Agreed& agreed) {
-  const auto failed =
-      std::count_if(splits.begin(), splits.end(), [](const auto& v) { return v.second["verdict"] == "failed"; });
+  const auto failed = std::count_if(splits.begin(), splits.end(), [](const auto& v) { return Failed(v.second); });
   if (failed > 0) return fmt::format("no term can be claimed: {} of {} splits have no verdict", failed, splits.size());
   if (agreed.holds.empty()) return "no term holds on every split";
   return fmt::format("{} on every split", agreed.holds.size() == 1 ? "one term holds" : "terms that hold");

@@ -47,7 +47,7 @@ std::string Gain(const ordered_json& verdict) {
 report::Table VerdictTable(const ordered_json& summary) {
   report::Table t{{"log", "verdict", "error removed %", "terms, or what is wrong"}, {}};
   for (const auto& v : summary.at("verdicts")) {
-    const bool failed = v.at("verdict") == "failed", effect = v.at("verdict") == "effect";
+    const bool failed = Failed(v), effect = v.at("verdict") == "effect";
     t.rows.push_back(
         {v.at("name"), v.at("verdict"), effect ? Gain(v) : "-", failed ? v.at("error").get<std::string>() : Terms(v)});
   }
@@ -69,7 +69,7 @@ ordered_json SummaryJson(const Verdicts& verdicts) {
     const std::string verdict = v.at("verdict");
     s[verdict] = s[verdict].get<int>() + 1;
     ordered_json row{{"name", name}, {"verdict", verdict}};
-    if (verdict == "failed") {
+    if (Failed(v)) {
       row["error"] = v.at("error");
       s["verdicts"].push_back(row);
       continue;

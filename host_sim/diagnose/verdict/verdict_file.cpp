@@ -28,7 +28,7 @@ bool IsListOfErrors(const ordered_json& j, std::size_t joints) {
 // It has what summaries and the fleet's database read.
 bool IsVerdict(const ordered_json& j) {
   if (!j.is_object() || !j.contains("verdict")) return false;
-  if (j.at("verdict") == "failed") return j.contains("error") && j.at("error").is_string();
+  if (Failed(j)) return j.contains("error") && j.at("error").is_string();
   const bool known = j.at("verdict") == "none" || j.at("verdict") == "effect";
   if (!known || !j.contains("terms") || !j.contains("before_moving") || !j.contains("after_moving")) return false;
   const ordered_json& terms = j.at("terms");
@@ -42,6 +42,7 @@ bool IsVerdict(const ordered_json& j) {
 std::string JointText(const ordered_json& joint) { return joint.is_string() ? joint.get<std::string>() : joint.dump(); }
 
 ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed"}, {"error", why}}; }
+bool Failed(const ordered_json& verdict) { return verdict.at("verdict") == "failed"; }
 
 ordered_json ReadVerdict(const fs::path& path) {
   ordered_json j = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);

@@ -15,6 +15,7 @@ using Verdicts = std::map<std::string, nlohmann::ordered_json>;
 
 // {"verdict": "failed", "error": why}, what a log without a verdict leaves behind.
 nlohmann::ordered_json FailedVerdict(const std::string& why);
+bool Failed(const nlohmann::ordered_json& verdict);
 
 // A term's joint as a verdict has it: a number, or words as "5-6".
 std::string JointText(const nlohmann::ordered_json& joint);

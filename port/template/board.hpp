@@ -16,7 +16,8 @@ inline armcal::hardware::Storage Storage() { return target::TargetStorage(); }
 inline armcal::hardware::Clock Clock() { return target::TargetClock(); }
 inline armcal::hardware::Serial Serial() { return target::TargetSerial(); }
 
-// What a client may do. The defaults: a table is adopted only while all axes are disabled; five saves, then one a minute.
+// What a client may do. The defaults: a table is adopted only while all axes are disabled; five saves, then one a
+// minute.
 inline armcal::controller::BoardRules Rules() { return {}; }
 
 // Answers which axes are under control, one bit for each.
@@ -30,9 +31,11 @@ std::uint32_t Measure(armcal::model::RawSample<n>& raw, armcal::controller::SetP
   // controller.
   return 0;
 }
-inline void Command(const float*) {}  // here: [n] N m, to your current controllers
-inline void OnSerial() {}             // here: target::OnReceived(byte), target::NextToSend(byte)
-inline void Start(float) {}           // here: serial line on, tick interrupt at this rate in Hz
-inline void Sleep() {}                // here: until the next interrupt (wfi)
+// Here: [n] N m, to your current controllers. The current of joint i is the torque over the nominal torque constant and
+// over controller.feed_forward().torque_scale(i).
+inline void Command(const float*) {}
+inline void OnSerial() {}    // here: target::OnReceived(byte), target::NextToSend(byte)
+inline void Start(float) {}  // here: serial line on, tick interrupt at this rate in Hz
+inline void Sleep() {}       // here: until the next interrupt (wfi)
 
 }  // namespace board

@@ -69,14 +69,16 @@ double Amplitude(const TableRow& row) { return row.state == "standby" ? 0.0 : ro
 std::vector<GridFriction> FrictionOnGrid(const codegen::Model& m, const Ceilings& c, const model::CeilingView& view,
                                          const TableFile& t) {
   const bool history = (c.friction_reads & model::kReadsHistory) != 0;
-  const int n = m.joints(), points = model::GridPoints(c.friction_reads), each = history ? 2 : 1;
+  const int n = m.joints(), points = model::GridPoints(c.friction_reads, m.nonlinear()), each = history ? 2 : 1;
+  std::vector<double> eta;
+  for (int k = m.parameters() - m.nonlinear(); k < m.parameters(); ++k) eta.push_back(t.row[k].mean);
   codegen::Signals s;
   s.q = s.qd = s.temp = Eigen::MatrixXd(points * each, n);
   s.qdd = Eigen::MatrixXd::Zero(points * each, n);
   s.t = Eigen::VectorXd::LinSpaced(points * each, 0, double{model::kGridStep_s} * (points * each - 1));
   for (int p = 0; p < points; ++p) {
     Eigen::VectorXd q(n), qd(n), temp(n);
-    model::GridState(view, c.friction_reads, p, q.data(), qd.data(), temp.data());
+    model::GridState(view, c.friction_reads, p, eta.data(), q.data(), qd.data(), temp.data());
     for (int k = 0; k < each; ++k) {
       const int row = p * each + k;
       s.q.row(row) = q - (k + 1 < each ? double{model::kGridStep_s} : 0.0) * qd;
@@ -87,10 +89,9 @@ std::vector<GridFriction> FrictionOnGrid(const codegen::Model& m, const Ceilings
   Eigen::VectorXd bodies(m.body_parameters());
   for (int k = 0; k < bodies.size(); ++k) bodies[k] = Amplitude(t.row[k]);
   const Eigen::VectorXd base = m.base_map() * bodies;
-  std::vector<double> committed(m.columns()), eta;
+  std::vector<double> committed(m.columns());
   for (int k = 0; k < m.columns(); ++k)
     committed[k] = m.is_rigid(k) ? base[k - m.front()] : Amplitude(t.row[m.table_index(k)]);
-  for (int k = m.parameters() - m.nonlinear(); k < m.parameters(); ++k) eta.push_back(t.row[k].mean);
   std::vector<Eigen::MatrixXd> rows;
   m.Regressor(s, committed, eta, rows);
   std::vector<GridFriction> out;

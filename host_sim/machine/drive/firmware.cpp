@@ -112,10 +112,7 @@ class Compiled final : public Firmware {
     (void)controller_.FeedForward(target, temperature, tau);  // its state is served
     for (int j = 0; j < n; ++j) tau_Nm[j] = static_cast<double>(tau[j]);
   }
-  double torque_scale(int j) const override {
-    return controller_.feed_forward().valid() ? static_cast<double>(controller_.adopted().committed.torque_scale[j])
-                                              : 1.0;
-  }
+  double torque_scale(int j) const override { return static_cast<double>(controller_.feed_forward().torque_scale(j)); }
   void ReportTrackingError() override { controller_.ReportTrackingError(); }
   void Push(const Reading* readings) override {
     const std::uint32_t tick = tick_.load();

@@ -86,7 +86,7 @@ class Firmware {
   // Arrays [joints]. tau_Nm: zero without a table.
   virtual void FeedForward(const double* q, const double* qd, const double* qdd, const double* temperature_degC,
                            double* tau_Nm) = 0;
-  // Of the table in force; 1 without one.
+  // Of the table in force, faded like its torque; 1 without one.
   virtual double torque_scale(int joint) const = 0;
   // readings: [joints]. Ends the tick.
   virtual void Push(const Reading* readings) = 0;

@@ -78,7 +78,7 @@ class TableCheck {
 
   core::Refusal TryFriction() {
     core::Refusal refusal;
-    constexpr int kAll = model::GridPoints(Model::kFrictionReads);
+    constexpr int kAll = model::GridPoints(Model::kFrictionReads, Model::kNonlinear);
     for (int k = 0; k < kPoints && point_ < kAll && core::IsOk(refusal.status); ++k, ++point_)
       refusal = model::CheckFrictionAt(point_, spare_->committed, ceilings_, memory_, rows_);
     if (core::IsOk(refusal.status) && point_ < kAll) refusal.status = core::Status::kBusy;

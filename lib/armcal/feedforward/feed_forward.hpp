@@ -61,8 +61,8 @@ class FeedForward {
     state.t = t_s_ = t_s;
     model::ModelTorque(active_, state, active_memory_, rows_, now);
 
-    core::Status status = active_.valid ? core::Status::kOk : core::Status::kEmpty;
     const std::uint32_t fading = math::MaskOf(blending && previous_.valid);
+    core::Status status = active_.valid ? core::Status::kOk : core::Status::kEmpty;
     for (int i = 0; i < n; ++i) {
       const float old = math::Masked(before[i], fading);
       const bool usable = active_.valid && math::IsFinite(now[i]) && math::IsFinite(old);
@@ -71,12 +71,19 @@ class FeedForward {
       if (usable) Count(math::Abs(now[i]) > limit || math::Abs(old) > least, status);
       const float tau = share * Cut(now[i], limit) + (1.0f - share) * Cut(old, least);
       limit_Nm_[i] = least + share * (limit - least);
+      const float first_gain = math::Select(fading != 0u, first_gain_[i], next_gain_[i]);
+      gain_[i] = first_gain + share * (next_gain_[i] - first_gain);
       tau_Nm[i] = Cut(math::Masked(tau, math::MaskOf(usable)), limit_Nm_[i]);
       last_Nm_[i] = tau_Nm[i];
     }
     share_ = share;
     return status;
   }
+
+  // Joint i's torque scale, by which a torque is divided before it is turned into a motor current. It is that of the
+  // table in force. During a cross-fade its inverse goes from the old to the new in equal steps, so that the current
+  // does not step either. 1 without a valid table. Context: tick, after Evaluate.
+  float torque_scale(int i) const { return active_.valid ? 1.0f / gain_[i] : 1.0f; }
 
   std::uint32_t clamp_count() const { return clamp_count_; }  // how often a joint was cut to its limit
   std::uint32_t generation() const { return active_.generation; }
@@ -94,6 +101,7 @@ class FeedForward {
     constexpr auto kShortest = static_cast<std::uint32_t>(kShortestFade_s * Model::kTickRate_Hz);
     active_.blend_ticks = active_.bumpless ? math::Max(active_.blend_ticks, kShortest) : 0u;
     blended_ticks_ = 0;
+    for (int i = 0; i < n; ++i) next_gain_[i] = 1.0f / active_.torque_scale[i];
   }
 
   // Prepares the next fade. It starts from the torque of the last tick. If no fade is running, it starts from the
@@ -111,6 +119,7 @@ class FeedForward {
       const float rest = last_Nm_[i] - model::RowTorque(previous_p_, rows_, i);
       remainder_Nm_[i] = math::Masked(rest, math::MaskOf(was_fading && math::IsFinite(rest)));
       first_limit_Nm_[i] = limit_Nm_[i];
+      first_gain_[i] = gain_[i];
     }
     previous_ = active_;
     previous_memory_ = active_memory_;
@@ -131,12 +140,13 @@ class FeedForward {
   model::Committed<Model> active_, previous_;
   model::Memory<Model> active_memory_, previous_memory_;
   model::Rows<Model> rows_ = {};
-  float previous_p_[Model::kColumns] = {};    // amplitudes that a fade starts from, with the columns of previous_
-  float remainder_Nm_[n] = {};                // and a torque beside them
-  float first_limit_Nm_[n] = {};              // at the start of the fade
-  float limit_Nm_[n] = {}, last_Nm_[n] = {};  // of the last tick
-  float share_ = 0.0f, t_s_ = 0.0f;           // of the last tick
-  float previous_t_s_ = 0.0f;                 // the time of previous_ goes on
+  float previous_p_[Model::kColumns] = {};  // amplitudes that a fade starts from, with the columns of previous_
+  float remainder_Nm_[n] = {};              // and a torque beside them
+  float first_limit_Nm_[n] = {};            // at the start of the fade
+  float first_gain_[n] = {}, next_gain_[n] = {}, gain_[n] = {};  // 1 / torque scale: at its start and end, and now
+  float limit_Nm_[n] = {}, last_Nm_[n] = {};                     // of the last tick
+  float share_ = 0.0f, t_s_ = 0.0f;                              // of the last tick
+  float previous_t_s_ = 0.0f;                                    // the time of previous_ goes on
   std::uint32_t blended_ticks_ = 0;
   std::uint32_t clamp_count_ = 0;
 };

@@ -212,19 +212,21 @@ void Device::FillCommand(Words<reg::kCommandBlock>& w) {
 Status Device::TakeCommand(const Words<reg::kCommandBlock>& w) {
   const TableCommand command{w.Get<reg::kSequence>(), w.Get<reg::kCommand>(), w.Get<reg::kCommandSchema>(),
                              w.Get<reg::kCommandWords>(), w.Get<reg::kCommandCrc>()};
+  if (w.Get<reg::kCommandReserved>() != 0) return Status::kOutOfRange;
   // A client whose connection broke before the reply asks again over a new one, which has no seat.
-  if (w.Get<reg::kCommandReserved>() == 0 && transaction_.IsRepeat(command)) return Status::kOk;
+  if (transaction_.IsRepeat(command)) return Status::kOk;
   const Status unlocked = NeedsUnlock();
   if (!core::IsOk(unlocked)) return unlocked;
-  if (w.Get<reg::kCommandReserved>() != 0) return Status::kOutOfRange;
   return transaction_.Command(command, map_.sessions().asking());
 }
 
 void Device::FillTrialLimit(Words<reg::kTrialLimit>& w) { w.Set<reg::kTrialLimit>(transaction_.trial_limit_s()); }
 
 Status Device::TakeTrialLimit(const Words<reg::kTrialLimit>& w) {
+  const std::uint16_t limit_s = w.Get<reg::kTrialLimit>();
+  if (!TableTransaction::MayLast(limit_s)) return Status::kOutOfRange;
   const Status unlocked = NeedsUnlock();
-  return core::IsOk(unlocked) ? transaction_.SetTrialLimit(w.Get<reg::kTrialLimit>()) : unlocked;
+  return core::IsOk(unlocked) ? transaction_.SetTrialLimit(limit_s) : unlocked;
 }
 
 void Device::FillLog(Words<reg::kLogBlock>& w) {

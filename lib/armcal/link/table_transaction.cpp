@@ -111,7 +111,7 @@ std::uint32_t TableTransaction::save_wait_ms() const {
 }
 
 Status TableTransaction::SetTrialLimit(std::uint16_t limit_s) {
-  if (limit_s < 1 || limit_s > reg::kLongestTrial_s) return Status::kOutOfRange;
+  if (!MayLast(limit_s)) return Status::kOutOfRange;
   trial_limit_s_ = limit_s;
   return Status::kOk;
 }
@@ -159,11 +159,9 @@ Status TableTransaction::Open(const TableCommand& command) {
 
 // The length of what is loaded follows from the record, and not from the command.
 Status TableTransaction::Load(const TableCommand& command) {
-  if (const Status opened = Open(command); !core::IsOk(opened)) return opened;
-  if (const Status begun = store_.Copy(staged_); !core::IsOk(begun)) {
-    state_ = TransactionState::kIdle;
-    return begun;
-  }
+  const bool on_trial = state_ == TransactionState::kOnTrial;
+  if (const Status begun = on_trial ? Status::kWrongOrder : store_.Copy(staged_); !core::IsOk(begun)) return begun;
+  (void)Open(command);  // it is refused during a trial only
   checking_ = command;
   phase_ = Phase::kLoading;
   return Status::kUnfinished;
@@ -196,7 +194,7 @@ void TableTransaction::CheckNext() {
     sum_ = core::Crc32Words(staged_ + summed_, count, sum_);
     summed_ = static_cast<std::uint16_t>(summed_ + count);
     if (summed_ < staged_words_) return;
-    if (sum_ != checking_.crc) return Answer(Status::kBadCrc);
+    if (sum_ != checking_.crc) return Judged({Status::kBadCrc});
     first_ = true;
     sealing_ = signing_.required();
     if (sealing_) seal_.Begin(staged_, staged_words_, signing_, counter_);
@@ -375,12 +373,15 @@ void TableTransaction::Step(std::uint32_t now_ms, std::uint32_t tick) {
   }
 }
 
-// If doubts come up while a table on trial is being stored, the table before comes back at once, and the new record is
-// erased when it is whole.
+// If doubts come up while a table on trial is being stored, the table before comes back at once. The new record gets no
+// commit word, or is erased if it has one already.
 void TableTransaction::StoreNext() {
   if (confirming_ && core::IsOk(refusal_)) {
     refusal_ = application_.doubt(application_.context);
-    if (!core::IsOk(refusal_)) application_.give_back(application_.context);
+    if (!core::IsOk(refusal_)) {
+      application_.give_back(application_.context);
+      store_.Cancel();
+    }
   }
   const Status stored = store_.Step();
   if (stored == Status::kBusy) return;
@@ -395,7 +396,7 @@ void TableTransaction::StoreNext() {
   if (core::IsOk(refusal_)) application_.give_back(application_.context);
   SwapTables();
   if (core::IsOk(stored)) return Revoke(refusal_);
-  End(TransactionState::kFailed, stored);
+  End(TransactionState::kFailed, stored == Status::kEmpty ? refusal_ : stored);
 }
 
 // An axis may have been enabled after the application permitted the adoption. Wait until it is disabled, but not for

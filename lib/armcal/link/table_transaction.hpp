@@ -102,7 +102,8 @@ class TableTransaction {
   // write (state kIdle, status kTimeout). Ends a trial if it must (state kFailed, and the reason as status).
   void Step(std::uint32_t now_ms, std::uint32_t tick = 0);
 
-  // How long the next trial may last: 1 to reg::kLongestTrial_s. An open sets reg::kUsualTrial_s.
+  // How long the next trial may last. An open sets reg::kUsualTrial_s.
+  static constexpr bool MayLast(std::uint16_t limit_s) { return limit_s >= 1 && limit_s <= reg::kLongestTrial_s; }
   core::Status SetTrialLimit(std::uint16_t limit_s);
   std::uint16_t trial_limit_s() const { return trial_limit_s_; }
   std::uint16_t trial_left_s() const;  // 0: no trial

@@ -251,8 +251,9 @@ void Trace::FillAcknowledge(Words<reg::kTraceAcknowledge>& w) { w.Set<reg::kTrac
 
 Status Trace::TakeAcknowledge(const Words<reg::kTraceAcknowledge>& w) {
   if (OwnedByAnother()) return Status::kSeatTaken;
-  owner_ = sessions_->asking();
-  return Acknowledge(w.Get<reg::kTraceAcknowledge>());
+  const Status taken = Acknowledge(w.Get<reg::kTraceAcknowledge>());
+  if (core::IsOk(taken)) owner_ = sessions_->asking();
+  return taken;
 }
 
 }  // namespace armcal::link

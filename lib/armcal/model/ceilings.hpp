@@ -186,8 +186,10 @@ inline core::Refusal CheckWords(const CeilingView& ceilings, bool bumpless_allow
     if (!check.Positive(word, kNarrowestGate, kWidestGate)) return check.refusal();
   }
   const int seal = WordOfGate(ceilings.joints, ceilings.parameters, ceilings.joints);
-  for (int k = 0; k < kSealWords && !sealed; ++k)
-    if (!check.Bits(seal + k, 0)) return check.refusal();
+  for (int k = 0; k < kSealWords; ++k) {
+    const bool reserved = k >= kSealReserved && k < kSealReserved + kSealReservedWords;
+    if ((reserved || !sealed) && !check.Bits(seal + k, 0)) return check.refusal();
+  }
   return check.refusal();
 }
 

@@ -29,6 +29,7 @@ inline constexpr int kJointWords = 8;
 inline constexpr int kParameterWords = 8;
 inline constexpr int kGateWords = 2;
 inline constexpr int kSealWords = 40;  // the last words of every table of version 2; no part of the numbers
+inline constexpr int kSealReserved = 5, kSealReservedWords = 3;  // these of them are always 0
 
 struct JointEntry {
   float sigma_Nm;

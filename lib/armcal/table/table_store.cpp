@@ -166,7 +166,7 @@ Status TableStore::Save(const std::uint16_t* words, std::uint32_t count) {
   source_ = words;
   source_words_ = count;
   previous_ = current_;
-  revocable_ = false;
+  revocable_ = cancelled_ = committing_ = false;
   at_ = 0;
   stage_ = Stage::kErase;
   if (current_ >= 0) BeginRecheck(current_);
@@ -272,7 +272,9 @@ Status TableStore::Step() {
     case Stage::kIdle:
       return Status::kOk;
     case Stage::kRecheck:
-      return RecheckNext();
+      if (!cancelled_) return RecheckNext();
+      stage_ = Stage::kIdle;  // nothing is erased yet
+      return Status::kEmpty;
     case Stage::kErase:
       return EraseNext();
     case Stage::kProgram:
@@ -280,7 +282,7 @@ Status TableStore::Step() {
     case Stage::kVerify:
       return VerifyNext();
     case Stage::kCommit:
-      return Commit();
+      return cancelled_ && !committing_ ? Undo(Status::kEmpty) : Commit();
     case Stage::kVerifyCommit:
       return VerifyCommit();
     case Stage::kRevoke:
@@ -318,7 +320,7 @@ Status TableStore::EraseNext() {
   state_[target_] = SlotState::kCorrupt;  // until the new record is whole
   const Status erased = storage_.Erase(BaseOf(target_) + at_);
   if (erased == Status::kBusy) return erased;
-  if (!IsOk(erased)) return Abandon();
+  if (!IsOk(erased)) return Undo(Status::kStorageFault);
   ++at_;
   if (at_ * storage_.sector_bytes >= RecordBytes(source_words_, storage_.program_unit)) {
     stage_ = Stage::kProgram;
@@ -334,7 +336,7 @@ Status TableStore::ProgramNext() {
   FillBody(at_, bytes, count);
   const Status programmed = storage_.Program(AddressOf(target_) + at_, bytes, count);
   if (programmed == Status::kBusy) return programmed;
-  if (!IsOk(programmed)) return Abandon();
+  if (!IsOk(programmed)) return Undo(Status::kStorageFault);
   at_ += count;
   if (at_ == end) {
     stage_ = Stage::kVerify;
@@ -349,8 +351,8 @@ Status TableStore::VerifyNext() {
   std::uint8_t wanted[kChunkBytes];
   std::uint8_t found[kChunkBytes];
   FillBody(at_, wanted, count);
-  if (!IsOk(storage_.Read(AddressOf(target_) + at_, found, count))) return Abandon();
-  if (std::memcmp(wanted, found, count) != 0) return Abandon();
+  if (!IsOk(storage_.Read(AddressOf(target_) + at_, found, count))) return Undo(Status::kStorageFault);
+  if (std::memcmp(wanted, found, count) != 0) return Undo(Status::kStorageFault);
   at_ += count;
   if (at_ == end) stage_ = Stage::kCommit;
   return Status::kBusy;
@@ -360,9 +362,10 @@ Status TableStore::Commit() {
   std::uint8_t bytes[kChunkBytes];
   FillCommit(bytes);
   const std::uint32_t at = AddressOf(target_) + CommitAt();
+  committing_ = true;
   const Status committed = storage_.Program(at, bytes, RoundUp(4, storage_.program_unit));
   if (committed == Status::kBusy) return committed;
-  if (!IsOk(committed)) return Abandon();
+  if (!IsOk(committed)) return Undo(Status::kStorageFault);
   stage_ = Stage::kVerifyCommit;
   return Status::kBusy;
 }
@@ -370,7 +373,8 @@ Status TableStore::Commit() {
 Status TableStore::VerifyCommit() {
   std::uint8_t found[4];
   const std::uint32_t at = AddressOf(target_) + CommitAt();
-  if (!IsOk(storage_.Read(at, found, sizeof found)) || core::GetBytes32(found) != kCommitWord) return Abandon();
+  if (!IsOk(storage_.Read(at, found, sizeof found)) || core::GetBytes32(found) != kCommitWord)
+    return Undo(Status::kStorageFault);
   state_[target_] = SlotState::kGood;
   sequence_[target_] = core::GetBytes32(header_ + 16);
   length_[target_] = source_words_;
@@ -380,9 +384,10 @@ Status TableStore::VerifyCommit() {
   return Status::kOk;
 }
 
-// A record that failed must not be taken at the next power-up, even if only its commit word could not be read back.
-Status TableStore::Abandon() {
-  result_ = Status::kStorageFault;
+// Erases the new record. One that failed must not be taken at the next power-up, even if only its commit word could not
+// be read back. why: what the save then answers.
+Status TableStore::Undo(Status why) {
+  result_ = why;
   stage_ = Stage::kRevoke;
   return Status::kBusy;
 }

@@ -77,6 +77,10 @@ class TableStore {
   core::Status Save(const std::uint16_t* words, std::uint32_t count);
   core::Status Save(const std::uint16_t* words) { return Save(words, words_); }
 
+  // Asks a save to end without its commit word. Go on to call Step: it answers kEmpty when the save has ended so, and
+  // the table before is in force. If the commit word is already being written, the save is completed: kOk.
+  void Cancel() { cancelled_ = true; }
+
   // Takes the last completed save back: erases its slot, so that the table before it is in force again. Call Step until
   // it no longer answers kBusy. kOk: it has begun. kWrongOrder: no completed save to take back. kBusy: a save is
   // running.
@@ -95,9 +99,10 @@ class TableStore {
     if (stage_ == Stage::kCopy) stage_ = Stage::kIdle;
   }
 
-  // One piece of a save, of Revoke or of Copy. kBusy: call again. kOk: nothing is left to do. kCorrupt: the record that
-  // Copy reads has changed. kStorageFault: the storage failed; the table before a save or a Revoke is in force. If the
-  // driver has also refused to erase the new record (slot_state: kCorrupt), the next power-up may load that record.
+  // One piece of a save, of Revoke or of Copy. kBusy: call again. kOk: nothing is left to do. kEmpty: see Cancel.
+  // kCorrupt: the record that Copy reads has changed. kStorageFault: the storage failed; the table before a save or a
+  // Revoke is in force. If the driver has also refused to erase the new record (slot_state: kCorrupt), the next
+  // power-up may load that record.
   core::Status Step();
 
   bool busy() const { return stage_ != Stage::kIdle; }
@@ -146,7 +151,7 @@ class TableStore {
   core::Status Commit();
   core::Status VerifyCommit();
   core::Status EraseTarget();
-  core::Status Abandon();
+  core::Status Undo(core::Status why);
 
   hardware::Storage storage_;
   std::uint32_t schema_;
@@ -158,7 +163,7 @@ class TableStore {
   int previous_ = -1;                      // the slot that Revoke puts in force again
 
   Stage stage_ = Stage::kIdle;
-  bool revocable_ = false;
+  bool revocable_ = false, cancelled_ = false, committing_ = false;
   int target_ = 0;
   int checking_ = 0;         // slot that is read once more before the erase, or copied
   int passes_ = 0;           // how often it was read well

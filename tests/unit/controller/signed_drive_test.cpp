@@ -75,6 +75,7 @@ TEST(SignedDrive, KeepsItsCeilings) {
   Words words = Plain(1);
   core::PutF32(&words[model::WordOfJoint(1) + 4], 1e6f);
   EXPECT_EQ(drive->Flash(test::Signed(words, kSerial, 1, kOwnKey)), Status::kBeyondCeiling);
+  EXPECT_EQ(drive->Flash(test::Signed(Plain(1), kSerial, 1, kOwnKey, 1, 0xDEAD)), Status::kOutOfRange);
   EXPECT_EQ(drive->Value<reg::kSigningCounter>(), 0u) << "the counter is still free";
 }
 

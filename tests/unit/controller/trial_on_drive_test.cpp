@@ -127,6 +127,14 @@ TEST(TrialOnDrive, FadesInAndOut_AlsoWhileAxesAreEnabled) {
   follow(heavy, light);
 }
 
+// A number outside its range is named first, whoever writes it.
+TEST(TrialOnDrive, ALimitOutsideItsRange_IsRefusedBeforeTheSeatIsLookedAt) {
+  const auto drive = std::make_unique<Drive>();
+  EXPECT_EQ(drive->WriteValue<reg::kTrialLimit>(0), Status::kOutOfRange);
+  EXPECT_EQ(drive->WriteValue<reg::kTrialLimit>(3601), Status::kOutOfRange);
+  EXPECT_EQ(drive->WriteValue<reg::kTrialLimit>(7), Status::kLocked);
+}
+
 TEST(TrialOnDrive, WhileAxesAreEnabled_IsRefusedToATableThatIsNotBumpless) {
   const auto drive = std::make_unique<Drive>();
   ASSERT_EQ(drive->Flash(TableWithMass(1.0f)), Status::kOk);

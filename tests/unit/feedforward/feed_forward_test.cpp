@@ -127,6 +127,31 @@ TEST_F(FeedForwardTest, BumplessTable_IsCrossFadedWithoutAStep) {
   EXPECT_NEAR(tau[0], Exact(c, 0), 1e-5 * 100);
 }
 
+// The current is the torque over the torque scale. So the inverse of the scale goes in equal steps, also when a fade
+// begins inside a fade.
+TEST_F(FeedForwardTest, TorqueScale_FadesLikeTheTorque) {
+  EXPECT_EQ(ff->torque_scale(0), 1.0f);
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  EXPECT_EQ(ff->torque_scale(0), 1.0f);
+  Set next = Example(2);
+  next.bumpless = true, next.blend_ticks = 100;
+  next.torque_scale[0] = 0.5f, next.torque_scale[1] = 2.0f;
+  ASSERT_EQ(ff->Offer(next, true), Status::kOk);
+  for (int k = 1; k <= 40; ++k) {
+    ASSERT_EQ(Evaluate(), Status::kOk);
+    EXPECT_NEAR(1 / ff->torque_scale(0), 1 + 0.01 * k, 1e-5) << k;
+    EXPECT_NEAR(1 / ff->torque_scale(1), 1 - 0.005 * k, 1e-5) << k;
+  }
+  next.generation = 3, next.torque_scale[0] = 1.0f;
+  ASSERT_EQ(ff->Offer(next, true), Status::kOk);
+  for (int k = 1; k <= 120; ++k) {
+    ASSERT_EQ(Evaluate(), Status::kOk);
+    EXPECT_NEAR(1 / ff->torque_scale(0), 1.4 - 0.004 * std::min(k, 100), 1e-5) << k;
+  }
+  EXPECT_EQ(ff->torque_scale(1), 2.0f);
+}
+
 TEST_F(FeedForwardTest, FirstBumplessTable_FadesInFromZero) {
   Set c = Example(1);
   c.bumpless = true;

@@ -19,13 +19,16 @@ inline Key MakeKey(int number) {
 }
 
 // What SPEC.md says of the seal: in the last 40 words serial number, counter, method, three zeros, and the code of
-// all words before the last 32. `words`: a table of layout version 2.
+// all words before the last 32. reserved: stands in place of the first zero. `words`: a table of layout version 2.
 inline std::vector<std::uint16_t> Signed(std::vector<std::uint16_t> words, std::uint32_t serial, std::uint32_t counter,
-                                         const Key& key, std::uint16_t method = 1) {
+                                         const Key& key, std::uint16_t method = 1, std::uint16_t reserved = 0) {
   std::uint16_t* seal = words.data() + words.size() - 40;
-  const std::uint16_t head[8] = {static_cast<std::uint16_t>(serial >> 16), static_cast<std::uint16_t>(serial),
-                                 static_cast<std::uint16_t>(counter >> 16), static_cast<std::uint16_t>(counter),
-                                 method};
+  const std::uint16_t head[8] = {static_cast<std::uint16_t>(serial >> 16),
+                                 static_cast<std::uint16_t>(serial),
+                                 static_cast<std::uint16_t>(counter >> 16),
+                                 static_cast<std::uint16_t>(counter),
+                                 method,
+                                 reserved};
   for (int k = 0; k < 40; ++k) seal[k] = k < 8 ? head[k] : std::uint16_t{0};
   std::vector<std::uint8_t> bytes;
   for (std::size_t k = 0; k + 32 < words.size(); ++k) {

@@ -187,6 +187,14 @@ TEST_F(Transaction, WrongTables_AreRefused_AndNothingIsStored) {
   Stage(words);
   words[100] ^= 1;
   EXPECT_EQ(Do(reg::kCheck, words), Status::kBadCrc);
+  words[100] ^= 1;
+  ASSERT_EQ(Do(reg::kCheck, words), Status::kOk);
+  words[100] ^= 1;
+  EXPECT_EQ(Do(reg::kCheck, words), Status::kBadCrc);
+  EXPECT_EQ(t().state(), TransactionState::kLoading);
+  EXPECT_EQ(t().refusal().status, Status::kBadCrc);
+  words[100] ^= 1;
+  EXPECT_EQ(Do(reg::kSave, words), Status::kWrongOrder) << "what an earlier check accepted can no longer be saved";
 
   Words unphysical = MakeTable(1);
   unphysical[5] = test::kBadPhysics;

@@ -223,6 +223,56 @@ TEST(Store, Revoked_IsAsBeforeTheSave_AlsoOnABusyFlash) {
   }
 }
 
+// Until the commit word is being written, a cancelled save leaves no record: not for a moment, and not on a busy flash.
+TEST(Store, CancelledSave_NeverBecomesWhole) {
+  for (const test::Geometry& geometry : {kNor, test::Geometry{2, 512, 8, 0xFF, 2, 3}}) {
+    NorFlash whole(geometry);
+    Prepare(whole, 1);
+    const auto first = whole.operations();
+    Prepare(whole, 2);
+    const auto each = whole.operations() - first;  // the last one writes the commit word
+    int cancelled = 0, completed = 0;
+    for (int steps = 0; completed == 0; ++steps) {
+      ASSERT_LT(steps, 1000);
+      NorFlash flash(geometry);
+      Prepare(flash, 1);
+      TableStore store(flash.storage(), kSchema, kWords);
+      Words words(kWords);
+      ASSERT_EQ(store.Load(words.data()), Status::kOk);
+      const Words next = Table(2);
+      ASSERT_EQ(store.Save(next.data()), Status::kOk);
+      for (int k = 0; k < steps; ++k) ASSERT_EQ(store.Step(), Status::kBusy);
+      const int left = each - (flash.operations() - first);
+      store.Cancel();
+      Status status = Status::kBusy;
+      bool was_whole = false;
+      while (status == Status::kBusy) {
+        status = store.Step();
+        NorFlash cut = flash;
+        cut.PowerUp();
+        was_whole |= Boot(cut) == next;
+      }
+      EXPECT_FALSE(flash.misused()) << steps;
+      // A busy flash counts an operation at its end.
+      const bool may_be_writing = left == 0 || (left == 1 && geometry.busy_program != 0);
+      ASSERT_TRUE(status == Status::kEmpty || (status == Status::kOk && may_be_writing)) << steps;
+      if (status == Status::kOk) {
+        ++completed;
+        EXPECT_EQ(Boot(flash), next);
+        continue;
+      }
+      ++cancelled;
+      EXPECT_FALSE(was_whole) << steps;
+      EXPECT_FALSE(store.busy());
+      EXPECT_EQ(store.sequence(), 1u);
+      EXPECT_EQ(Boot(flash), Table(1)) << steps;
+      ASSERT_EQ(SaveAll(store, Table(3)), Status::kOk) << "the next save is none the worse for it";
+      EXPECT_EQ(Boot(flash), Table(3));
+    }
+    EXPECT_GT(cancelled, 10);
+  }
+}
+
 TEST(Store, WithAWrappedSequence_TakesTheNewerOne) {
   NorFlash flash(kNor);
   Prepare(flash, 1);

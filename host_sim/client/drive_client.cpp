@@ -32,6 +32,7 @@ constexpr int kLongestPause_ms = 30;     // inside what comes from a serial line
 constexpr int kByteTimeout_us = 100000;  // inside a reply, on a serial line
 
 void CloseAndFree(_modbus* connection) {
+  SetExclusive(modbus_get_socket(connection), false);  // nothing on a socket
   modbus_close(connection);
   modbus_free(connection);
 }
@@ -98,9 +99,11 @@ void DriveClient::Connect() {
   modbus_set_slave(fresh.get(), unit_);
   if (modbus_connect(fresh.get()) != 0)
     throw LinkError(fmt::format("{}: cannot connect: {}; {}", name_, modbus_strerror(errno),
-                                line_ ? "is the adapter plugged in, and is this its name?"
-                                      : "is a drive running there, and is this its port?"));
+                                !line_           ? "is a drive running there, and is this its port?"
+                                : errno == EBUSY ? "does another program use it?"
+                                                 : "is the adapter plugged in, and is this its name?"));
   if (line_) {
+    SetExclusive(modbus_get_socket(fresh.get()), true);
     if (const int got = SetSpeed(modbus_get_socket(fresh.get()), line_->baud);
         got == 0 || std::abs(got - line_->baud) > line_->baud / 50)
       throw LinkError(fmt::format("{}: the adapter cannot run at {} baud{}", name_, line_->baud,
@@ -143,7 +146,8 @@ void DriveClient::DropLateReplies() {
 // refused; so a refusal to read is believed when it comes twice.
 void DriveClient::Request(const std::string& what, const std::function<int(_modbus*)>& call, Patience patience,
                           bool reads) {
-  int refused = 0;  // the exception of the attempt before
+  int refused = 0;     // the exception of the attempt before
+  int unanswered = 0;  // attempts over a connection
   const auto start = std::chrono::steady_clock::now();
   for (int attempt = 0;; ++attempt) {
     const bool over = std::chrono::steady_clock::now() - start >= kBudget;
@@ -159,12 +163,12 @@ void DriveClient::Request(const std::string& what, const std::function<int(_modb
       }
       failure = fmt::format("{}: {}: {}", name_, what, modbus_strerror(errno));
       AfterFailure(errno == ETIMEDOUT);
-    } catch (const LinkError& error) {  // it cannot connect; a line that was pulled out may be plugged in again
-      if (!line_) throw;
+      ++unanswered;
+    } catch (const LinkError& error) {  // it cannot connect anew: a drive may restart, a line may be plugged in again
       failure = error.what();
       std::this_thread::sleep_for(kPause);
     }
-    if (over || (!line_ && attempt + 1 == kTcpAttempts))
+    if (over || (!line_ && unanswered == kTcpAttempts))
       throw LinkError(fmt::format("{} (tried {} times)", failure, attempt + 1));
   }
 }

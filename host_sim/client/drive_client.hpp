@@ -50,7 +50,8 @@ enum class Patience {
 
 // Every call throws LinkError after three attempts over TCP, two seconds each, or after six seconds on a serial line,
 // without a sensible answer. Over TCP it connects anew between attempts; on a serial line it waits for silence first.
-// So a late answer is not taken for the next one. A serial adapter that was pulled out may come back meanwhile. It
+// So a late answer is not taken for the next one. A serial adapter that was pulled out or a drive that restarts may
+// come back meanwhile: a connection that was once up is tried for six seconds. The first connection is tried once. It
 // throws RefusedError, with the drive's own reason, if the drive answers with an exception. An attempt may be repeated
 // because every armcal write may come twice.
 class DriveClient {

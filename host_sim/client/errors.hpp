@@ -13,6 +13,11 @@ struct LinkError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// The link was lost after the drive was told to take a table. Whether it has done so is unknown.
+struct SentError : LinkError {
+  using LinkError::LinkError;
+};
+
 // The drive refused. `status` is its reason, or kOk if it gave none. The tool exits with 4.
 struct RefusedError : std::runtime_error {
   RefusedError(const std::string& what, int exception_code, core::Status reason)

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <numbers>
@@ -15,6 +16,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/line_load.hpp"
 #include "host_sim/client/packed_records.hpp"
+#include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/vendor_registers.hpp"
 #include "host_sim/data/report/progress.hpp"
 #include "host_sim/data/trajectory/trajectory.hpp"
@@ -41,7 +43,11 @@ Player ReadPlayer(DriveClient& drive) {
           core::GetU32(&w[6])};
 }
 
-void Upload(DriveClient& drive, const trajectory::Trajectory& t) {
+void ThrowIfInterrupted(const RecordOptions& o) {
+  if (o.interrupted != nullptr && *o.interrupted) throw LinkError("interrupted");
+}
+
+void Upload(DriveClient& drive, const RecordOptions& o, const trajectory::Trajectory& t) {
   const int n = t.joints(), points = static_cast<int>(t.q.rows()), chunk = (kPlayerPointsCount - 2) / (2 * n);
   std::uint16_t setup[4];
   core::PutU32(setup, points);
@@ -50,6 +56,7 @@ void Upload(DriveClient& drive, const trajectory::Trajectory& t) {
   report::Progress progress("load trajectory");
   std::vector<std::uint16_t> w;
   for (int first = 0; first < points; first += chunk) {
+    ThrowIfInterrupted(o);
     const int count = std::min(chunk, points - first);
     w.assign(2 + 2 * n * count, 0);
     core::PutU32(w.data(), first);
@@ -169,49 +176,111 @@ void KeepLongestRun(TraceRecords& r) {
   cut(r.ticks, 1), cut(r.generations, 1), cut(r.words, r.record_words);
 }
 
+// A window of `ticks` ticks from `first` on lies whole in the played part; ticks wrap.
+bool Inside(std::uint32_t first, std::uint32_t ticks, const PlayedTicks& played) {
+  return first - played.first < 0x80000000u && played.last - (first + ticks - 1) < 0x80000000u;
+}
+
+// Stops and disables the arm of a drive that plays, on each way out.
+class ArmGuard {
+ public:
+  ArmGuard(DriveClient& drive, std::optional<Traces>& traces) : drive_(drive), traces_(traces) {}
+  ~ArmGuard() {
+    if (!released_) (void)TryRelease();
+  }
+  ArmGuard(const ArmGuard&) = delete;
+  ArmGuard& operator=(const ArmGuard&) = delete;
+
+  void Command(PlayerCommand command) { drive_.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(command)); }
+  void Enable() {
+    enabled_ = true;
+    Command(PlayerCommand::kEnable);
+  }
+  void Release() {
+    released_ = true;
+    Command(PlayerCommand::kStop);
+    Command(PlayerCommand::kDisable);
+    try {  // a drive in virtual time waits for whoever reads a trace
+      if (traces_) traces_->Stop();
+    } catch (const RefusedError&) {  // another client has taken it
+    }
+    WaitFor(drive_, "axes disabled", [&] { return ReadPlayer(drive_).state == PlayerState::kDisabled; });
+  }
+  // False: the drive did not answer, or it refused.
+  bool TryRelease() {
+    try {
+      Release();
+      return true;
+    } catch (const std::exception&) {
+      return false;
+    }
+  }
+  // It was told so at least.
+  bool enabled() const { return enabled_; }
+
+ private:
+  DriveClient& drive_;
+  std::optional<Traces>& traces_;
+  bool enabled_ = false, released_ = false;
+};
+
+// Takes records until the motion has ended and no more come. `player` is what the drive said last.
+void TakeMotion(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot, double duration_s,
+                Traces& traces, Recording& recording, Player& player) {
+  report::Progress progress("record");
+  // A drive in virtual time stands still soon after the motion, and then there are no more records. The tick of a
+  // real drive goes on: what comes half a second later belongs to no motion.
+  int quiet = 0;  // looks in a row that found nothing after the motion
+  const auto rest_ticks = static_cast<std::int32_t>(0.5 * robot.tick_rate_Hz);
+  const auto over = [&](const TraceRecords& r) {
+    return !r.ticks.empty() && static_cast<std::int32_t>(r.ticks.back() - player.last_tick) > rest_ticks;
+  };
+  for (bool moved = false, done = false; !done;) {
+    ThrowIfInterrupted(o);
+    const std::size_t got = traces.Take(recording);
+    player = ReadPlayer(drive);
+    moved = moved || player.moving() || player.state == PlayerState::kFinished || player.state == PlayerState::kStopped;
+    if (player.state == PlayerState::kPlaying && !recording.raw.ticks.empty())
+      progress.Set(
+          std::max(0.0, static_cast<double>(static_cast<std::int32_t>(recording.raw.ticks.back() - player.first_tick)) /
+                            robot.tick_rate_Hz / duration_s * o.speed_percent / 100));
+    const bool ended = moved && !player.moving();
+    quiet = ended && got == 0 ? quiet + 1 : 0;
+    const bool all_came = over(recording.raw) && (o.samples.empty() || over(recording.samples));
+    done = ended && (quiet == 10 || all_came || player.state == PlayerState::kStopped);
+  }
+}
+
 // The drive plays the trajectory.
 Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
   const trajectory::Trajectory trajectory = trajectory::ReadTrajectory(o.trajectory, robot.joints());
-  Upload(drive, trajectory);
-  drive.WriteSingle(kPlayerSpeed, static_cast<std::uint16_t>(o.speed_percent));
-  drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kEnable));
-  WaitFor(drive, "axes enabled", [&] { return ReadPlayer(drive).state != PlayerState::kDisabled; });
   Recording recording;
-  Traces traces(drive, o, robot, recording);
-  drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kStart));
   Player player{};
+  std::optional<Traces> traces;
+  ArmGuard arm(drive, traces);
   try {
-    report::Progress progress("record");
-    // A drive in virtual time stands still soon after the motion, and then there are no more records. The tick of a
-    // real drive goes on: what comes half a second later belongs to no motion.
-    int quiet = 0;  // looks in a row that found nothing after the motion
-    const auto rest_ticks = static_cast<std::int32_t>(0.5 * robot.tick_rate_Hz);
-    const auto over = [&](const TraceRecords& r) {
-      return !r.ticks.empty() && static_cast<std::int32_t>(r.ticks.back() - player.last_tick) > rest_ticks;
-    };
-    for (bool moved = false, done = false; !done;) {
-      const std::size_t got = traces.Take(recording);
-      player = ReadPlayer(drive);
-      moved =
-          moved || player.moving() || player.state == PlayerState::kFinished || player.state == PlayerState::kStopped;
-      if (player.state == PlayerState::kPlaying && !recording.raw.ticks.empty())
-        progress.Set(std::max(
-            0.0, static_cast<double>(static_cast<std::int32_t>(recording.raw.ticks.back() - player.first_tick)) /
-                     robot.tick_rate_Hz / trajectory.duration_s() * o.speed_percent / 100));
-      const bool ended = moved && !player.moving();
-      quiet = ended && got == 0 ? quiet + 1 : 0;
-      const bool all_came = over(recording.raw) && (o.samples.empty() || over(recording.samples));
-      done = ended && (quiet == 10 || all_came || player.state == PlayerState::kStopped);
-    }
+    Upload(drive, o, trajectory);
+    drive.WriteSingle(kPlayerSpeed, static_cast<std::uint16_t>(o.speed_percent));
+    traces.emplace(drive, o, robot, recording);
+    arm.Enable();
+    WaitFor(drive, "axes enabled", [&] {
+      ThrowIfInterrupted(o);
+      traces->Take(recording);
+      return ReadPlayer(drive).state != PlayerState::kDisabled;
+    });
+    arm.Command(PlayerCommand::kStart);
+    TakeMotion(drive, o, robot, trajectory.duration_s(), *traces, recording, player);
+    arm.Release();
   } catch (const LinkError& error) {
-    if (player.state != PlayerState::kPlaying || recording.raw.ticks.empty()) throw;
-    recording.cut = error.what();
-    recording.played = {player.first_tick, recording.raw.ticks.back() + recording.raw.tick_step - 1};
+    std::string why = error.what();
+    if (!arm.TryRelease() && arm.enabled()) why += "; the arm may still be moving and enabled";
+    const bool finished = player.state == PlayerState::kFinished;
+    if ((player.state != PlayerState::kPlaying && !finished) || recording.raw.ticks.empty()) throw LinkError(why);
+    recording.cut = why;
+    recording.played = {player.first_tick,
+                        finished ? player.last_tick : recording.raw.ticks.back() + recording.raw.tick_step - 1};
     return recording;
   }
-  traces.Stop();
-  drive.WriteSingle(kPlayerCommand, static_cast<std::uint16_t>(PlayerCommand::kDisable));
-  WaitFor(drive, "axes disabled", [&] { return ReadPlayer(drive).state == PlayerState::kDisabled; });
   if (player.state == PlayerState::kStopped)
     throw RefusedError(drive.name() + ": the motion was stopped: " + Describe(player), 0, core::Status::kHeld);
   recording.played = {player.first_tick, player.last_tick};
@@ -227,8 +296,8 @@ Recording Watch(DriveClient& drive, const RecordOptions& o, const codegen::Robot
   report::Progress progress("record");
   Clock::time_point last = Clock::now();
   try {
-    for (double seconds = 0; seconds < o.seconds;) {
-      if (o.interrupted != nullptr && *o.interrupted) throw LinkError("interrupted");
+    for (double seconds = 0; raw.ticks.empty() || seconds < o.seconds;) {
+      ThrowIfInterrupted(o);
       if (traces.Take(recording) > 0) last = Clock::now();
       if (Clock::now() - last > std::chrono::seconds(10))
         throw LinkError(
@@ -247,34 +316,47 @@ Recording Watch(DriveClient& drive, const RecordOptions& o, const codegen::Robot
   return recording;
 }
 
-// Throws io::InputError, RefusedError.
-void CheckDrive(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
+// Returns the drive's schema. Throws io::InputError, RefusedError.
+std::uint32_t CheckDrive(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
   const Identity id = drive.ReadIdentity();
-  if (id.axes != robot.joints())
-    throw io::InputError(
-        fmt::format("{}: {} axes, robot {} has {}", drive.name(), id.axes, robot.name, robot.joints()));
+  const auto same = [&](const char* what, double of_drive, double of_robot) {
+    if (std::abs(of_drive - of_robot) >= 1)
+      throw io::InputError(
+          fmt::format("{}: {:g} {}, robot {} has {:g}; give the robot file that the drive was built for", drive.name(),
+                      of_drive, what, robot.name, of_robot));
+  };
+  same("axes", id.axes, robot.joints());
+  same("ticks a second", id.tick_rate_Hz, robot.tick_rate_Hz);
+  same("ticks a sample", id.sample_ticks, robot.sample_ticks);
   const auto need = [&](std::uint32_t capability, const char* what) {
     if ((id.capabilities & capability) == 0)
       throw RefusedError(fmt::format("{}: serves no {}", drive.name(), what), 0, core::Status::kBadAddress);
   };
   need(reg::kHasRawTrace, "raw trace (Controller::Record)");
   if (!o.samples.empty()) need(reg::kHasSampleTrace, "trace of processed samples, for --samples");
-  if (o.trajectory.empty()) return;
   try {
-    (void)ReadPlayer(drive);
+    if (!o.trajectory.empty()) (void)ReadPlayer(drive);
   } catch (const RefusedError&) {
     throw RefusedError(drive.name() +
                            ": plays no trajectories; move the arm by its own controller, with --seconds "
                            "instead of --trajectory",
                        0, core::Status::kBadAddress);
   }
+  if (id.schema != o.schema)  // the drive's model may only have other effects, which change no log
+    fmt::print(
+        stderr,
+        "armcal: {}: the drive runs schema {}, robot {} has {}; if this is the robot file of another arm, the log "
+        "is wrong\n",
+        drive.name(), CrcText(id.schema), robot.name, CrcText(o.schema));
+  return id.schema;
 }
 
 }  // namespace
 
 Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot) {
-  CheckDrive(drive, o, robot);
+  const std::uint32_t schema = CheckDrive(drive, o, robot);
   Recording recording = o.trajectory.empty() ? Watch(drive, o, robot) : Play(drive, o, robot);
+  recording.schema = schema;
   recording.failed_attempts = drive.failed_attempts();
   if (const std::uint32_t lost = recording.raw.lost + recording.samples.lost; lost > 0 && recording.cut.empty())
     recording.cut = fmt::format(
@@ -282,7 +364,10 @@ Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robo
         drive.name(), lost);
   if (!recording.cut.empty()) {  // nothing is glued over a gap
     KeepLongestRun(recording.raw), KeepLongestRun(recording.samples);
-    if (recording.raw.count() < logs::kMinSamples) throw LinkError(recording.cut + "; nothing is kept");
+    const auto played = std::count_if(recording.raw.ticks.begin(), recording.raw.ticks.end(), [&](std::uint32_t tick) {
+      return Inside(tick, recording.raw.tick_step, recording.played);
+    });
+    if (played < logs::kMinSamples) throw LinkError(recording.cut + "; nothing is kept");
   }
   if (recording.packed) {
     Unpacked plain = Unpack(recording.raw, robot.joints());
@@ -313,11 +398,6 @@ struct AxisScale {
     }
   }
 };
-
-// A window of `ticks` ticks from `first` on lies whole in the played part; ticks wrap.
-bool Inside(std::uint32_t first, std::uint32_t ticks, const PlayedTicks& played) {
-  return first - played.first < 0x80000000u && played.last - (first + ticks - 1) < 0x80000000u;
-}
 
 }  // namespace
 

@@ -21,7 +21,8 @@ struct RecordOptions {
   double seconds = 0;
   int speed_percent = 100, decimation = 0;
   bool lean = false;
-  const std::atomic<bool>* interrupted = nullptr;  // ends a recording of --seconds early, as a partial one
+  std::uint32_t schema = 0;                        // the robot's
+  const std::atomic<bool>* interrupted = nullptr;  // ends a recording early, as a partial one
 };
 
 struct Recording {
@@ -31,13 +32,16 @@ struct Recording {
   bool packed = false;      // the drive's packed records were taken
   std::size_t unknown = 0;  // of those: positions that could not be told
   int decimation = 0, wanted_decimation = 0;
-  int failed_attempts = 0;  // requests that had to be repeated
+  int failed_attempts = 0;   // requests that had to be repeated
+  std::uint32_t schema = 0;  // the drive's
 };
 
 // The trajectory if there is one, else so many seconds. On a serial line that cannot carry the records, it says so
 // before the recording begins, and takes a larger decimation. What came before the link broke or records were lost is
-// kept if it makes a log: then `cut` says why. Throws io::InputError (another robot, a bad trajectory, a line too slow
-// for any decimation), RefusedError (the drive serves no trace or plays none; the motion was stopped), LinkError.
+// kept if it makes a log: then `cut` says why. A drive that plays is stopped and disabled at the end, and after each
+// failure; if that fails, the message says so. A drive of another schema is named on stderr. Throws io::InputError
+// (another number of joints, another tick, a bad trajectory, a line too slow for any decimation), RefusedError (the
+// drive serves no trace or plays none; the motion was stopped), LinkError.
 Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robot& robot);
 
 // Trace 0, with motion and flags and whatever else its channels hold. Records whose whole window lies inside the played

@@ -20,6 +20,8 @@ int SetSpeed(int descriptor, int baud) {
   return static_cast<int>(settings.c_ospeed);
 }
 
+void SetExclusive(int descriptor, bool exclusive) { ioctl(descriptor, exclusive ? TIOCEXCL : TIOCNXCL); }
+
 bool DrainToSilence(int descriptor, int quiet_ms) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::seconds(2);

@@ -18,6 +18,9 @@ struct SerialLine {
 // Sets an open line to any speed. Returns the speed that the hardware took, 0 if it took none.
 int SetSpeed(int descriptor, int baud);
 
+// Whether the line belongs to this program alone until it is closed. Programs of root may open it all the same.
+void SetExclusive(int descriptor, bool exclusive);
+
 // Reads and drops what comes until nothing has come for `quiet_ms`. False: bytes were still coming after two seconds.
 bool DrainToSilence(int descriptor, int quiet_ms);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,7 +18,12 @@ std::string CrcText(std::uint32_t crc);
 nlohmann::ordered_json BackupJson(std::span<const std::uint16_t> words, std::uint32_t schema,
                                   std::uint32_t serial_number);
 
-// The words of such a file. Throws io::InputError: it is another file, or its words and its checksum differ.
-std::vector<std::uint16_t> ReadBackup(const std::string& path);
+struct TableBackup {
+  std::vector<std::uint16_t> words;
+  std::optional<std::uint32_t> serial_number;  // of the drive that it comes from, if the file tells it
+};
+
+// Throws io::InputError: it is another file, or its words differ from its checksum or its schema.
+TableBackup ReadBackup(const std::string& path);
 
 }  // namespace armcal::client

@@ -34,6 +34,9 @@ class Flash {
  public:
   Flash(DriveClient& drive, const Key* key) : drive_(drive), key_(key) {}
 
+  // The last command, once it was sent; 0 before.
+  std::uint32_t finishing() const { return finishing_; }
+
   // From unlock to the last command. The drive drops what was staged when the connection breaks, and then all begins
   // anew. limit_s: of a trial; 0: the table is saved.
   void Send(std::span<const std::uint16_t> words, int limit_s, const FlashProgress& progress) {
@@ -69,11 +72,11 @@ class Flash {
   // Of the table that is on trial.
   void Confirm() {
     SetWords(ReadActiveTable(drive_));
-    Repeat([&] { Finish(reg::kConfirm); });
+    Repeat([&] { Finish(reg::kConfirm); }, true);
   }
   void Back() {
     SetWords(ReadActiveTable(drive_));
-    Repeat([&] { Command(reg::kBack); });
+    Repeat([&] { Command(reg::kBack); }, true);
   }
 
   // Another client may write at once. A drive that does not know how to be left is left all the same.
@@ -96,22 +99,9 @@ class Flash {
  private:
   // Signed with the next counter if the drive asks for it. A counter is used once, so each round takes another one.
   std::vector<std::uint16_t> AsTheDriveWants(std::span<const std::uint16_t> words) {
-    const Identity id = drive_.ReadIdentity();
-    const auto method = id.map_minor < kMinorOfLayout2
-                            ? link::SealMethod::kNone
-                            : static_cast<link::SealMethod>(drive_.ReadValue<reg::kSigning>());
-    const auto refuse = [&](const char* why) {
-      throw RefusedError(fmt::format("{}: {}", drive_.name(), why), 0, core::Status::kBadSignature);
-    };
-    if (method == link::SealMethod::kNone) {
-      if (key_ != nullptr) refuse("takes tables without a signature; leave --key out");
-      return {words.begin(), words.end()};
-    }
-    if (method != link::SealMethod::kHmac) refuse("takes tables that are signed in its board's own way only");
-    if (key_ == nullptr) refuse("takes signed tables only; give its key as --key FILE");
-    const auto counter = drive_.ReadValue<reg::kSigningCounter>();
-    if (counter == 0xFFFFFFFF) refuse("has used its last counter; it needs another key and a blank store");
-    return SealTable(words, id.serial_number, counter + 1, *key_);
+    const std::optional<std::uint32_t> counter = NextCounter(drive_, key_);
+    if (!counter) return {words.begin(), words.end()};
+    return SealTable(words, drive_.ReadIdentity().serial_number, *counter, *key_);
   }
 
   void SetWords(std::vector<std::uint16_t> words) {
@@ -119,8 +109,9 @@ class Flash {
     crc_ = core::Crc32Words(words_.data(), words_.size());
   }
 
+  // of_trial: the commands are about the table on trial.
   template <class Commands>
-  void Repeat(Commands commands) {
+  void Repeat(Commands commands, bool of_trial = false) {
     for (int round = 1;; ++round) try {
         sequence_ = ReadTwice().command_sequence;
         finishing_ = 0;
@@ -130,8 +121,20 @@ class Flash {
         if (IsCarriedOut()) return;
         const bool again = error.status == core::Status::kLocked || error.status == core::Status::kWrongOrder ||
                            error.status == core::Status::kBadCrc || error.status == core::Status::kReplayed;
-        if (!again || round == kRounds) throw;
+        if (again && round < kRounds) continue;
+        if (error.status == core::Status::kWrongOrder) ThrowForTrial(error, of_trial);
+        throw;
       }
+  }
+
+  // WrongOrder may mean that a trial runs, or that none does.
+  void ThrowForTrial(const RefusedError& error, bool of_trial) {
+    const bool on_trial = ReadTwice().transaction_state == link::TransactionState::kOnTrial;
+    if (on_trial == of_trial) return;
+    throw RefusedError(fmt::format("{}: {}", drive_.name(),
+                                   on_trial ? "a trial runs; end or confirm it first: armcal trial --end or --confirm"
+                                            : "no table is on trial"),
+                       error.exception, error.status);
   }
 
   // The command after which the drive acts.
@@ -157,7 +160,7 @@ class Flash {
       return look();
     } catch (const RefusedError& error) {
       if (error.exception == 0) throw;
-      throw LinkError(fmt::format("{}: the table was sent and cannot be read back: {}", drive_.name(), error.what()));
+      throw LinkError(error.what());
     }
   }
 
@@ -219,7 +222,7 @@ class Flash {
                            0, s.transaction_status);
       std::this_thread::sleep_for(kCommitPoll);
     }
-    throw LinkError(drive_.name() + ": the drive does not finish saving; its state is unknown");
+    throw LinkError(drive_.name() + ": the drive does not finish saving");
   }
 
   void Verify(const DriveStatus& s) {
@@ -270,8 +273,15 @@ FlashReport Carry(DriveClient& drive, const Key* key, Send send) {
     const DriveStatus s = flash.Proven();
     flash.LeaveSeat();
     return {s.active_crc, s.generation, s.store_sequence};
-  } catch (const LinkError&) {
-    throw;
+  } catch (const LinkError& error) {
+    if (flash.finishing() == 0) throw;
+    throw SentError(fmt::format("{}: {} ({})", drive.name(),
+                                flash.finishing() == reg::kConfirm
+                                    ? "the command to store the table on trial was sent, and it is unknown whether it "
+                                      "is stored: armcal trial tells"
+                                    : "the table was sent, and it is unknown whether it is in force: armcal verify or "
+                                      "armcal info tells",
+                                error.what()));
   } catch (const std::runtime_error&) {
     flash.LeaveSeat();
     throw;
@@ -287,6 +297,26 @@ void Expect(DriveClient& drive, const char* what) {
 }
 
 }  // namespace
+
+std::optional<std::uint32_t> NextCounter(DriveClient& drive, const Key* key) {
+  const auto method = drive.ReadIdentity().map_minor < kMinorOfLayout2
+                          ? link::SealMethod::kNone
+                          : static_cast<link::SealMethod>(drive.ReadValue<reg::kSigning>());
+  const auto refuse = [&](const char* why) {
+    throw RefusedError(fmt::format("{}: {}", drive.name(), why), 0, core::Status::kBadSignature);
+  };
+  if (method == link::SealMethod::kNone) {
+    if (key != nullptr) refuse("takes tables without a signature; leave --key out");
+    return std::nullopt;
+  }
+  if (method != link::SealMethod::kHmac) refuse("takes tables that are signed in its board's own way only");
+  if (key == nullptr) refuse("takes signed tables only; give its key as --key FILE");
+  const auto counter = drive.ReadValue<reg::kSigningCounter>();
+  if (!IsCredible(counter, 0) && !IsCredible(counter, SignedCounter(ReadActiveTable(drive), *key)))
+    refuse("shows a signing counter that its table in force does not bear out; look for another device on the line");
+  if (counter == 0xFFFFFFFF) refuse("has used its last counter; it needs another key and a blank store");
+  return counter + 1;
+}
 
 FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress,
                        const Key* key) {

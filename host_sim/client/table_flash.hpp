@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,11 +25,16 @@ struct FlashReport {
 // Called with 0 to 1 while the table is on its way.
 using FlashProgress = std::function<void(double share)>;
 
+// The counter with which the drive's next table has to be signed; nothing if it takes tables without a signature.
+// Throws RefusedError if no table can be sent with this key, or without one.
+std::optional<std::uint32_t> NextCounter(DriveClient& drive, const Key* key);
+
 // Unlocks, opens, stages the words, checks, saves, waits and reads back. If another client is writing, it waits for the
 // seat. If the connection breaks or a word is damaged on the way, it begins anew. `words`: the layout of
 // model/parameters.hpp, whose first two words are the schema. If the drive takes signed tables only, they are signed
 // with `key` and the drive's next counter. Throws RefusedError (the table before it stays in force and stored),
-// VerifyError (the drive says that the table is active, but it reads back otherwise) and LinkError.
+// VerifyError (the drive says that the table is active, but it reads back otherwise), LinkError (the table before it
+// stays in force) and SentError (the link was lost once the drive had been told to take the table).
 FlashReport FlashTable(DriveClient& drive, std::span<const std::uint16_t> words, const FlashProgress& progress = {},
                        const Key* key = nullptr);
 

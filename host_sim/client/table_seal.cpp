@@ -3,6 +3,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "armcal/core/words.hpp"
 #include "armcal/link/seal.hpp"
 
@@ -38,6 +40,20 @@ std::vector<std::uint16_t> SealTable(std::span<const std::uint16_t> words, std::
   for (int k = 0; k < static_cast<int>(sizeof bytes) / 2; ++k)
     sealed[static_cast<std::size_t>(covered + k)] = core::GetBytes16(bytes + 2 * k);
   return sealed;
+}
+
+std::uint32_t SignedCounter(std::span<const std::uint16_t> words, const Key& key) {
+  if (words.size() <= kJointsWord || words[kLayoutWord] != link::kSealedLayout) return 0;
+  const link::Seal seal = link::GetSeal(words.data(), static_cast<int>(words.size()));
+  if (seal.method != link::SealMethod::kHmac) return 0;
+  const std::vector<std::uint16_t> sealed = SealTable(words, seal.serial_number, seal.counter, key);
+  return std::equal(sealed.begin(), sealed.end(), words.begin(), words.end()) ? seal.counter : 0;
+}
+
+bool IsCredible(std::uint32_t counter, std::uint32_t proven) {
+  constexpr std::uint32_t kUsual = 1'000'000;  // a table a minute takes two years
+  constexpr std::uint32_t kTried = 1000;       // tables since the one in force was signed
+  return counter <= kUsual || (counter >= proven && counter - proven <= kTried);
 }
 
 std::vector<std::uint16_t> UnsealTable(std::span<const std::uint16_t> words) {

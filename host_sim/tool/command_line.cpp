@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
+#include <set>
 #include <string_view>
 #include <vector>
 
@@ -60,6 +62,51 @@ std::string Misspelt(const CLI::App& app, const CLI::App* verb, int argc, const 
       return text;
   }
   return {};
+}
+
+enum class FileUse {
+  kWrites,  // a file that the verb writes
+  kOwn,     // a file or a folder that it writes and checks itself
+  kOther,   // a file that it reads, or no file at all
+};
+
+struct GivenPath {
+  std::string option;
+  std::filesystem::path path;
+  FileUse use;
+};
+
+// A name means the same in all verbs, but for `file`, which only armcal backup writes.
+FileUse UseOf(const CLI::App& verb, const CLI::Option& option) {
+  static const std::set<std::string> written{"--json",      "--report",  "--out",     "--samples",   "--model-out",
+                                             "--table-out", "--records", "--ros-out", "--truth-log", "--payload-out"};
+  const std::string name = option.get_name();
+  if (name == "--db" || name == "--storage" || option.get_type_name() == kFolder) return FileUse::kOwn;
+  const bool backup = verb.get_name() == "backup" && name == "file";
+  return backup || written.contains(name) ? FileUse::kWrites : FileUse::kOther;
+}
+
+// The values of this command line, as paths. InputError: a file that has to be written has no name.
+std::vector<GivenPath> GivenPaths(const CLI::App& verb) {
+  std::vector<GivenPath> out;
+  for (const CLI::Option* option : Options(verb))
+    for (const std::string& value : option->results()) {
+      const FileUse use = UseOf(verb, *option);
+      if (!value.empty()) out.push_back({option->get_name(), value, use});
+      else if (use == FileUse::kWrites && option->get_required())
+        throw io::InputError(option->get_name() + ": expected a file");
+    }
+  return out;
+}
+
+// `one` is written. What is no output is a file only if it is there: it may be a name that looks like one.
+bool SameFile(const GivenPath& one, const GivenPath& other) {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  const fs::file_status status = fs::status(other.path, none);
+  if (fs::exists(status) ? !fs::is_regular_file(status) : other.use == FileUse::kOther) return false;
+  const fs::path path = fs::weakly_canonical(fs::absolute(one.path), none);
+  return !path.empty() && path == fs::weakly_canonical(fs::absolute(other.path), none);
 }
 
 // Troff reads a dot or a quote at the start of a line as a request, and a backslash anywhere.
@@ -177,11 +224,17 @@ std::string WrongUse(const CLI::App& app, int argc, const char* const* argv, con
 }
 
 void CheckOutputs(const CLI::App& app) {
-  for (const CLI::App* verb : app.get_subcommands())
-    for (const char* name : {"--json", "--report", "--model-out", "--table-out", "--payload-out", "--ros-out"})
-      if (const CLI::Option* option = verb->get_option_no_throw(name); option != nullptr && option->count() > 0)
-        for (const std::string& path : option->results())
-          if (!path.empty()) io::CheckWritable(path);
+  for (const CLI::App* verb : app.get_subcommands()) {
+    const std::vector<GivenPath> paths = GivenPaths(*verb);
+    for (const GivenPath& one : paths) {
+      if (one.use == FileUse::kWrites) io::CheckWritable(one.path);
+      if (one.use == FileUse::kOther) continue;
+      for (const GivenPath& other : paths)
+        if (one.option != other.option && SameFile(one, other))
+          throw io::InputError(
+              fmt::format("{} and {} both name {}; choose another place", one.option, other.option, one.path.string()));
+    }
+  }
 }
 
 CLI::Validator OneOf(const std::vector<std::string>& words) {
@@ -195,9 +248,12 @@ CLI::Validator OneOf(const std::vector<std::string>& words) {
 }
 
 CLI::Validator AboveZero() {
-  CLI::Validator check = CLI::PositiveNumber;
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  CLI::Validator check = CLI::PositiveNumber;  // which takes nan, too
   check.operation([](std::string& text) {
-    return CLI::PositiveNumber(text).empty() ? std::string() : text + ": expected a number above 0";
+    double value = 0;
+    const bool good = CLI::detail::lexical_cast(text, value) && value > 0 && value <= kLargest;
+    return good ? std::string() : text + ": expected a number above 0";
   });
   return check;
 }
@@ -207,7 +263,9 @@ void AddPages(CLI::App& app, std::function<int()>& action) {
                                   "write manual pages and bash completion from the program's own definition\nexample: "
                                   "armcal pages --out build/pages && man build/pages/man1/armcal-excite.1");
   auto folder = std::make_shared<std::string>();
-  verb->add_option("--out", *folder, "folder to write: man1/armcal*.1, armcal (bash completion)")->required();
+  verb->add_option("--out", *folder, "folder to write: man1/armcal*.1, armcal (bash completion)")
+      ->required()
+      ->type_name(kFolder);
   verb->callback([&app, &action, folder] {
     action = [&app, folder] {
       const std::filesystem::path out = *folder;

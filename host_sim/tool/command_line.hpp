@@ -25,17 +25,23 @@ CLI::Validator OneOf(const std::vector<std::string>& words);
 CLI::Validator AboveZero();
 template <class Number>
 CLI::Validator Between(Number low, Number high) {
-  const CLI::Range range(low, high);
   const std::string expected =
       fmt::format("expected {} from {:.7g} to {:.7g}", std::is_integral_v<Number> ? "an integer" : "a number",
                   static_cast<double>(low), static_cast<double>(high));
-  CLI::Validator check = range;
-  check.operation(
-      [range, expected](std::string& text) { return range(text).empty() ? std::string() : text + ": " + expected; });
+  CLI::Validator check = CLI::Range(low, high);  // which takes nan, too
+  check.operation([low, high, expected](std::string& text) {
+    Number value{};
+    const bool lies = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+    return lies ? std::string() : text + ": " + expected;
+  });
   return check;
 }
 
-// The files that this command line asks for can be written: some verbs work for minutes first. InputError: one cannot.
+// The type of an option --out whose value is a folder.
+inline constexpr const char* kFolder = "FOLDER";
+
+// The files that this command line asks for can be written, and none of them is another file of it: some verbs work for
+// minutes first. InputError: one cannot, or two options name one file.
 void CheckOutputs(const CLI::App& app);
 
 // armcal pages: manual pages and the words that bash completes, written from the definition of `app`.

@@ -25,42 +25,47 @@ std::vector<std::string> Parts(const std::string& address) {
   return parts;
 }
 
-bool TakeSerial(const std::vector<std::string>& parts, client::SerialLine& line, int& unit) {
-  line.device = parts[0];
-  if (parts.size() > 1 && !TakeNumber(parts[1], 300, 12000000, line.baud)) return false;
-  if (parts.size() > 2) {
-    if (parts[2].size() != 1 || std::string("NEO").find(parts[2]) == std::string::npos) return false;
-    line.parity = parts[2][0];
-  }
-  return parts.size() < 4 || (parts.size() == 4 && TakeNumber(parts[3], 1, 247, unit));
-}
-
 }  // namespace
 
 bool IsSerialLine(const std::string& address) { return address.rfind('/', 0) == 0; }
 
-std::pair<std::string, int> HostAndPort(const std::string& address) {
+std::optional<std::pair<std::string, int>> HostAndPort(const std::string& address) {
   const auto colon = address.rfind(':');
   int port = 0;
-  if (colon == std::string::npos || !TakeNumber(address.substr(colon + 1), 1, 65535, port))
-    throw io::InputError("--connect " + address +
-                         ": expected HOST:PORT, for instance 127.0.0.1:1502, or a serial line, for instance "
-                         "/dev/ttyUSB0:115200");
-  return {address.substr(0, colon), port};
+  if (colon == std::string::npos || !TakeNumber(address.substr(colon + 1), 1, 65535, port)) return std::nullopt;
+  std::string host = address.substr(0, colon);
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  return std::pair{host, port};
+}
+
+std::optional<SerialAddress> LineAndUnit(const std::string& address) {
+  const std::vector<std::string> parts = Parts(address);
+  SerialAddress out;
+  out.line.device = parts[0];
+  if (parts.size() > 1 && !TakeNumber(parts[1], 300, 12000000, out.line.baud)) return std::nullopt;
+  if (parts.size() > 2) {
+    if (parts[2].size() != 1 || std::string("NEO").find(parts[2]) == std::string::npos) return std::nullopt;
+    out.line.parity = parts[2][0];
+  }
+  if (parts.size() > 4 || (parts.size() == 4 && !TakeNumber(parts[3], 1, 247, out.unit))) return std::nullopt;
+  return out;
 }
 
 client::DriveClient ConnectTo(const std::string& address) {
   if (IsSerialLine(address)) {
-    client::SerialLine line;
-    int unit = 1;
-    if (!TakeSerial(Parts(address), line, unit))
+    const std::optional<SerialAddress> serial = LineAndUnit(address);
+    if (!serial)
       throw io::InputError("--connect " + address +
                            ": expected DEVICE[:BAUD[:PARITY[:UNIT]]], for instance /dev/ttyUSB0:115200:E:1; 300 to "
                            "12000000 baud, parity N, E or O, unit 1 to 247");
-    return client::DriveClient(line, unit);
+    return client::DriveClient(serial->line, serial->unit == 0 ? 1 : serial->unit);
   }
-  const auto [host, port] = HostAndPort(address);
-  return client::DriveClient(host, port);
+  const auto host_and_port = HostAndPort(address);
+  if (!host_and_port)
+    throw io::InputError("--connect " + address +
+                         ": expected HOST:PORT, for instance 127.0.0.1:1502, or a serial line, for instance "
+                         "/dev/ttyUSB0:115200");
+  return client::DriveClient(host_and_port->first, host_and_port->second);
 }
 
 void AddKeyOption(CLI::App& verb, std::string& path) {

@@ -15,6 +15,7 @@
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/machine/plant/scenario.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/demo_result.hpp"
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
@@ -287,7 +288,7 @@ void AddDemo(CLI::App& app, Action& action) {
       "it, measure again; ends with 6 where the loop did not close\nexample: armcal demo --scenario ripple");
   auto o = std::make_shared<DemoOptions>();
   verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->capture_default_str();
-  verb->add_option("--out", o->out, "folder for everything that is made")->capture_default_str();
+  verb->add_option("--out", o->out, "folder for everything that is made")->capture_default_str()->type_name(kFolder);
   verb->add_option("--excite-seconds", o->excite_s, "at most, for each search of a trajectory")->capture_default_str();
   verb->callback([o, &action] { action = [o] { return Demo(*o).Run(); }; });
 }

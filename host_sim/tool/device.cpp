@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -16,6 +17,7 @@
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/client/writer_seat.hpp"
+#include "host_sim/data/report/progress.hpp"
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/interrupt.hpp"
@@ -32,10 +34,11 @@ using nlohmann::ordered_json;
 
 struct DeviceOptions {
   std::string connect, json, name, value;
-  int from = 1, to = 247, count = 0;
+  int from = 0, to = 0, count = 0;  // from, to: 0: left out
   bool csv = false, markdown = false;
 };
 
+constexpr int kModbusPort = 502, kLastUnit = 247;
 constexpr char kNameHelp[] = "name, as armcal map lists it; an element in brackets, from 0";
 constexpr char kWhoMayWrite[] = "Without a key anyone who reaches the line may write within the ceilings.";
 constexpr char kNobodyMayWrite[] = "The board refuses all writing now.";
@@ -43,7 +46,7 @@ constexpr char kSignedOnly[] = "Only tables that are signed with the drive's key
 
 // info ---------------------------------------------------------------------------------------------------------------
 
-int RunInfo(const DeviceOptions& o) {
+int RunInfo(const DeviceOptions& o, ordered_json&) {
   client::DriveClient drive = ConnectTo(o.connect);
   const client::Identity id = drive.ReadIdentity();
   const client::DriveStatus s = drive.ReadStatus();
@@ -164,8 +167,9 @@ int Elements(client::DriveClient& drive, const Register& r) {
 ordered_json ReadRegister(client::DriveClient& drive, const Named& named) {
   const Register& r = *named.r;
   const int size = link::WordsOf(r.type);
+  const int elements = Elements(drive, r);
   const int first = named.element < 0 ? 0 : named.element;
-  const int count = named.element < 0 ? Elements(drive, r) : 1;
+  const int count = named.element < 0 ? elements : 1;
   const auto words = r.kind == RegisterKind::kInput ? drive.ReadInput(r + first * size, count * size)
                                                     : drive.ReadHolding(r + first * size, count * size);
   ordered_json values = ordered_json::array();
@@ -173,7 +177,7 @@ ordered_json ReadRegister(client::DriveClient& drive, const Named& named) {
   return count == 1 ? values[0] : values;
 }
 
-int RunGet(const DeviceOptions& o) {
+int RunGet(const DeviceOptions& o, ordered_json&) {
   const Named named = Find(o.name);
   client::DriveClient drive = ConnectTo(o.connect);
   const ordered_json value = ReadRegister(drive, named);
@@ -203,7 +207,7 @@ std::vector<std::uint16_t> WordsOf(const Named& named, const std::string& text) 
   return words;
 }
 
-int RunSet(const DeviceOptions& o) {
+int RunSet(const DeviceOptions& o, ordered_json&) {
   const Named named = Find(o.name);
   const Register& r = *named.r;
   if (r.access != link::Access::kWrite)
@@ -213,6 +217,7 @@ int RunSet(const DeviceOptions& o) {
   const std::vector<std::uint16_t> words = WordsOf(named, o.value);
   if (named.element < 0 && r.count > 1) throw io::InputError(o.name + ": expected an element, as in " + o.name + "[0]");
   client::DriveClient drive = ConnectTo(o.connect);
+  (void)drive.ReadIdentity();  // throws if it is no armcal drive
   std::optional<client::WriterSeat> seat;
   if (std::string(r.name).rfind("learning_", 0) == 0 || std::string(r.name) == "trial_limit") seat.emplace(drive);
   const int at = r + std::max(0, named.element) * link::WordsOf(r.type);
@@ -227,12 +232,12 @@ int RunSet(const DeviceOptions& o) {
 // watch --------------------------------------------------------------------------------------------------------------
 
 // Whatever else is on the screen scrolls away; each look is one block of lines.
-int RunWatch(const DeviceOptions& o) {
+int RunWatch(const DeviceOptions& o, ordered_json& said) {
   client::DriveClient drive = ConnectTo(o.connect);
   const client::Identity id = drive.ReadIdentity();
   const InterruptGuard guard;
   const bool monitor = (id.capabilities & reg::kHasFilterA) != 0;
-  ordered_json looks = ordered_json::array();
+  ordered_json& looks = said["readings"] = ordered_json::array();
   for (int look = 0; (o.count == 0 || look < o.count) && !InterruptGuard::interrupted(); ++look) {
     if (look > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1000));
     const client::DriveStatus s = drive.ReadStatus();
@@ -264,20 +269,59 @@ int RunMap(const DeviceOptions& o) {
   return kOk;
 }
 
-// Units of a serial line, or ports of a host.
-int RunScan(const DeviceOptions& o) {
-  ordered_json found = ordered_json::array();
+// "PREFIX:FROM" to "PREFIX:TO".
+std::vector<std::string> Numbered(const std::string& prefix, int from, int to) {
+  if (from > to) throw io::InputError(fmt::format("--from {}: expected at most --to {}", from, to));
+  std::vector<std::string> out;
+  for (int k = from; k <= to; ++k) out.push_back(fmt::format("{}:{}", prefix, k));
+  return out;
+}
+
+std::vector<std::string> UnitsToScan(const DeviceOptions& o) {
+  const std::optional<SerialAddress> serial = LineAndUnit(o.connect);
+  if (!serial || serial->unit != 0)
+    throw io::InputError("scan " + o.connect +
+                         ": expected DEVICE[:BAUD[:PARITY]], for instance /dev/ttyUSB0:9600:N; 300 to 12000000 baud, "
+                         "parity N, E or O; --from and --to say which units");
+  for (const auto& [name, unit] : {std::pair{"--from", o.from}, {"--to", o.to}})
+    if (unit > kLastUnit)
+      throw io::InputError(fmt::format("{} {}: expected a unit from 1 to {} of a serial line", name, unit, kLastUnit));
+  return Numbered(fmt::format("{}:{}:{}", serial->line.device, serial->line.baud, serial->line.parity),
+                  o.from == 0 ? 1 : o.from, o.to == 0 ? kLastUnit : o.to);
+}
+
+// The host may have a port. Without one, and without --from and --to, the two ports are tried that drives usually have.
+std::vector<std::string> PortsToScan(const DeviceOptions& o) {
+  const std::string& host = o.connect;
+  const bool bracket = host.starts_with('['),
+             port = bracket ? !host.ends_with(']') : std::count(host.begin(), host.end(), ':') == 1;
+  if (port && !HostAndPort(host))
+    throw io::InputError("scan " + host + ": expected HOST, HOST:PORT with a port from 1 to 65535, or a serial line");
+  if (port && o.from + o.to > 0)
+    throw io::InputError("scan " + host + ": has a port; expected a host alone beside --from and --to");
+  if (port) return {host};
+  if (o.from + o.to == 0) return {fmt::format("{}:{}", host, kModbusPort), fmt::format("{}:{}", host, kSimulatedPort)};
+  if (o.from == 0 || o.to == 0)
+    throw io::InputError(fmt::format("scan {}: expected --from and --to, the first and the last port", host));
+  return Numbered(host, o.from, o.to);
+}
+
+// Units of a serial line, or ports of a host. What is found is told at once: the rest may take long.
+int RunScan(const DeviceOptions& o, ordered_json& said) {
+  const std::vector<std::string> addresses = IsSerialLine(o.connect) ? UnitsToScan(o) : PortsToScan(o);
+  ordered_json& found = said["found"] = ordered_json::array();
   std::string last_failure;
-  const bool serial = IsSerialLine(o.connect);
-  if (o.from > o.to) throw io::InputError(fmt::format("--from {}: expected at most --to {}", o.from, o.to));
-  for (int k = o.from; k <= o.to; ++k) {
-    const std::string address =
-        serial ? fmt::format("{}:{}:{}:{}", o.connect, 115200, 'E', k) : fmt::format("{}:{}", o.connect, k);
+  const InterruptGuard guard;
+  report::Progress progress("scan");
+  for (std::size_t k = 0; k < addresses.size() && !InterruptGuard::interrupted(); ++k) {
+    const std::string& address = addresses[k];
     try {
       client::DriveClient drive = ConnectTo(address);
       const client::Identity id = drive.ReadIdentity();
+      progress.Clear();
       fmt::print("{}: serial number {}, schema {}, {} axes\n", address, id.serial_number, client::CrcText(id.schema),
                  id.axes);
+      std::fflush(stdout);
       found.push_back({{"address", address},
                        {"serial_number", id.serial_number},
                        {"schema", client::CrcText(id.schema)},
@@ -287,18 +331,29 @@ int RunScan(const DeviceOptions& o) {
     } catch (const client::RefusedError& error) {
       last_failure = error.what();
     }
+    progress.Set(static_cast<double>(k + 1) / static_cast<double>(addresses.size()));
   }
-  if (found.empty()) fmt::print("no drive answered; the last failure was: {}\n", last_failure);
+  const bool stopped = InterruptGuard::interrupted();
+  if (found.empty())
+    throw client::LinkError(stopped ? "stopped before a drive answered"
+                                    : "no drive answered; the last failure was: " + last_failure);
   WriteJson(o.json, found);
-  return found.empty() ? kLink : kOk;
+  return stopped ? kPartial : kOk;
 }
 
 CLI::App* Add(CLI::App& app, Action& action, const char* name, const char* help,
-              const std::shared_ptr<DeviceOptions>& o, int (*run)(const DeviceOptions&), bool connects = true) {
+              const std::shared_ptr<DeviceOptions>& o, int (*run)(const DeviceOptions&, ordered_json& said),
+              bool connects = true) {
   auto* verb = app.add_subcommand(name, help);
   if (connects) verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--json", o->json, "write the result here");
-  verb->callback([o, &action, run] { action = [o, run] { return Reported(o->json, [&] { return run(*o); }); }; });
+  verb->callback([o, &action, run] {
+    action = [o, run] {
+      ordered_json said = ordered_json::object();
+      return Reported(
+          o->json, [&] { return run(*o, said); }, said);
+    };
+  });
   return verb;
 }
 
@@ -332,13 +387,14 @@ void AddDevice(CLI::App& app, Action& action) {
   o = options();
   verb = Add(
       app, action, "scan",
-      "find drives: units 1 to 247 of a serial line (115200 baud, even parity), or ports of a host\nexit code 3: no "
-      "drive answered\nexample: armcal scan "
-      "/dev/ttyUSB0 --to 10\nexample: armcal scan 192.168.0.10 --from 502 --to 502",
+      "find drives: units of a serial line, or ports of a host\nexit code 3: no drive answered, 6: stopped by "
+      "Ctrl-C\nexample: armcal scan /dev/ttyUSB0:9600:N --to 10\nexample: armcal scan 192.168.0.10\nexample: armcal "
+      "scan 192.168.0.10 --from 500 --to 510",
       o, RunScan, false);
-  verb->add_option("line", o->connect, "serial line or host")->required();
-  verb->add_option("--from", o->from, "first unit or port")->capture_default_str()->check(Between(1, 65535));
-  verb->add_option("--to", o->to, "last unit or port")->capture_default_str()->check(Between(1, 65535));
+  verb->add_option("line", o->connect, "serial line as /dev/ttyUSB0[:115200[:E]], HOST, or HOST:PORT")->required();
+  verb->add_option("--from", o->from, "first unit (default: 1), or first port (default: ports 502 and 1502 alone)")
+      ->check(Between(1, 65535));
+  verb->add_option("--to", o->to, "last unit (default: 247), or last port")->check(Between(1, 65535));
   o = options();
   verb = app.add_subcommand("map", "print the register map of this version\nexample: armcal map --csv > registers.csv");
   auto* json =

@@ -14,6 +14,7 @@
 #include "host_sim/diagnose/verdict/splits.hpp"
 #include "host_sim/diagnose/verdict/summary.hpp"
 #include "host_sim/identify/search/parallel.hpp"
+#include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/process.hpp"
@@ -256,7 +257,8 @@ void AddBatchOptions(CLI::App& verb, BatchOptions& b) {
                                  std::string("diagnose a folder of logs: ") + kLayout +
                                      "; the robot is the folder's robot.toml, or --robot, or the batch's robot.toml");
   verb.add_option("--out", b.out,
-                  "with --batch, --splits: NAME.json, .html, .toml and .log of each log go to this folder");
+                  "with --batch, --splits: NAME.json, .html, .toml and .log of each log go to this folder")
+      ->type_name(kFolder);
   verb.add_option("--jobs", b.jobs, "with --batch, --splits: logs at a time; 0: one a core");
   verb.add_option("--part", b.part, "with --batch: K/N, every N-th log beginning with the K-th, for independent jobs");
   verb.add_flag("--resume", b.resume,

@@ -21,7 +21,7 @@ using nlohmann::ordered_json;
 struct TableOptions {
   std::string connect, json, file, key;
   FleetOptions fleet;
-  bool confirm = false, end = false;
+  bool confirm = false, end = false, another_drive = false;
 };
 
 ordered_json Told(const client::FlashReport& report) {
@@ -43,7 +43,22 @@ ordered_json Backup(client::DriveClient& drive) {
   return client::BackupJson(words, id.schema, id.serial_number);
 }
 
-int RunBackup(const TableOptions& o) {
+// The seal says who stored a table and when, and nothing about the arm.
+client::TableBackup ReadUnsealed(const std::string& path) {
+  client::TableBackup backup = client::ReadBackup(path);
+  backup.words = client::UnsealTable(backup.words);
+  return backup;
+}
+
+// Empty, or that a backup comes from another drive than this one.
+std::string OfAnotherDrive(const TableOptions& o, client::DriveClient& drive, const client::TableBackup& backup) {
+  const std::uint32_t here = drive.ReadIdentity().serial_number;
+  if (!backup.serial_number || *backup.serial_number == here) return "";
+  return fmt::format("{}: is of the drive with serial number {}, and {} has {}", o.file, *backup.serial_number,
+                     drive.name(), here);
+}
+
+int RunBackup(const TableOptions& o, ordered_json&) {
   client::DriveClient drive = ConnectTo(o.connect);
   const ordered_json backup = Backup(drive);
   files::WriteWholeFile(o.file, backup.dump(1) + "\n");
@@ -53,23 +68,29 @@ int RunBackup(const TableOptions& o) {
   return kOk;
 }
 
-int RunRestore(const TableOptions& o) {
-  const std::vector<std::uint16_t> words = client::UnsealTable(client::ReadBackup(o.file));
+int RunRestore(const TableOptions& o, ordered_json& said) {
+  const client::TableBackup backup = ReadUnsealed(o.file);
+  const std::vector<std::uint16_t>& words = backup.words;
   const std::optional<client::Key> key = ReadKeyOption(o.key);
   TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
+  if (const std::string other = OfAnotherDrive(o, drive, backup); !other.empty() && !o.another_drive)
+    throw io::InputError(other + "; --another-drive restores it all the same");
   const client::FlashReport report = client::FlashTable(drive, words, {}, KeyOf(key));
   fmt::print("{}: {} registers stored, adopted and read back: CRC {}, generation {}, store sequence {}\n", drive.name(),
              words.size(), client::CrcText(report.crc), report.generation, report.store_sequence);
-  WriteJson(o.json, Told(report));
-  KeepTable(o.fleet, drive, "restore", Told(report), o.file);
+  said = Told(report);
+  WriteJson(o.json, said);
+  KeepTable(o.fleet, drive, "restore", said, o.file);
   return kOk;
 }
 
-int RunDiff(const TableOptions& o) {
-  // The seal says who stored a table and when, and nothing about the arm.
-  const std::vector<std::uint16_t> words = client::UnsealTable(client::ReadBackup(o.file));
+int RunDiff(const TableOptions& o, ordered_json&) {
+  const client::TableBackup backup = ReadUnsealed(o.file);
+  const std::vector<std::uint16_t>& words = backup.words;
   client::DriveClient drive = ConnectTo(o.connect);
+  const std::string other = OfAnotherDrive(o, drive, backup);
+  if (!other.empty()) fmt::print("{}\n", other);
   const auto active = client::UnsealTable(client::ReadActiveTable(drive));
   ordered_json differ = ordered_json::array();
   for (std::size_t k = 0; k < std::max(words.size(), active.size()); ++k) {
@@ -81,33 +102,35 @@ int RunDiff(const TableOptions& o) {
   }
   fmt::print("{}: {}\n", drive.name(),
              differ.empty() ? "the table in force is this file's" : fmt::format("{} words differ", differ.size()));
-  WriteJson(o.json, {{"same", differ.empty()}, {"differ", differ}});
+  WriteJson(o.json, {{"same", differ.empty()}, {"differ", differ}, {"another_drive", !other.empty()}});
   return differ.empty() ? kOk : kMismatch;
 }
 
 // rollback, trial, log ------------------------------------------------------------------------------------------------
 
-int RunRollback(const TableOptions& o) {
+int RunRollback(const TableOptions& o, ordered_json& said) {
   const std::optional<client::Key> key = ReadKeyOption(o.key);
   TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   const client::FlashReport report = client::Rollback(drive, KeyOf(key));
   fmt::print("{}: the older table is stored, adopted and read back: CRC {}, generation {}, store sequence {}\n",
              drive.name(), client::CrcText(report.crc), report.generation, report.store_sequence);
-  WriteJson(o.json, Told(report));
-  KeepTable(o.fleet, drive, "rollback", Told(report));
+  said = Told(report);
+  WriteJson(o.json, said);
+  KeepTable(o.fleet, drive, "rollback", said);
   return kOk;
 }
 
-int RunTrial(const TableOptions& o) {
+int RunTrial(const TableOptions& o, ordered_json& said) {
   TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   if (o.confirm) {
     const client::FlashReport report = client::ConfirmTrial(drive);
     fmt::print("{}: the table on trial is stored: CRC {}, store sequence {}\n", drive.name(),
                client::CrcText(report.crc), report.store_sequence);
-    WriteJson(o.json, Told(report));
-    KeepTable(o.fleet, drive, "trial --confirm", Told(report));
+    said = Told(report);
+    WriteJson(o.json, said);
+    KeepTable(o.fleet, drive, "trial --confirm", said);
     return kOk;
   }
   if (o.end) client::EndTrial(drive);
@@ -154,7 +177,7 @@ link::Words<reg::kLogBlock> ReadLog(client::DriveClient& drive) {
   }
 }
 
-int RunLog(const TableOptions& o) {
+int RunLog(const TableOptions& o, ordered_json&) {
   client::DriveClient drive = ConnectTo(o.connect);
   if (const client::Identity id = drive.ReadIdentity(); id.map_minor < client::kMinorOfLayout2)
     throw client::RefusedError(fmt::format("{}: its map {}.{} has no log; expected a drive of map 1.{} or newer",
@@ -183,11 +206,17 @@ int RunLog(const TableOptions& o) {
 }
 
 CLI::App* AddVerb(CLI::App& app, Action& action, const char* name, const char* help,
-                  const std::shared_ptr<TableOptions>& o, int (*run)(const TableOptions&)) {
+                  const std::shared_ptr<TableOptions>& o, int (*run)(const TableOptions&, ordered_json& said)) {
   auto* verb = app.add_subcommand(name, help);
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--json", o->json, "write the result here");
-  verb->callback([o, &action, run] { action = [o, run] { return Reported(o->json, [&] { return run(*o); }); }; });
+  verb->callback([o, &action, run] {
+    action = [o, run] {
+      ordered_json said = ordered_json::object();
+      return Reported(
+          o->json, [&] { return run(*o, said); }, said);
+    };
+  });
   return verb;
 }
 
@@ -205,6 +234,7 @@ void AddDriveTable(CLI::App& app, Action& action) {
                  "store and adopt the table of a backup\nexample: armcal restore drive.json --connect 127.0.0.1:1502",
                  o, RunRestore);
   verb->add_option("file", o->file, "file of armcal backup")->required();
+  verb->add_flag("--another-drive", o->another_drive, "also a backup of another drive");
   AddKeyOption(*verb, o->key);
   AddDriveFleetOptions(*verb, o->fleet, "the table");
   o = std::make_shared<TableOptions>();

@@ -18,6 +18,8 @@
 namespace armcal::tool {
 namespace {
 
+using nlohmann::ordered_json;
+
 struct FlashOptions {
   std::string connect, robot, table, json, key;
   FleetOptions fleet;
@@ -27,29 +29,33 @@ struct FlashOptions {
 
 // Read before the drive is called, so that a wrong file is named even where no drive answers.
 struct ToFlash {
-  explicit ToFlash(const FlashOptions& o) : model(LoadModel(o.robot)), file(calibration::ReadTable(o.table)) {}
+  explicit ToFlash(const FlashOptions& o) : model(LoadModel(o.robot)), file(calibration::ReadTable(o.table)) {
+    calibration::TableFile layout = calibration::DefaultTable(model);
+    carried = calibration::CarryOver(file, layout, o.table);
+    other_version = file.schema != layout.schema;
+  }
   codegen::Model model;
   calibration::TableFile file;
+  calibration::CarriedOver carried;  // between the file and the model
+  bool other_version;                // the file was made for another version of the model
 };
 
 // What the file means for this drive.
 struct Sending {
   std::vector<std::uint16_t> words;
-  calibration::TableFile table;      // of the words
-  std::vector<std::string> missing;  // parameters that the file lacks: the drive's values stand
+  calibration::TableFile active;  // in force now
+  calibration::TableFile table;   // of the words
   std::vector<std::string> kept;  // friction and effects that rest on the prior: the drive's values stand unless forced
 };
 
 Sending SendingOf(client::DriveClient& drive, const FlashOptions& o, const ToFlash& read) {
-  const auto& [model, file] = read;
-  const calibration::TableFile layout = LayoutOf(drive, model);
-  if (file.joint.size() != layout.joint.size())
-    throw io::InputError(
-        fmt::format("{}: {} joints, the drive has {}", o.table, file.joint.size(), layout.joint.size()));
-  const calibration::TableFile active = calibration::DecodeTable(client::ReadActiveTable(drive), layout);
-  Sending out{{}, active, {}, {}};
+  const codegen::Model& model = read.model;
+  const calibration::TableFile& file = read.file;
+  const calibration::TableFile layout = LayoutOf(drive, model),
+                               active = calibration::DecodeTable(client::ReadActiveTable(drive), layout);
+  Sending out{{}, active, active, {}};
   calibration::TableFile& sent = out.table;
-  out.missing = calibration::CarryOver(file, sent);
+  calibration::CarryOver(file, sent, o.table);
   std::copy(std::begin(file.forgetting), std::end(file.forgetting), sent.forgetting);
   sent.bumpless = file.bumpless;
   sent.blend_ms = file.blend_ms;
@@ -68,24 +74,88 @@ Sending SendingOf(client::DriveClient& drive, const FlashOptions& o, const ToFla
   return out;
 }
 
-int Flash(const FlashOptions& o) {
+void PrintVersion(const FlashOptions& o, const ToFlash& read) {
+  if (!read.other_version) return;
+  fmt::print(
+      "{}: was made for another version of the model of {} (schema {:08X}, here {:08X}); its values are carried "
+      "over by name\n",
+      o.table, read.file.robot, read.file.schema, codegen::Schema(read.model));
+  if (!read.carried.unknown.empty())
+    fmt::print("not in this model, so left out: {}\n", fmt::join(read.carried.unknown, ", "));
+}
+
+// Parameters whose value is the drive's own, not the file's.
+std::vector<std::string> DrivesOwn(const ToFlash& read, const Sending& sending) {
+  std::vector<std::string> names = read.carried.missing;
+  names.insert(names.end(), sending.kept.begin(), sending.kept.end());
+  return names;
+}
+
+// Each value of a table by its name.
+std::vector<std::pair<std::string, ordered_json>> ValuesOf(const calibration::TableFile& t) {
+  std::vector<std::pair<std::string, ordered_json>> out;
+  out.emplace_back("bumpless", t.bumpless), out.emplace_back("blend_ms", t.blend_ms);
+  for (int g = 0; g < 4; ++g) out.emplace_back(fmt::format("forgetting[{}]", g), t.forgetting[g]);
+  for (std::size_t j = 0; j < t.joint.size(); ++j) {
+    const calibration::TableJoint& joint = t.joint[j];
+    for (const auto& [name, value] : {std::pair{"sigma_Nm", joint.sigma_Nm},
+                                      {"v_min_radps", joint.v_min_radps},
+                                      {"torque_limit_Nm", joint.torque_limit_Nm},
+                                      {"torque_scale", joint.torque_scale},
+                                      {"gate_sigma", joint.gate_sigma}})
+      out.emplace_back(fmt::format("joint {} {}", j + 1, name), value);
+  }
+  for (const calibration::TableRow& r : t.row) {
+    out.emplace_back(r.name, r.mean), out.emplace_back(r.name + " sd", r.sd);
+    out.emplace_back(r.name + " process_noise", r.process_noise), out.emplace_back(r.name + " state", r.state);
+    out.emplace_back(r.name + " group", r.group);
+  }
+  return out;
+}
+
+// What would be sent, without sending it.
+int DryRun(const FlashOptions& o, client::DriveClient& drive, const Sending& sending, const client::Key* key,
+           ordered_json json) {
+  (void)client::NextCounter(drive, key);  // throws if the drive would not take a table with this key
+  const auto is = ValuesOf(sending.active), sent = ValuesOf(calibration::DecodeTable(sending.words, sending.active));
+  const auto text = [](const ordered_json& v) {
+    return v.is_number_float() ? fmt::format("{:.9g}", v.get<double>())
+           : v.is_string()     ? v.get<std::string>()
+                               : v.dump();
+  };
+  json["dry_run"] = true, json["changes"] = ordered_json::array();
+  for (std::size_t k = 0; k < is.size(); ++k) {
+    if (is[k].second == sent[k].second) continue;
+    fmt::print("{}: {} -> {}\n", is[k].first, text(is[k].second), text(sent[k].second));
+    json["changes"].push_back({{"name", is[k].first}, {"from", is[k].second}, {"to", sent[k].second}});
+  }
+  fmt::print("dry run: {} registers would be sent, nothing was; values that would change: {}\n", sending.words.size(),
+             json["changes"].size());
+  WriteJson(o.json, json);
+  return kOk;
+}
+
+// said: what the JSON says if something fails after the flash.
+int Flash(const FlashOptions& o, ordered_json& said) {
   const std::optional<client::Key> key = ReadKeyOption(o.key);
   const ToFlash read(o);
-  TryFleet(o.fleet);
+  if (!o.dry_run) TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   const Sending sending = SendingOf(drive, o, read);
   if (const std::string beyond = calibration::BeyondCeiling(read.model, sending.table); !beyond.empty())
     throw io::InputError(fmt::format("{}: {}, by [ceilings] of {}", o.table, beyond, o.robot));
-  for (const std::string& name : sending.missing) fmt::print("not in {}, kept as in the drive: {}\n", o.table, name);
+  PrintVersion(o, read);
+  for (const std::string& name : read.carried.missing)
+    fmt::print("not in {}, kept as in the drive: {}\n", o.table, name);
   int kept = 0;
   for (const auto& row : sending.table.row) kept += row.from_prior;
   if (kept)
     fmt::print("{} of {} parameters rest on the prior{}\n", kept, sending.table.row.size(),
                o.force ? " (forced)" : "; friction and effects among them keep the drive's value");
-  if (o.dry_run) {
-    fmt::print("dry run: {} registers would be sent, nothing was\n", sending.words.size());
-    return kOk;
-  }
+  const std::vector<std::string> own = DrivesOwn(read, sending);
+  if (o.dry_run)
+    return DryRun(o, drive, sending, KeyOf(key),
+                  {{"registers", sending.words.size()}, {"from_prior", kept}, {"kept", own}});
   client::FlashReport report;
   {
     report::Progress progress("flash");
@@ -99,15 +169,16 @@ int Flash(const FlashOptions& o) {
   else
     fmt::print("{}: {} registers stored, adopted and read back: CRC {:08X}, generation {}, store sequence {}\n",
                drive.name(), sending.words.size(), report.crc, report.generation, report.store_sequence);
-  const nlohmann::ordered_json json{{"table_crc", client::CrcText(report.crc)},
-                                    {"readback_ok", true},
-                                    {"generation", report.generation},
-                                    {"store_sequence", report.store_sequence},
-                                    {"registers", sending.words.size()},
-                                    {"trial_s", o.trial ? o.limit_s : 0},
-                                    {"from_prior", kept}};
-  WriteJson(o.json, json);
-  KeepTable(o.fleet, drive, o.trial ? "flash --trial" : "flash", json, o.table);
+  said = {{"table_crc", client::CrcText(report.crc)},
+          {"readback_ok", true},
+          {"generation", report.generation},
+          {"store_sequence", report.store_sequence},
+          {"registers", sending.words.size()},
+          {"trial_s", o.trial ? o.limit_s : 0},
+          {"from_prior", kept},
+          {"kept", own}};
+  WriteJson(o.json, said);
+  KeepTable(o.fleet, drive, o.trial ? "flash --trial" : "flash", said, o.table);
   return kOk;
 }
 
@@ -115,6 +186,7 @@ int Verify(const FlashOptions& o) {
   const ToFlash read(o);
   client::DriveClient drive = ConnectTo(o.connect);
   const Sending sending = SendingOf(drive, o, read);
+  PrintVersion(o, read);
   const calibration::TableFile& wanted = sending.table;
   const auto active = client::ReadActiveTable(drive);
   const calibration::TableFile is = calibration::DecodeTable(active, wanted);
@@ -126,16 +198,20 @@ int Verify(const FlashOptions& o) {
       fmt::print("{}: drive {:.9g} {}, file {:.9g} {}\n", is.row[k].name, is.row[k].mean, is.row[k].state,
                  wanted.row[k].mean, wanted.row[k].state);
     }
-  const bool same = calibration::EncodeTable(is) == sending.words;
+  const std::vector<std::string> own = DrivesOwn(read, sending);
+  const bool same = calibration::EncodeTable(is) == sending.words, compared = own.size() < is.row.size();
   fmt::print("{}: {}\n", drive.name(),
-             same ? "the table in force is this file's"
-                  : fmt::format("differs in {} parameters{}", differ, differ ? "" : " (joint settings or flags)"));
-  if (!sending.missing.empty())
-    fmt::print("not in {}, so not compared: {}\n", o.table, fmt::join(sending.missing, ", "));
+             !same      ? fmt::format("differs in {} parameters{}", differ, differ ? "" : " (joint settings or flags)")
+             : compared ? "the table in force is this file's"
+                        : "no parameter was compared, so nothing is known");
+  if (!read.carried.missing.empty())
+    fmt::print("not in {}, so not compared: {}\n", o.table, fmt::join(read.carried.missing, ", "));
   if (!sending.kept.empty())
     fmt::print("rest on the prior, so not compared (--force compares them): {}\n", fmt::join(sending.kept, ", "));
-  WriteJson(o.json, {{"same", same}, {"differ", differ}});
-  return same ? kOk : kMismatch;
+  WriteJson(
+      o.json,
+      {{"same", same && !compared ? ordered_json() : ordered_json(same)}, {"differ", differ}, {"not_compared", own}});
+  return same && compared ? kOk : kMismatch;
 }
 
 CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std::shared_ptr<FlashOptions>& o) {
@@ -158,7 +234,7 @@ void AddFlash(CLI::App& app, Action& action) {
                          "store a parameter table in the drive, adopt it and read it back\nexample: armcal flash "
                          "--connect 127.0.0.1:1502 --robot er20_like --table build/table.toml",
                          o);
-  verb->add_flag("--dry-run", o->dry_run, "check and say what would be sent");
+  verb->add_flag("--dry-run", o->dry_run, "check, and say which values would change; nothing is sent or kept");
   AddKeyOption(*verb, o->key);
   AddDriveFleetOptions(*verb, o->fleet, "the table");
   auto* trial = verb->add_flag("--trial", o->trial,
@@ -168,7 +244,11 @@ void AddFlash(CLI::App& app, Action& action) {
       ->capture_default_str()
       ->check(Between(1, int{link::reg::kLongestTrial_s}));
   verb->callback([o, &action] {
-    action = [o] { return Reported(o->json, [&] { return Flash(*o); }, {{"readback_ok", false}}); };
+    action = [o] {
+      ordered_json said{{"readback_ok", false}};
+      return Reported(
+          o->json, [&] { return Flash(*o, said); }, said);
+    };
   });
 }
 
@@ -179,7 +259,7 @@ void AddVerify(CLI::App& app, Action& action) {
                          "--robot er20_like --table build/table.toml",
                          o);
   verb->callback([o, &action] {
-    action = [o] { return Reported(o->json, [&] { return Verify(*o); }, {{"same", false}}); };
+    action = [o] { return Reported(o->json, [&] { return Verify(*o); }, {{"same", nullptr}}); };
   });
 }
 

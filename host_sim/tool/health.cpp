@@ -94,7 +94,7 @@ ordered_json JointJson(const JointHealth& h) {
   return j;
 }
 
-int RunHealth(const HealthOptions& o) {
+int RunHealth(const HealthOptions& o, ordered_json& said) {
   TryFleet(o.fleet);
   client::DriveClient drive = ConnectTo(o.connect);
   ordered_json json{{"verdict", ""}, {"elapsed_s", 0}, {"joints", ordered_json::array()}};
@@ -117,6 +117,7 @@ int RunHealth(const HealthOptions& o) {
   if (unnamed) fmt::print("take a log: armcal record ..., then armcal diagnose ...\n");
   json["changed_together"] = together;
   json["verdict"] = misfit ? "misfit" : early ? "too_early" : "fits";
+  said = json;
   WriteJson(o.json, json);
   KeepHealth(o.fleet, drive, json);
   return misfit ? kMismatch : early ? kPartial : kOk;
@@ -134,7 +135,13 @@ void AddHealth(CLI::App& app, Action& action) {
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--json", o->json, "write the verdicts here");
   AddDriveFleetOptions(*verb, o->fleet, "the verdicts");
-  verb->callback([o, &action] { action = [o] { return RunHealth(*o); }; });
+  verb->callback([o, &action] {
+    action = [o] {
+      ordered_json said = ordered_json::object();
+      return Reported(
+          o->json, [&] { return RunHealth(*o, said); }, said);
+    };
+  });
 }
 
 }  // namespace armcal::tool

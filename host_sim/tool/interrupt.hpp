@@ -1,4 +1,4 @@
-// tool - lets Ctrl-C end the work but not the program, as long as a guard lives.
+// tool - lets the first Ctrl-C end the work but not the program, as long as a guard lives.
 #pragma once
 
 #include <atomic>
@@ -8,7 +8,7 @@ namespace armcal::tool {
 
 class InterruptGuard {
  public:
-  InterruptGuard() : before_(std::signal(SIGINT, [](int) { interrupted_ = true; })) {}
+  InterruptGuard() : before_(std::signal(SIGINT, &Interrupt)) {}
   ~InterruptGuard() { std::signal(SIGINT, before_); }
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
@@ -19,6 +19,10 @@ class InterruptGuard {
  private:
   static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may set it
   inline static std::atomic<bool> interrupted_{false};
+  static void Interrupt(int) {
+    interrupted_ = true;
+    std::signal(SIGINT, SIG_DFL);  // the second Ctrl-C ends the program
+  }
   void (*before_)(int);
 };
 

@@ -76,7 +76,7 @@ void AddLearning(CLI::App& app, Action& action) {
   verb->add_flag("--resume", o->resume, "samples change the estimates again")->excludes(hold);
   verb->add_option("--reset", o->reset, "a joint from 1, or bodies: what was known of it no longer counts");
   verb->add_option("--json", o->json, "write the drive's answer here");
-  verb->callback([o, &action] { action = [o] { return RunLearning(*o); }; });
+  verb->callback([o, &action] { action = [o] { return Reported(o->json, [&] { return RunLearning(*o); }); }; });
 }
 
 }  // namespace armcal::tool

@@ -75,6 +75,8 @@ int ExitCodeOf(const std::exception& error) {
   return kBadInput;
 }
 
+bool WasSent(const std::exception& error) { return dynamic_cast<const client::SentError*>(&error) != nullptr; }
+
 }  // namespace armcal::tool
 
 int main(int argc, char** argv) { return armcal::tool::Main(argc, argv); }

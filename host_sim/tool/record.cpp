@@ -1,9 +1,12 @@
 // tool - armcal record: writes the traces of a drive as logs, and prints how the arm moved.
 #include <fmt/core.h>
+#include <algorithm>
 #include <cmath>
 
+#include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/recording.hpp"
+#include "host_sim/client/table_backup.hpp"
 #include "host_sim/data/logs/log.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
@@ -34,20 +37,24 @@ VectorXd RmsOf(const logs::Log& log, Value value, Use use) {
   return out;
 }
 
-// "work.csv.gz" gives "work.partial.csv.gz", so that nobody takes it for a whole recording.
+// "work.csv.gz" gives "work.partial.csv.gz", so that nobody takes it for a whole recording. A device stays: no file may
+// lie beside it.
 std::string PartialPath(const std::string& path) {
+  if (path.empty() || (std::filesystem::exists(path) && !std::filesystem::is_regular_file(path))) return path;
   const auto name = path.rfind('/') == std::string::npos ? 0 : path.rfind('/') + 1;
-  const auto dot = path.find('.', name);
-  return path.empty() || dot == std::string::npos ? path : path.substr(0, dot) + ".partial" + path.substr(dot);
+  const auto dot = std::min(path.find('.', name), path.size());
+  return path.substr(0, dot) + ".partial" + path.substr(dot);
 }
 
 int RunRecord(const client::RecordOptions& o) {
-  const codegen::Robot robot = codegen::ReadRobot(RobotPath(o.robot));
+  const codegen::Model model = LoadModel(o.robot);
+  const codegen::Robot& robot = model.robot();
   const int n = robot.joints();
   if (o.trajectory.empty() == (o.seconds == 0)) throw io::InputError("record: expected --trajectory or --seconds");
   client::DriveClient drive = ConnectTo(o.connect);
   const InterruptGuard guard;
   client::RecordOptions options = o;
+  options.schema = codegen::Schema(model);
   options.interrupted = &InterruptGuard::interrupted();
   const client::Recording recording = Record(drive, options, robot);
   const bool partial = !recording.cut.empty();
@@ -67,7 +74,9 @@ int RunRecord(const client::RecordOptions& o) {
                               {"wanted_decimation", recording.wanted_decimation},
                               {"packed", recording.packed},
                               {"positions_not_told", recording.unknown},
-                              {"repeated_requests", recording.failed_attempts}};
+                              {"repeated_requests", recording.failed_attempts},
+                              {"schema", client::CrcText(recording.schema)},
+                              {"robot_schema", client::CrcText(options.schema)}};
   report::Table table{{"joint", "moving / %"}, {}};
   VectorXd tracking;
   if (log.qref.size() > 0) {

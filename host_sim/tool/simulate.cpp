@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 struct SimulateOptions {
   std::string scenario = "any", robot = "er20_like", drive, storage = "build/drive.nor", truth_log, serial, key;
-  int port = 1502, read_port = -1;
+  int port = kSimulatedPort, read_port = -1;
   bool real_time = false;
 };
 

@@ -45,6 +45,9 @@ void AddDriveTable(CLI::App& app, Action& action);  // backup, restore, diff, ro
 void AddBench(CLI::App& app, Action& action);
 void AddSurvey(CLI::App& app, Action& action);
 
+// Where armcal simulate listens.
+inline constexpr int kSimulatedPort = 1502;
+
 using codegen::Home;
 using codegen::LoadCatalogue;
 using codegen::LoadModel;
@@ -57,18 +60,22 @@ inline void WriteJson(const std::string& path, const nlohmann::ordered_json& j) 
 
 // The exit code that main() makes of an exception.
 int ExitCodeOf(const std::exception& error);
+// A table was sent, and it is unknown what the drive made of it.
+bool WasSent(const std::exception& error);
 
 // Runs a verb's work. If it fails, the JSON says so, with whatever `said` holds by then: what went wrong, and the exit
-// code.
+// code. The JSON of an earlier run goes first, so that none is left by a run that is killed.
 template <class Work>
 int Reported(const std::string& path, Work work,
              const nlohmann::ordered_json& said = nlohmann::ordered_json::object()) {
+  if (std::filesystem::is_regular_file(std::filesystem::symlink_status(path))) std::filesystem::remove(path);
   try {
     return work();
   } catch (const std::exception& error) {
     nlohmann::ordered_json json = said;
     json["error"] = error.what();
     json["exit_code"] = ExitCodeOf(error);
+    if (WasSent(error)) json["sent"] = true;
     WriteJson(path, json);
     throw;
   }

@@ -1,15 +1,39 @@
 // end-to-end tests - the verbs for a technician at a drive, and a port that may only be read.
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <unistd.h>
+
+#include <atomic>
 #include <fstream>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string_view>
 
 #include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
 #include "codegen/src/generator/load.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "tests/e2e/tool.hpp"
+#include "tests/unit/client/loopback_proxy.hpp"
 
 namespace armcal::tests {
 namespace {
+
+// Carries what comes. `look` sees it first, and may change it. False: the connection ends.
+using Look = std::function<bool(std::span<char> bytes, bool replies)>;
+test::LoopbackProxy::Move Seen(Look look) {
+  return [look = std::move(look)](int from, int to, bool replies) {
+    char bytes[512];
+    const ssize_t count = ::recv(from, bytes, sizeof bytes, 0);
+    return count > 0 && look({bytes, static_cast<std::size_t>(count)}, replies) &&
+           ::send(to, bytes, static_cast<std::size_t>(count), MSG_NOSIGNAL) == count;
+  };
+}
+// A request that holds the command "save".
+bool IsSave(std::span<const char> bytes, bool replies) {
+  return !replies && std::string_view(bytes.data(), bytes.size()).find("evas") != std::string_view::npos;
+}
 
 class DeviceVerbs : public testing::Test {
  protected:
@@ -74,6 +98,94 @@ TEST_F(DeviceVerbs, ABackup_ComesBackWordForWord_AndADamagedOneIsRefused) {
   EXPECT_EQ(Json()["differ"][0]["word"], 17);
 }
 
+TEST_F(DeviceVerbs, ABackupOfAnotherDrive_IsRestoredOnlyIfThatIsSaid) {
+  const std::string file = (folder_ / "backup.json").string(), table = (folder_ / "table.toml").string();
+  calibration::WriteTable(table, calibration::DefaultTable(codegen::LoadModel("er20_like")));
+  ASSERT_EQ(Ask({"flash", "--robot", "er20_like", "--table", table}).code, 0);
+  ASSERT_EQ(Ask({"backup", file}).code, 0);
+  nlohmann::json backup = ReadJson(file);
+  const auto serial_number = backup["serial_number"].get<std::uint32_t>();
+  ASSERT_EQ(Ask({"diff", file}).code, 0);
+  EXPECT_EQ(Json()["another_drive"], false);
+  backup["serial_number"] = serial_number + 1;
+  std::ofstream(file) << backup;
+  const Outcome o = Ask({"restore", file});
+  ExpectOneLine(o, 2, "serial number " + std::to_string(serial_number + 1));
+  EXPECT_NE(o.err.find("has " + std::to_string(serial_number) + "; --another-drive"), std::string::npos) << o.err;
+  const Outcome diff = Ask({"diff", file});
+  EXPECT_EQ(diff.code, 0);
+  EXPECT_NE(diff.out.find("is of the drive with serial number"), std::string::npos) << diff.out;
+  EXPECT_EQ(Json()["another_drive"], true);
+  EXPECT_EQ(Ask({"restore", file, "--another-drive"}).code, 0);
+  backup["schema"] = "00000000";
+  std::ofstream(file) << backup;
+  ExpectOneLine(Ask({"restore", file, "--another-drive"}), 2, "\"schema\"");
+}
+
+TEST_F(DeviceVerbs, WithoutALink_WriteTheErrorIntoTheirJson) {
+  const TakenPort closed(false);
+  for (const char* verb : {"learning", "health", "info", "watch", "trial", "log"}) {
+    std::ofstream(folder_ / "out.json") << "{}";  // of an earlier run
+    ExpectOneLine(Ask({verb}, closed.address()), 3, "cannot connect");
+    EXPECT_EQ(Json()["exit_code"], 3) << verb;
+    EXPECT_NE(Json()["error"].get<std::string>().find("cannot connect"), std::string::npos) << verb;
+  }
+}
+
+// The save goes through, and nothing after it.
+TEST_F(DeviceVerbs, ALinkThatIsLostAfterTheSave_IsToldAsSent) {
+  const std::string table = (folder_ / "table.toml").string();
+  calibration::WriteTable(table, calibration::DefaultTable(codegen::LoadModel("er20_like")));
+  std::atomic<bool> saved{false};
+  test::LoopbackProxy proxy(drive_.port(), Seen([&](std::span<char> bytes, bool replies) {
+                              if (saved) return false;
+                              saved = IsSave(bytes, replies);
+                              return true;
+                            }));
+  ExpectOneLine(Ask({"flash", "--robot", "er20_like", "--table", table}, "127.0.0.1:" + std::to_string(proxy.port())),
+                3, "the table was sent, and it is unknown whether it is in force: armcal verify or armcal info tells");
+  EXPECT_EQ(Json()["sent"], true);
+  EXPECT_EQ(Json()["readback_ok"], false);
+}
+
+// The database is spoilt while the table is stored.
+TEST_F(DeviceVerbs, ADatabaseThatFailsAfterTheFlash_LeavesTheTruthInTheJson) {
+  const std::string table = (folder_ / "table.toml").string(), database = (folder_ / "fleet.sqlite").string();
+  calibration::WriteTable(table, calibration::DefaultTable(codegen::LoadModel("er20_like")));
+  test::LoopbackProxy proxy(drive_.port(), Seen([&](std::span<char> bytes, bool replies) {
+                              if (IsSave(bytes, replies)) std::ofstream(database) << std::string(1000, 'x');
+                              return true;
+                            }));
+  const auto fails = [&](std::vector<std::string> words) {
+    fs::remove(database);
+    words.insert(words.end(), {"--db", database, "--arm", "left"});
+    ExpectOneLine(Ask(words, "127.0.0.1:" + std::to_string(proxy.port())), 2, "is not a database");
+    EXPECT_EQ(Json()["readback_ok"], true) << words[0];
+    EXPECT_EQ(Json()["exit_code"], 2) << words[0];
+    EXPECT_TRUE(Json().contains("error") && Json().contains("table_crc")) << words[0];
+  };
+  fails({"flash", "--robot", "er20_like", "--table", table});
+  fails({"flash", "--robot", "er20_like", "--table", table});
+  fails({"rollback"});
+  const std::string backup = (folder_ / "backup.json").string();
+  ASSERT_EQ(Ask({"backup", backup}).code, 0);
+  fails({"restore", backup});
+}
+
+// A device that answers Modbus and is no armcal drive: the magic number of the identity is another one.
+TEST_F(DeviceVerbs, OnAnotherDevice_NothingIsReadOrWritten) {
+  ASSERT_EQ(Ask({"set", "scratch[3]", "5"}).code, 0);
+  test::LoopbackProxy other(drive_.port(), Seen([](std::span<char> bytes, bool replies) {
+                              if (replies && bytes.size() == 61 && bytes[7] == 4 && bytes[8] == 52) bytes[9] = 0;
+                              return true;
+                            }));
+  const std::string address = "127.0.0.1:" + std::to_string(other.port());
+  ExpectOneLine(Ask({"get", "scratch[3]"}, address), 3, "not an armcal drive");
+  ExpectOneLine(Ask({"set", "scratch[3]", "6"}, address), 3, "not an armcal drive");
+  ASSERT_EQ(Ask({"get", "scratch[3]"}).code, 0);
+  EXPECT_EQ(Json()["value"], 5);
+}
+
 // A table file with one number changed, so that two of them differ.
 TEST_F(DeviceVerbs, ATrial_IsStoredOnlyByConfirm_AndRollbackBringsTheOlderTable) {
   const auto file = [&](double scale) {
@@ -104,11 +216,13 @@ TEST_F(DeviceVerbs, ATrial_IsStoredOnlyByConfirm_AndRollbackBringsTheOlderTable)
   ASSERT_EQ(Ask({"trial"}).code, 0);
   EXPECT_EQ(Json()["on_trial"], true);
   EXPECT_GT(Json()["left_s"], 1000);
-  ExpectOneLine(flash(1.03), 4, "WrongOrder");
+  ExpectOneLine(flash(1.03), 4, "a trial runs; end or confirm it first");
+  ExpectOneLine(Ask({"rollback"}), 4, "a trial runs; end or confirm it first");
   ASSERT_EQ(Ask({"trial", "--end"}).code, 0);
   EXPECT_EQ(Json()["on_trial"], false);
   EXPECT_EQ(scale(), 1.01f);
-  ExpectOneLine(Ask({"trial", "--confirm"}), 4, "WrongOrder");
+  ExpectOneLine(Ask({"trial", "--confirm"}), 4, "no table is on trial");
+  ExpectOneLine(Ask({"trial", "--end"}), 4, "no table is on trial");
   ASSERT_EQ(flash(1.02, {"--trial"}).code, 0);
   ASSERT_EQ(Ask({"trial", "--confirm"}).code, 0);
   EXPECT_EQ(Json()["store_sequence"], 2);
@@ -135,10 +249,36 @@ TEST_F(DeviceVerbs, WatchScanAndMap_WriteWhatTheyShow) {
   ASSERT_EQ(Tool({"scan", "127.0.0.1", "--from", port, "--to", port, "--json", (folder_ / "out.json").string()}).code,
             0);
   EXPECT_EQ(Json()[0]["address"], drive_.address());
+  ASSERT_EQ(Tool({"scan", drive_.address(), "--json", (folder_ / "out.json").string()}).code, 0);
+  EXPECT_EQ(Json().size(), 1u);
+  EXPECT_EQ(Json()[0]["address"], drive_.address());
+  // Simulated drives listen on 127.0.0.1. The last of the usual ports is that of armcal simulate.
+  ExpectOneLine(Tool({"scan", "127.0.0.2", "--json", (folder_ / "out.json").string()}), 3,
+                "no drive answered; the last failure was: 127.0.0.2:1502: cannot connect");
+  EXPECT_EQ(Json()["exit_code"], 3);
+  EXPECT_TRUE(Json()["found"].empty());
   const Outcome csv = Tool({"map", "--csv"});
   EXPECT_NE(csv.out.find("holding,337,1,u16,rw,learning_reset,,1 to 17"), std::string::npos);
   EXPECT_NE(Tool({"map", "--md"}).out.find("### Holding registers"), std::string::npos);
   EXPECT_EQ(nlohmann::json::parse(Tool({"map", "--json"}).out)["map_minor"], 6);
+}
+
+TEST(Watch, KeepsItsReadingsWhenTheLinkDrops) {
+  const fs::path folder = FreshFolder("watch"), json = folder / "out.json";
+  auto drive = std::make_unique<RunningDrive>(folder);
+  std::ofstream(json) << "[]";  // of an earlier run
+  int pipe_ends[2];
+  ASSERT_EQ(pipe2(pipe_ends, O_CLOEXEC), 0);
+  const pid_t watch = Start({ARMCAL_TOOL, "watch", "--connect", drive->address(), "--json", json.string()},
+                            pipe_ends[1], STDERR_FILENO);
+  close(pipe_ends[1]);
+  for (char c = 0; read(pipe_ends[0], &c, 1) == 1 && c != '\n';) continue;
+  EXPECT_FALSE(fs::exists(json)) << "a result of an earlier run would be taken for this one's";
+  drive.reset();
+  EXPECT_EQ(WaitFor(watch), 3);
+  close(pipe_ends[0]);
+  EXPECT_GE(ReadJson(json).at("readings").size(), 1u);
+  EXPECT_EQ(ReadJson(json).at("exit_code"), 3);
 }
 
 // Against a drive with a key: without the key nothing is stored, and with it all verbs go on as before.
@@ -167,6 +307,8 @@ TEST(DriveWithAKey, TakesWhatIsSignedForIt) {
     return ask(words);
   };
   ExpectOneLine(flash(1.01, {}), 4, "--key FILE");
+  ExpectOneLine(flash(1.01, {"--dry-run"}), 4, "--key FILE");
+  EXPECT_EQ(flash(1.01, {"--dry-run", "--key", key}).code, 0);
   ExpectOneLine(flash(1.01, {"--key", wrong}), 4, "BadSignature");
   ASSERT_EQ(flash(1.01, {"--key", key}).code, 0);
   EXPECT_EQ(ask({"verify", "--robot", "er20_like", "--table", (folder / "table.toml").string()}).code, 0);

@@ -64,6 +64,7 @@ class Sessions {
     EXPECT_TRUE(o.code != kRefused || is_old) << said;
     EXPECT_TRUE(o.code != kMismatch || !is_new) << said;
     ExpectTrueJson(o, status, said);
+    EXPECT_TRUE(o.code != kLink || !is_new || ReadJson(Json()).value("sent", false)) << said;
     if (is_new) now_ = next;
     if (!is_old && !is_new) client::FlashTable(direct_, words_[now_]);
     return o.code;

@@ -61,6 +61,11 @@ class Mistakes : public testing::Test {
     Robots();
     Maps();
     Write("empty.json", "{}");
+    Write("table.toml",
+          "robot = \"er20_like\"\nschema = 1\nforgetting = [1, 1, 1, 1]\n[[joint]]\nsigma_Nm = 1\nv_min_radps = "
+          "0.01\ntorque_limit_Nm = 100\ntorque_scale = 1\n[[parameter]]\nname = \"Fc1\"\nmean = 1\nsd = 1\nstate = "
+          "\"fixed\"\n");
+    Write("group.toml", ReadText(folder_ / "table.toml") + "group = 1.5\n");
     Write("broken.json", "{ not json");
     Write("path.csv", "t,q1\n0,0\n1,1\n");
     const std::string scenario =
@@ -202,6 +207,8 @@ TEST_F(Mistakes, OnTheCommandLine) {
       {"convert {}/good.csv --out {}/x.csv", {"--channels is required"}, {"armcal convert --help"}},
       {"excite --robot er20_like --out {}/x.csv --seconds -3", {"--seconds -3"}, {"a number from 0 to"}},
       {"excite --robot er20_like --out {}/x.csv --seconds ten", {"--seconds ten"}, {"a number from 0 to"}},
+      {"excite --robot er20_like --out {}/x.csv --seconds nan", {"--seconds nan"}, {"a number from 0 to"}},
+      {"excite --robot er20_like --out {}/x.csv --harmonics nan", {"--harmonics nan"}, {"an integer from 1 to 20"}},
       {"excite --robot er20_like --out {}/x.csv --purpose training", {"--purpose training"}, {"train or test"}},
       {"excite --robot er20_like --out {}/x.csv --harmonics 2.5", {"--harmonics 2.5"}, {"an integer from 1 to 20"}},
       {"excite --robot er20_like --out {}/x.csv --seed abc", {"--seed abc"}, {"expected a number"}},
@@ -211,6 +218,7 @@ TEST_F(Mistakes, OnTheCommandLine) {
       {"excite --robot er20_like --out {}/x.csv --separate stribeck:7", {"stribeck:7"}, {"joints", "1 to 6"}},
       {"excite --robot er20_like --out {}/x.csv --from {}/empty.json", {"--from"}, {"requires --separate"}},
       {"replay --robot er20_like --segment 0 {}/good.csv", {"--segment 0"}, {"a number above 0"}},
+      {"replay --robot er20_like --segment nan {}/good.csv", {"--segment nan"}, {"a number above 0"}},
       {"export --robot er20_like --format xml --out {}/x", {"--format xml"}, {"urdf, sdf, mjcf, yaml or c"}},
       {"export --robot er20_like --format urdf --out {}/x", {"names no URDF"}, {"expected --urdf FILE"}},
       {"estimate --robot er20_like", {"estimate"}, {"either --connect or --log"}},
@@ -343,7 +351,11 @@ TEST_F(Mistakes, WithAFileOfTheRobotTheTableOrTheChannels) {
 
 TEST_F(Mistakes, WhereToWrite) {
   const std::string convert = "convert {}/good.csv --channels {}/map.toml --out ";
+  const std::string record = "record --connect CLOSED --robot er20_like --seconds 3 --out ";
   MakeAll({
+      {record + "{}/folder", {"{}/folder: cannot be written: Is a directory"}, {"choose another place"}},
+      {record + "{}/x.csv --samples {}/good.csv/x.csv", {"x.csv: cannot be written: Not a directory"}, {"choose"}},
+      {"backup {}/folder --connect CLOSED", {"{}/folder: cannot be written: Is a directory"}, {"another place"}},
       {convert + "{}/folder", {"{}/folder: cannot be written"}, {"choose another place"}},
       {"survey --report {}/folder", {"{}/folder: cannot be written: Is a directory"}, {"choose another place"}},
       {"bench --robot er20_like --json {}/good.csv/x.json", {"x.json: cannot be written: Not a directory"}, {"choose"}},
@@ -353,6 +365,30 @@ TEST_F(Mistakes, WhereToWrite) {
       {"demo --out /proc/armcal", {"/proc/armcal: this folder cannot be made"}, {"choose another place"}},
       {"simulate --scenario none --port 0 --storage /proc/armcal/x.nor", {"/proc/armcal"}, {"another place"}},
       {"simulate --scenario none --port 0 --storage {}/folder", {"{}/folder"}, {"a file that can be written"}},
+  });
+}
+
+// Nothing is asked of a drive before.
+TEST_F(Mistakes, OneFileForTwoOptions) {
+  const std::string flash = "flash --connect CLOSED --robot er20_like --table {}/robot.toml --json ";
+  fs::create_symlink(folder_ / "robot.toml", folder_ / "link.toml");
+  MakeAll({
+      {"record --connect CLOSED --robot er20_like --seconds 3 --out {}/x.csv --samples {}/x.csv",
+       {"--out and --samples both name {}/x.csv"},
+       {"choose another place"}},
+      {"backup {}/x.json --connect CLOSED --json {}/folder/../x.json",
+       {"--json", "file", "both name"},
+       {"another place"}},
+      {"restore {}/empty.json --connect CLOSED --json {}/empty.json",
+       {"--json", "file", "both name"},
+       {"another place"}},
+      {flash + "{}/robot.toml", {"--json and --table both name {}/robot.toml"}, {"choose another place"}},
+      {flash + "{}/link.toml", {"--json and --table both name {}/link.toml"}, {"choose another place"}},
+      {flash + "{}/x --db {}/x --arm a", {"--json and --db both name {}/x"}, {"choose another place"}},
+      {"identify --robot er20_like --train {}/held_out.csv {}/good.csv --table-out {}/good.csv",
+       {"--table-out", "--train", "both name {}/good.csv"},
+       {"choose another place"}},
+      {"generate --robot {}/robot.toml --out {}/x --json {}/x", {"--out and --json both name {}/x"}, {"another place"}},
   });
 }
 
@@ -370,6 +406,7 @@ TEST_F(Mistakes, WithADriveOrASimulatedOne) {
       {"demo --out {}/x --scenario nope", {"scenario nope"}, {"expected a file or one of any"}},
       {"record --connect CLOSED --robot er20_like --out {}/x.csv", {"record"}, {"--trajectory or --seconds"}},
       {"record --connect CLOSED --robot er20_like --seconds -3 --out {}/x.csv", {"--seconds -3"}, {"from 1 to"}},
+      {"record --connect CLOSED --robot er20_like --seconds nan --out {}/x.csv", {"--seconds nan"}, {"from 1 to"}},
       {"record --connect CLOSED --robot er20_like --seconds 3 --out {}/x.csv",
        {"CLOSED: cannot connect"},
        {"is a drive running there"},
@@ -382,7 +419,21 @@ TEST_F(Mistakes, WithADriveOrASimulatedOne) {
       {"verify --connect CLOSED --robot er20_like --table {}/absent.toml",
        {"absent.toml: no such"},
        {"check the path"}},
+      {"flash --connect CLOSED --robot two_link --table {}/table.toml",
+       {"table.toml: is a table of robot er20_like", "expected one of robot two_link"},
+       {"give --robot er20_like"}},
+      {"verify --connect CLOSED --robot two_link --table {}/table.toml",
+       {"table of robot er20_like"},
+       {"give --robot"}},
+      {"flash --connect CLOSED --robot er20_like --table {}/group.toml", {"group"}, {"an integer from 0 to 3"}},
       {"health --connect nowhere", {"--connect nowhere"}, {"HOST:PORT"}},
+      {"health --connect [::1]:1", {"::1:1: cannot connect"}, {"is a drive running there"}, kLink},
+      {"scan /dev/does-not-exist --to 248", {"--to 248"}, {"a unit from 1 to 247"}},
+      {"scan /dev/does-not-exist:9600:X", {"scan /dev/does-not-exist:9600:X"}, {"DEVICE[:BAUD[:PARITY]]"}},
+      {"scan /dev/does-not-exist:9600:N --to 2", {"/dev/does-not-exist: cannot connect"}, {"plugged in"}, kLink},
+      {"scan 127.0.0.1 --from 502", {"scan 127.0.0.1"}, {"expected --from and --to"}},
+      {"scan 127.0.0.1:502 --from 1 --to 2", {"scan 127.0.0.1:502: has a port"}, {"a host alone"}},
+      {"scan 127.0.0.1:0", {"scan 127.0.0.1:0"}, {"a port from 1 to 65535"}},
       {"health --connect 127.0.0.1:99999", {"127.0.0.1:99999"}, {"HOST:PORT"}},
       {"health --connect no-such-host.invalid:502", {"cannot find this host"}, {"check the name"}, kLink},
       {"health --connect /dev/does-not-exist", {"/dev/does-not-exist: cannot connect"}, {"plugged in"}, kLink},

@@ -102,10 +102,76 @@ TEST_F(Flashing, TablesBeyondTheCeilings_AreRefusedByTheTool) {
 }
 
 TEST_F(Flashing, AnotherSchema_IsRefused) {
-  ExpectFlashRefused(good_, kRefused, "schema", "two_link");  // the tool's model is not the drive's
   const codegen::Model two(codegen::ReadRobot("codegen/robots/two_link.toml"),
                            codegen::ReadCatalogue("codegen/effects"));
-  ExpectFlashRefused(File("two.toml", calibration::DefaultTable(two)), kBadInput, "two.toml");
+  const std::string table = File("two.toml", calibration::DefaultTable(two));
+  ExpectFlashRefused(table, kRefused, "schema", "two_link");  // the tool's model is not the drive's
+  ExpectFlashRefused(table, kBadInput, "two.toml: is a table of robot two_link, expected one of robot er20_like");
+  calibration::TableFile renamed = table_;
+  renamed.robot = "er21_like";
+  ExpectFlashRefused(File("renamed.toml", renamed), kBadInput, "give --robot er21_like");
+}
+
+TEST_F(Flashing, RowsThatTheModelDoesNotHave_AreRefused) {
+  calibration::TableFile t = table_;
+  t.row[66].name = "FC1";
+  ExpectFlashRefused(File("misspelt.toml", t), kBadInput, "the nearest is Fc1");
+  t = table_;
+  t.row[66].unit = "N*mm";
+  ExpectFlashRefused(File("unit.toml", t), kBadInput, "Fc1: unit is N*mm, expected N*m");
+  t = table_;
+  t.row.push_back(t.row[66]);
+  ExpectFlashRefused(File("twice.toml", t), kBadInput, "Fc1 is there twice");
+}
+
+TEST_F(Flashing, APartOfATable_KeepsTheRestAndNamesIt) {
+  calibration::TableFile t = table_;
+  t.row = {table_.row[66]};
+  t.row[0].mean += 1;
+  const std::string part = File("part.toml", t);
+  const std::size_t others = table_.row.size() - 1;
+  EXPECT_EQ(Verb("flash", part).code, 0);
+  EXPECT_EQ(ReadJson(folder_ / "out.json").at("kept").size(), others);
+  EXPECT_EQ(ReadJson(folder_ / "out.json").at("kept")[0], table_.row[0].name);
+  EXPECT_EQ(Verb("verify", part).code, 0);
+  EXPECT_EQ(ReadJson(folder_ / "out.json").at("same"), true);
+  EXPECT_EQ(ReadJson(folder_ / "out.json").at("not_compared").size(), others);
+}
+
+// Of a model with an effect that this drive does not have.
+TEST_F(Flashing, ATableOfAnotherVersionOfTheModel_IsCarriedOverAndSaysSo) {
+  calibration::TableFile t = table_;
+  t.schema ^= 1;
+  t.row.push_back(t.row[66]);
+  t.row.back().name = "stribeck.dFs1";
+  Outcome o = Verb("flash", File("other_version.toml", t));
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.out.find("another version of the model"), std::string::npos) << o.out;
+  EXPECT_NE(o.out.find("left out: stribeck.dFs1"), std::string::npos) << o.out;
+  t.row = {t.row.back()};
+  o = Verb("verify", File("nothing.toml", t));
+  EXPECT_EQ(o.code, kMismatch) << o.out;
+  EXPECT_NE(o.out.find("no parameter was compared"), std::string::npos) << o.out;
+  EXPECT_TRUE(ReadJson(folder_ / "out.json").at("same").is_null());
+}
+
+TEST_F(Flashing, ADryRun_NamesWhatWouldChangeAndKeepsNothing) {
+  calibration::TableFile t = table_;
+  t.row[66].mean += 1;
+  const fs::path database = folder_ / "dry.sqlite", json = folder_ / "dry.json";
+  const Outcome o =
+      Tool({"flash", "--connect", drive_.address(), "--robot", "er20_like", "--table", File("dry.toml", t), "--dry-run",
+            "--db", database.string(), "--arm", "left", "--json", json.string()});
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.out.find("Fc1: "), std::string::npos) << o.out;
+  const nlohmann::json told = ReadJson(json);
+  EXPECT_TRUE(told.at("dry_run").get<bool>());
+  ASSERT_EQ(told.at("changes").size(), 1u) << told;
+  EXPECT_EQ(told.at("changes")[0].at("name"), "Fc1");
+  EXPECT_NEAR(told.at("changes")[0].at("to").get<double>() - told.at("changes")[0].at("from").get<double>(), 1, 1e-5)
+      << "two floats near 60";
+  EXPECT_FALSE(fs::exists(database));
+  EXPECT_EQ(Verb("verify", good_).code, 0);
 }
 
 TEST_F(Flashing, ADifferentTable_DoesNotVerify) {
@@ -144,6 +210,12 @@ TEST(Link, ADriveThatDoesNotAnswer_IsALinkError) {
   const TakenPort silent(true);
   ExpectOneLine(Tool({"flash", "--connect", silent.address(), "--robot", "er20_like", "--table", table}), kLink,
                 silent.address());
+  const TakenPort closed(false);
+  const std::string json = (folder / "verify.json").string();
+  ExpectOneLine(
+      Tool({"verify", "--connect", closed.address(), "--robot", "er20_like", "--table", table, "--json", json}), kLink,
+      "cannot connect");
+  EXPECT_TRUE(ReadJson(json).at("same").is_null());
 }
 
 }  // namespace

@@ -192,7 +192,7 @@ def with_tool(tool, path):
         log = os.path.join(folder, "log.csv")
         record = [tool, "record", *drive, "--robot", "er20_like", "--out", log]
         assert "plays no trajectories" in run(4, *record, "--trajectory", "any.csv")
-        assert "serves no trace of processed samples" in run(4, *record, "--seconds", "5", "--samples", log)
+        assert "serves no trace of processed samples" in run(4, *record, "--seconds", "5", "--samples", log + ".gz")
         run(0, *record, "--seconds", "5", "--lean")
         with open(log, encoding="utf-8") as file:
             header, *rows = [line.strip().split(",") for line in file if not line.startswith("#")]

@@ -10,11 +10,13 @@ namespace armcal::report {
 Progress::Progress(std::string task, std::FILE* out)
     : task_(std::move(task)), out_(out), terminal_(isatty(fileno(out)) == 1) {}
 
-Progress::~Progress() {
-  if (terminal_ && shown_percent_ >= 0) {
-    std::fputs("\r\033[K", out_);
-    std::fflush(out_);
-  }
+Progress::~Progress() { Clear(); }
+
+void Progress::Clear() {
+  if (!terminal_ || shown_percent_ < 0) return;
+  std::fputs("\r\033[K", out_);
+  std::fflush(out_);
+  shown_percent_ = -1;
 }
 
 void Progress::Set(double done) {

@@ -17,6 +17,8 @@ class Progress {
 
   // done: 0 to 1. Cheap when nothing visible changes.
   void Set(double done);
+  // Takes the line away, so that something else can be printed. The next Set shows it again.
+  void Clear();
 
  private:
   std::string task_;

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "armcal/model/parameters.hpp"
 #include "codegen/src/generator/emit.hpp"
+#include "codegen/src/io/faults.hpp"
 #include "codegen/src/io/file_kind.hpp"
 #include "codegen/src/io/toml_reader.hpp"
 #include "host_sim/data/files/files.hpp"
@@ -146,17 +148,42 @@ TableFile DecodeTable(const std::vector<std::uint16_t>& words, const TableFile& 
   return t;
 }
 
-std::vector<std::string> CarryOver(const TableFile& from, TableFile& to) {
-  std::map<std::string, const TableRow*> known;
-  for (const TableRow& r : from.row) known[r.name] = &r;
-  std::vector<std::string> missing;
+CarriedOver CarryOver(const TableFile& from, TableFile& to, const std::string& source) {
+  if (from.robot != to.robot)
+    throw io::InputError(
+        fmt::format("{}: is a table of robot {}, expected one of robot {}; give --robot {}, or a table "
+                    "that armcal identify made with --robot {}",
+                    source, from.robot, to.robot, from.robot, to.robot));
+  if (from.joint.size() != to.joint.size())
+    throw io::InputError(
+        fmt::format("{}: {} joints, expected {} (robot {})", source, from.joint.size(), to.joint.size(), to.robot));
+  std::map<std::string, const TableRow*> left;
+  for (const TableRow& r : from.row) left[r.name] = &r;
+  CarriedOver out;
+  std::vector<std::string_view> absent;
   for (TableRow& r : to.row) {
-    const auto it = known.find(r.name);
-    if (it == known.end()) missing.push_back(r.name);
-    else r = *it->second;
+    const auto it = left.find(r.name);
+    if (it == left.end()) {
+      out.missing.push_back(r.name), absent.push_back(r.name);
+      continue;
+    }
+    const TableRow& given = *it->second;
+    if (!given.unit.empty() && given.unit != r.unit)
+      throw io::InputError(
+          fmt::format("{}: {}: unit is {}, expected {} (robot {})", source, r.name, given.unit, r.unit, to.robot));
+    const std::string unit = r.unit;
+    r = given, r.unit = unit;
+    left.erase(it);
   }
-  if (from.joint.size() == to.joint.size()) to.joint = from.joint;
-  return missing;
+  for (const auto& [name, row] : left) out.unknown.push_back(name);
+  if (from.schema == to.schema && !out.unknown.empty()) {
+    const std::string& name = out.unknown.front();
+    const std::string nearest = io::Nearest(name, absent);
+    throw io::InputError(fmt::format("{}: {}: robot {} has no such parameter{}", source, name, to.robot,
+                                     nearest.empty() ? "" : "; the nearest is " + nearest));
+  }
+  to.joint = from.joint;
+  return out;
 }
 
 void WriteTable(const std::filesystem::path& path, const TableFile& t) {
@@ -197,11 +224,8 @@ TableFile ReadTable(const std::filesystem::path& path) {
   TableFile t;
   t.robot = in.Text("robot");
   t.note = in.Text("note", "");
-  const double schema = in.Number("schema"), blend = in.Number("blend_ms", 0);
-  if (schema < 0 || schema > 4294967295.0) in.Fail("schema", "a 32-bit number");
-  if (blend < 0 || blend > 1e6) in.Fail("blend_ms", "0 to 1000000");
-  t.schema = static_cast<std::uint32_t>(schema);
-  t.blend_ms = static_cast<std::uint32_t>(blend);
+  t.schema = static_cast<std::uint32_t>(in.Integer("schema", 0, 4294967295));
+  t.blend_ms = static_cast<std::uint32_t>(in.Integer("blend_ms", 0, 1000000, 0));
   t.bumpless = in.Flag("bumpless", false);
   const auto forgetting = in.Numbers("forgetting", 4);
   std::copy(forgetting.begin(), forgetting.end(), t.forgetting);
@@ -210,20 +234,21 @@ TableFile ReadTable(const std::filesystem::path& path) {
     t.joint.push_back({j.Positive("sigma_Nm"), j.Positive("v_min_radps"), j.Positive("torque_limit_Nm"),
                        j.Positive("torque_scale"), j.Has("gate_sigma") ? j.Positive("gate_sigma") : 0.0});
   }
+  std::set<std::string> names;
   for (const auto& p : in.Tables("parameter")) {
     p.AllowOnly(
         {"name", "unit", "mean", "sd", "process_noise", "state", "group", "posterior_sd", "from_prior", "free_mean"});
     TableRow r;
     r.name = p.Text("name");
+    if (!names.insert(r.name).second) p.Fail("name", "each name once, and " + r.name + " is there twice");
     r.unit = p.Text("unit", "");
     r.mean = p.Number("mean");
-    r.sd = p.Number("sd");
+    r.sd = p.NotNegative("sd");
     r.process_noise = p.Number("process_noise", 0);
     r.state = p.Text("state");
     if (std::find(std::begin(kStates), std::end(kStates), r.state) == std::end(kStates))
       p.Fail("state", "estimated, considered, fixed or standby");
-    r.group = static_cast<int>(p.Number("group", 0));
-    if (r.sd < 0 || r.group < 0 || r.group > 3) p.Fail("group", "sd not below zero and a group 0 to 3");
+    r.group = static_cast<int>(p.Integer("group", 0, 3, 0));
     r.posterior_sd = p.Number("posterior_sd", 0);
     r.from_prior = p.Flag("from_prior", false);
     r.free_mean = p.Number("free_mean", r.mean);

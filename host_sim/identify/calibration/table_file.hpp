@@ -56,8 +56,15 @@ void WriteTable(const std::filesystem::path& path, const TableFile& table);
 std::vector<std::uint16_t> EncodeTable(const TableFile& table);
 TableFile DecodeTable(const std::vector<std::uint16_t>& words, const TableFile& like);
 
-// Copies the values of `from` into the layout `to`, by parameter name. Rows that `from` does not have keep their value;
-// their names are returned.
-std::vector<std::string> CarryOver(const TableFile& from, TableFile& to);
+// Names of parameters that one of two tables lacks.
+struct CarriedOver {
+  std::vector<std::string> missing;  // rows that `from` does not have: they keep their value
+  std::vector<std::string> unknown;  // rows that `to` does not have
+};
+
+// Copies the values of `from` into the layout `to`, by parameter name. Throws io::InputError, which names `source`: a
+// table of another robot, another number of joints, another unit, or an unknown row in a table of the same schema. A
+// table of another schema was made for another version of the model, so it may hold rows of other effects.
+CarriedOver CarryOver(const TableFile& from, TableFile& to, const std::string& source);
 
 }  // namespace armcal::calibration

@@ -145,13 +145,48 @@ TEST(TableFile, CarriedOver_ByNameIntoAnotherLayout) {
   TableRow added = to.row.back();
   added.name = "stribeck.dFs2", added.mean = 4.5;
   to.row.push_back(added);
-  EXPECT_EQ(CarryOver(from, to), std::vector<std::string>{"stribeck.dFs2"});
+  EXPECT_EQ(CarryOver(from, to, "t.toml").missing, std::vector<std::string>{"stribeck.dFs2"});
   for (const TableRow& r : to.row) {
     const auto same =
         std::find_if(from.row.begin(), from.row.end(), [&](const TableRow& f) { return f.name == r.name; });
     EXPECT_EQ(r.mean, same == from.row.end() ? 4.5 : same->mean) << r.name;
   }
   EXPECT_EQ(to.joint[2].torque_limit_Nm, 900);
+}
+
+TEST(TableFile, ThatDoesNotFitTheModel_IsNotCarriedOver) {
+  const auto error = [](auto change) {
+    TableFile from = Changed(), to = DefaultTable(Er20Model());
+    change(from);
+    return ErrorOf([&] { CarryOver(from, to, "t.toml"); });
+  };
+  EXPECT_EQ(error([](TableFile&) {}), "");
+  EXPECT_EQ(error([](TableFile& t) { t.row.erase(t.row.begin(), t.row.begin() + 60); }), "") << "a part is a table";
+  EXPECT_EQ(error([](TableFile& t) { t.row[66].unit = ""; }), "") << "a unit may be left out";
+  EXPECT_NE(error([](TableFile& t) {
+              t.robot = "ur10";
+            }).find("t.toml: is a table of robot ur10, expected one of robot er20_like"),
+            std::string::npos);
+  EXPECT_NE(error([](TableFile& t) { t.joint.pop_back(); }).find("t.toml: 5 joints, expected 6"), std::string::npos);
+  EXPECT_NE(error([](TableFile& t) {
+              t.row[66].name = "FC1";
+            }).find("FC1: robot er20_like has no such parameter; the nearest is Fc1"),
+            std::string::npos);
+  EXPECT_NE(error([](TableFile& t) { t.row[66].unit = "N*mm"; }).find("Fc1: unit is N*mm, expected N*m"),
+            std::string::npos);
+}
+
+// A table of another version of the model may hold effects that this one lacks.
+TEST(TableFile, OfAnotherSchema_LeavesOutWhatTheModelLacksAndNamesIt) {
+  TableFile from = Changed(), to = DefaultTable(Er20Model());
+  from.schema ^= 1;
+  from.row[66].name = "stribeck.dFs1";
+  from.row[66].unit = "";
+  const CarriedOver carried = CarryOver(from, to, "t.toml");
+  EXPECT_EQ(carried.unknown, std::vector<std::string>{"stribeck.dFs1"});
+  EXPECT_EQ(carried.missing, std::vector<std::string>{"Fc1"});
+  EXPECT_EQ(to.row[70].mean, from.row[70].mean);
+  EXPECT_EQ(to.schema, from.schema ^ 1);
 }
 
 TEST(TableFile, BadFiles_AreRefusedNamingFileAndKey) {
@@ -173,6 +208,9 @@ TEST(TableFile, BadFiles_AreRefusedNamingFileAndKey) {
                                 {with("sigma_Nm = ", "sigma_Nm = -"), "sigma_Nm"},
                                 {with("state = \"estimated\"", "state = \"guessed\""), "state"},
                                 {with("group = 0", "group = 4"), "group"},
+                                {with("group = 0", "group = 0.5"), "group"},
+                                {with("blend_ms = ", "blend_ms = 0.5 #"), "blend_ms"},
+                                {with("name = \"mx1\"", "name = \"m1\""), "m1 is there twice"},
                                 {with("blend_ms = ", "blend_s = "), "blend_s"},
                                 {with("forgetting = [", "forgetting = [1.0, "), "forgetting"},
                                 {with("mean = ", "mean = \"heavy\" #"), "mean"},

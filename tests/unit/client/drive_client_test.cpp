@@ -6,8 +6,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <string>
 
+#include "tests/unit/client/cutting_proxy.hpp"
 #include "tests/unit/client/test_server.hpp"
 
 namespace {
@@ -126,6 +128,23 @@ TEST(DriveClient, AfterTheServerClosedTheConnection_ConnectsAnew) {
     return server.connections() == 0;
   }));
   EXPECT_EQ(drive.ReadValue<reg::kProbeU32>(), 0x12345678u);
+}
+
+// A drive that restarts refuses connections for a while. The client tries again, as on a serial line.
+TEST(DriveClient, WhenALinkThatWasUpIsRefused_TriesAgain) {
+  test::TestServer server;
+  auto proxy = std::make_unique<test::CuttingProxy>(server.port());
+  client::DriveClient drive("127.0.0.1", proxy->port());
+  EXPECT_EQ(drive.ReadValue<reg::kProbeU32>(), 0x12345678u);
+  proxy.reset();
+  try {
+    (void)drive.ReadValue<reg::kProbeU32>();
+    FAIL();
+  } catch (const client::LinkError& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find("cannot connect"), what.npos) << what;
+    EXPECT_NE(what.find("(tried "), what.npos) << what;
+  }
 }
 
 // Runs the line that README and SPEC show, with the program that they name.

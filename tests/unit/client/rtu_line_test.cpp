@@ -5,6 +5,7 @@
 #include <modbus.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -107,6 +108,22 @@ TEST_F(RtuLine, DriveClient_FlashesATable) {
   EXPECT_EQ(client::ReadActiveTable(drive), test::MakeTable(1));
   EXPECT_THROW(client::FlashTable(drive, test::MakeTable(2, 0x11112222)), client::RefusedError);
   EXPECT_EQ(client::ReadActiveTable(drive), test::MakeTable(1));
+}
+
+TEST_F(RtuLine, DriveClient_KeepsTheLineForItselfUntilItGoes) {
+  const int line = ::open(client_.path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  ASSERT_GE(line, 0);
+  const auto exclusive = [&] {
+    int on = -1;
+    EXPECT_EQ(::ioctl(line, TIOCGEXCL, &on), 0);
+    return on;
+  };
+  {
+    client::DriveClient drive(client::SerialLine{client_.path, 115200, 'N'}, 9);
+    EXPECT_EQ(exclusive(), 1);
+  }
+  EXPECT_EQ(exclusive(), 0);
+  ::close(line);
 }
 
 TEST(SerialLine, ThatIsNotThere_IsALinkError) {

@@ -5,10 +5,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <string>
 
+#include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/drive_client.hpp"
+#include "host_sim/client/table_backup.hpp"
 #include "tests/unit/client/cutting_proxy.hpp"
 #include "tests/unit/client/test_server.hpp"
+#include "tests/unit/files/temporary_folder.hpp"
 
 namespace {
 
@@ -72,7 +76,17 @@ TEST(Flash, OnTrial_IsInForceAndNotStored_UntilItIsConfirmed) {
   EXPECT_EQ(client::TryTable(drive, MakeTable(2), 30).store_sequence, 1u);
   EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(2));
   EXPECT_EQ(drive.ReadValue<reg::kTrialLeft>(), 30);
+  const auto refusal = [](auto call) -> std::string {
+    try {
+      call();
+    } catch (const RefusedError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(refusal([&] { client::Rollback(drive); }).find("a trial runs; end or confirm it first"), std::string::npos);
   client::EndTrial(drive);
+  EXPECT_NE(refusal([&] { client::EndTrial(drive); }).find("no table is on trial"), std::string::npos);
   EXPECT_EQ(client::ReadActiveTable(drive), MakeTable(1));
   client::TryTable(drive, MakeTable(3), 30);
   EXPECT_EQ(client::ConfirmTrial(drive).store_sequence, 2u);
@@ -155,6 +169,62 @@ TEST(Flash, WhenTheDriveReadsBackSomethingElse_IsAVerifyError) {
   });
   auto drive = server.Connect();
   EXPECT_THROW(FlashTable(drive, MakeTable(1)), client::VerifyError);
+}
+
+// The drive goes on with the save although the link is lost.
+TEST(Flash, WithTheLinkLostAfterTheSave_SaysThatTheTableWasSent) {
+  std::atomic<bool> lost{false};
+  test::TestServer server([&](test::TestDevice& drive) {
+    const link::TransactionState state = drive.transaction.state();
+    lost = lost || state == link::TransactionState::kCommitting || state == link::TransactionState::kActive;
+  });
+  test::LoopbackProxy proxy(server.port(), [&](int from, int to, bool) {
+    char bytes[512];
+    const ssize_t count = ::recv(from, bytes, sizeof bytes, 0);
+    return count > 0 && !lost && ::send(to, bytes, static_cast<std::size_t>(count), MSG_NOSIGNAL) == count;
+  });
+  client::DriveClient drive("127.0.0.1", proxy.port());
+  try {
+    FlashTable(drive, MakeTable(1));
+    FAIL();
+  } catch (const client::SentError& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find("the table was sent, and it is unknown whether it is in force"), what.npos) << what;
+    EXPECT_NE(what.find("armcal verify or armcal info"), what.npos) << what;
+  }
+  auto direct = server.Connect();
+  EXPECT_TRUE(test::Await([&] { return direct.ReadStatus().store_sequence == 1; }));
+  EXPECT_EQ(client::ReadActiveTable(direct), MakeTable(1));
+}
+
+TEST(Flash, LinkLostBeforeTheSave_IsAPlainLinkError) {
+  test::TestServer server;
+  auto proxy = std::make_unique<test::CuttingProxy>(server.port());
+  client::DriveClient drive("127.0.0.1", proxy->port());
+  bool sent = true;
+  try {
+    FlashTable(drive, MakeTable(1), [&](double) { proxy.reset(); });  // while the words are on their way
+  } catch (const client::LinkError& error) {
+    sent = dynamic_cast<const client::SentError*>(&error) != nullptr;
+  }
+  EXPECT_FALSE(sent);
+}
+
+TEST(Backup, HoldsItsDrive_AndADamagedHeaderIsRefused) {
+  const files::test::TemporaryFolder folder;
+  const auto json = client::BackupJson(MakeTable(1), test::kSchema, 77);
+  const auto read = [&](const nlohmann::ordered_json& j) {
+    return client::ReadBackup(folder.Write("backup.json", j.dump()));
+  };
+  EXPECT_EQ(read(json).words, MakeTable(1));
+  EXPECT_EQ(read(json).serial_number, 77u);
+  auto changed = json;
+  changed.erase("serial_number"), changed.erase("schema");
+  EXPECT_EQ(read(changed).serial_number, std::nullopt) << "written by hand, of no drive";
+  changed = json, changed["schema"] = "5C4E3A22";
+  EXPECT_THROW(read(changed), io::InputError);
+  changed = json, changed["serial_number"] = "77";
+  EXPECT_THROW(read(changed), io::InputError);
 }
 
 // Two clients at once: one waits for the other, and each ends with its own table having been in force.

@@ -40,6 +40,33 @@ TEST(TableSeal, OfEitherLayout_IsWhatOpenSslSigns) {
   EXPECT_THROW(client::SealTable(later, 1, 1, key), io::InputError);
 }
 
+TEST(TableSeal, ShowsItsCounterToItsKeyAlone) {
+  const client::Key key = test::MakeKey(9);
+  const Words sealed = client::SealTable(SecondLayout(), 7, 0x10007, key);
+  EXPECT_EQ(client::SignedCounter(sealed, key), 0x10007u);
+  EXPECT_EQ(client::SignedCounter(sealed, test::MakeKey(8)), 0u);
+  EXPECT_EQ(client::SignedCounter(SecondLayout(), key), 0u);
+  EXPECT_EQ(client::SignedCounter(FirstLayout(), key), 0u);
+  for (std::size_t k = 0; k < sealed.size(); ++k) {
+    Words changed = sealed;
+    changed[k] ^= 4;
+    EXPECT_EQ(client::SignedCounter(changed, key), 0u) << k;
+  }
+}
+
+// Counters that a drive reaches in its life are believed; one far beyond only beside a table that was signed near it.
+TEST(TableSeal, ACounterThatALineMadeUp_IsNotCredible) {
+  for (const std::uint32_t proven : {0u, 5u, 900000u}) {
+    EXPECT_TRUE(client::IsCredible(proven, proven));
+    EXPECT_TRUE(client::IsCredible(proven + 70000, proven));
+    EXPECT_FALSE(client::IsCredible(0x10000000u, proven));
+    EXPECT_FALSE(client::IsCredible(0xFFFFFFFEu, proven));
+  }
+  EXPECT_TRUE(client::IsCredible(0x10000007u, 0x10000000u));
+  EXPECT_FALSE(client::IsCredible(0x20000000u, 0x10000000u));
+  EXPECT_FALSE(client::IsCredible(0x10000000u, 0x10000007u)) << "below that of the table in force";
+}
+
 std::string RefusalOfKey(const std::string& text, fs::perms perms = fs::perms::owner_read | fs::perms::owner_write) {
   const fs::path path = fs::temp_directory_path() / "armcal_test.key";
   std::ofstream(path) << text;

@@ -1,7 +1,10 @@
 // files tests - read and write whole files, and compare their hashes.
 #include "host_sim/data/files/files.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "codegen/src/io/atomic_write.hpp"
 #include "tests/unit/files/temporary_folder.hpp"
@@ -78,6 +81,67 @@ TEST(Files, CheckWritable_SaysBeforeWhatAWriteSaysAfter_AndMakesNothing) {
     EXPECT_EQ(ErrorOf([&] { io::CheckWritable(folder / good); }), "") << good;
   EXPECT_FALSE(std::filesystem::exists(folder / "new"));
   EXPECT_FALSE(std::filesystem::exists(folder / "new.csv"));
+}
+
+TEST(Files, AtomicWrite_ToALink_ReplacesTheFileThatItNames) {
+  const TemporaryFolder folder;
+  namespace fs = std::filesystem;
+  fs::create_directories(folder / "far");
+  folder.Write("far/old.csv", "old");
+  fs::create_symlink("far/old.csv", folder / "link");
+  fs::create_symlink("link", folder / "link of a link");
+  fs::create_symlink(folder / "far/new.csv", folder / "link to nothing");
+  for (const auto& [link, file] : {std::pair{"link", "far/old.csv"}, std::pair{"link of a link", "far/old.csv"},
+                                   std::pair{"link to nothing", "far/new.csv"}}) {
+    EXPECT_EQ(ErrorOf([&] { io::CheckWritable(folder / link); }), "") << link;
+    io::AtomicWrite(folder / link, link);
+    EXPECT_TRUE(fs::is_symlink(folder / link)) << link;
+    EXPECT_FALSE(fs::is_symlink(folder / file)) << link;
+    EXPECT_EQ(test::ReadBytes(folder / file), link);
+  }
+  fs::create_symlink("far", folder / "link to a folder");
+  fs::create_symlink("loop", folder / "loop");
+  for (const auto& [link, why] :
+       {std::pair{"link to a folder", "Is a directory"}, std::pair{"loop", "Too many levels"}})
+    for (const auto write : {+[](const fs::path& path) { io::CheckWritable(path); },
+                             +[](const fs::path& path) { io::AtomicWrite(path, "text"); }})
+      EXPECT_NE(ErrorOf([&] { write(folder / link); }).find(why), std::string::npos) << link;
+}
+
+TEST(Files, AtomicWrite_ToAPipeOrADevice_WritesToItAndLeavesIt) {
+  const TemporaryFolder folder;
+  const std::filesystem::path pipe = folder / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(ErrorOf([&] { io::CheckWritable(pipe); }), "");
+  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);  // the writer need not wait for it
+  io::AtomicWrite(pipe, "through the pipe");
+  char bytes[64];
+  const ssize_t count = read(reader, bytes, sizeof bytes);
+  close(reader);
+  ASSERT_GT(count, 0);
+  EXPECT_EQ(std::string(bytes, static_cast<std::size_t>(count)), "through the pipe");
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  std::filesystem::create_symlink("/dev/null", folder / "nowhere");
+  io::AtomicWrite(folder / "nowhere", "text");
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "nowhere"));
+  EXPECT_NE(ErrorOf([&] { io::AtomicWrite("/dev/full", "text"); }).find("No space left"), std::string::npos);
+}
+
+// As `--json /dev/stdout` does, with the standard output in a file: both writers go on where the other one ended.
+TEST(Files, AtomicWrite_ToADescriptorOfThisProgram_AppendsToWhatItHolds) {
+  const TemporaryFolder folder;
+  const int file = open((folder / "out").c_str(), O_CREAT | O_RDWR, 0600);
+  const std::filesystem::path link = "/dev/fd/" + std::to_string(file);
+  std::filesystem::create_symlink(link, folder / "as stdout");
+  ASSERT_EQ(write(file, "before ", 7), 7);
+  for (const std::filesystem::path& path : {link, folder / "as stdout"}) {
+    EXPECT_EQ(ErrorOf([&] { io::CheckWritable(path); }), "");
+    io::AtomicWrite(path, "text ");
+  }
+  ASSERT_EQ(write(file, "after", 5), 5);
+  close(file);
+  EXPECT_EQ(test::ReadBytes(folder / "out"), "before text text after");
 }
 
 TEST(Files, ReadWholeFile_GzipCutShort_IsRefused) {

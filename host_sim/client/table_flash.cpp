@@ -313,7 +313,7 @@ std::optional<std::uint32_t> NextCounter(DriveClient& drive, const Key* key) {
   if (key == nullptr) refuse("takes signed tables only; give its key as --key FILE");
   const auto counter = drive.ReadValue<reg::kSigningCounter>();
   if (!IsCredible(counter, 0) && !IsCredible(counter, SignedCounter(ReadActiveTable(drive), *key)))
-    refuse("shows a signing counter that its table in force does not bear out; look for another device on the line");
+    refuse("shows a signing counter that its table in force does not prove; look for another device on the line");
   if (counter == 0xFFFFFFFF) refuse("has used its last counter; it needs another key and a blank store");
   return counter + 1;
 }

@@ -347,13 +347,7 @@ CLI::App* Add(CLI::App& app, Action& action, const char* name, const char* help,
   auto* verb = app.add_subcommand(name, help);
   if (connects) verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--json", o->json, "write the result here");
-  verb->callback([o, &action, run] {
-    action = [o, run] {
-      ordered_json said = ordered_json::object();
-      return Reported(
-          o->json, [&] { return run(*o, said); }, said);
-    };
-  });
+  verb->callback([o, &action, run] { action = Telling(o, run); });
   return verb;
 }
 

@@ -210,13 +210,7 @@ CLI::App* AddVerb(CLI::App& app, Action& action, const char* name, const char* h
   auto* verb = app.add_subcommand(name, help);
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--json", o->json, "write the result here");
-  verb->callback([o, &action, run] {
-    action = [o, run] {
-      ordered_json said = ordered_json::object();
-      return Reported(
-          o->json, [&] { return run(*o, said); }, said);
-    };
-  });
+  verb->callback([o, &action, run] { action = Telling(o, run); });
   return verb;
 }
 

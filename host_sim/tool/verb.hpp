@@ -81,6 +81,16 @@ int Reported(const std::string& path, Work work,
   }
 }
 
+// A verb whose work says in `said` what the JSON is to hold if it fails later on.
+template <class Options>
+Action Telling(std::shared_ptr<Options> o, int (*run)(const Options&, nlohmann::ordered_json& said)) {
+  return [o, run] {
+    nlohmann::ordered_json said = nlohmann::ordered_json::object();
+    return Reported(
+        o->json, [&] { return run(*o, said); }, said);
+  };
+}
+
 // A scenario file by its path, or by its name in host_sim/scenarios. Throws io::InputError if there is none.
 inline std::filesystem::path ScenarioPath(const std::string& scenario) {
   return codegen::NamedFile("scenario", scenario, Home() / "host_sim" / "scenarios");

@@ -243,13 +243,7 @@ void AddFlash(CLI::App& app, Action& action) {
       ->needs(trial)
       ->capture_default_str()
       ->check(Between(1, int{link::reg::kLongestTrial_s}));
-  verb->callback([o, &action] {
-    action = [o] {
-      ordered_json said{{"readback_ok", false}};
-      return Reported(
-          o->json, [&] { return Flash(*o, said); }, said);
-    };
-  });
+  verb->callback([o, &action] { action = Telling(o, &Flash, {{"readback_ok", false}}); });
 }
 
 void AddVerify(CLI::App& app, Action& action) {

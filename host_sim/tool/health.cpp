@@ -135,13 +135,7 @@ void AddHealth(CLI::App& app, Action& action) {
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--json", o->json, "write the verdicts here");
   AddDriveFleetOptions(*verb, o->fleet, "the verdicts");
-  verb->callback([o, &action] {
-    action = [o] {
-      ordered_json said = ordered_json::object();
-      return Reported(
-          o->json, [&] { return RunHealth(*o, said); }, said);
-    };
-  });
+  verb->callback([o, &action] { action = Telling(o, &RunHealth); });
 }
 
 }  // namespace armcal::tool

@@ -81,11 +81,13 @@ int Reported(const std::string& path, Work work,
   }
 }
 
-// A verb whose work says in `said` what the JSON is to hold if it fails later on.
+// A verb whose work says in `said` what the JSON is to hold if it fails later on. first: what `said` holds at the
+// start.
 template <class Options>
-Action Telling(std::shared_ptr<Options> o, int (*run)(const Options&, nlohmann::ordered_json& said)) {
-  return [o, run] {
-    nlohmann::ordered_json said = nlohmann::ordered_json::object();
+Action Telling(std::shared_ptr<Options> o, int (*run)(const Options&, nlohmann::ordered_json& said),
+               nlohmann::ordered_json first = nlohmann::ordered_json::object()) {
+  return [o, run, first] {
+    nlohmann::ordered_json said = first;
     return Reported(
         o->json, [&] { return run(*o, said); }, said);
   };

@@ -1,5 +1,6 @@
 // verdict - computes the held-out error, and gives it and the exogeneity test as text and JSON.
 #include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
 
 #include <fmt/core.h>
 
@@ -106,10 +107,6 @@ HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::Matri
   return CompareHeldOut({{&test, predicted}}, band_Hz);
 }
 
-const char* TorqueUnit(const codegen::Joint& joint) {
-  return joint.kinematics.type == codegen::JointType::kPrismatic ? "N" : "N m";
-}
-
 void PrintError(const HeldOutError& e, const codegen::Robot& robot, const std::string& of) {
   report::Table t{{"joint", "unit", "error rms", "moving", "moving / torque %", "NRMSE", "R2"}, {}, of};
   const auto add = [](std::vector<std::string>& row, const ErrorFigures& f, int j) {
@@ -123,7 +120,7 @@ void PrintError(const HeldOutError& e, const codegen::Robot& robot, const std::s
     for (const char* title : {"rms", "moving", "%", "NRMSE", "R2"})
       t.header.push_back(fmt::format("{}{}", *title == 'r' ? fmt::format("below {:g} Hz: ", e.band_Hz) : "", title));
   for (int j = 0; j < e.full.rms.size(); ++j) {
-    t.rows.push_back({std::to_string(j + 1), TorqueUnit(robot.joint[static_cast<std::size_t>(j)])});
+    t.rows.push_back({std::to_string(j + 1), calibration::TorqueUnit(robot.joint[static_cast<std::size_t>(j)])});
     add(t.rows.back(), e.full, j);
     if (band) add(t.rows.back(), e.band, j);
   }

@@ -11,9 +11,6 @@
 
 namespace armcal::verdict {
 
-// "N m", or "N" of a joint that slides.
-const char* TorqueUnit(const codegen::Joint& joint);
-
 // Per joint [n]. rms: over scored samples; rms_moving, relative (error / torque): over those where the joint moves.
 // nrmse: rms(error) / std(torque) over every sample of the record, as the public benchmarks define it; R2 is one minus
 // its square.

@@ -15,6 +15,7 @@
 #include "host_sim/diagnose/verdict/curves.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
 
 namespace armcal::verdict {
 
@@ -125,7 +126,7 @@ nlohmann::ordered_json DeclaredJson(const DiagnosisView& v) {
 void AddRobot(ordered_json& json, const codegen::Robot& robot) {
   json["robot"] = robot.name, json["robot_title"] = robot.title;
   for (const codegen::Joint& joint : robot.joint)
-    json["joint_names"].push_back(joint.name), json["torque_units"].push_back(TorqueUnit(joint));
+    json["joint_names"].push_back(joint.name), json["torque_units"].push_back(calibration::TorqueUnit(joint));
 }
 
 nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {

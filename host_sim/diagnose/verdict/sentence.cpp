@@ -7,6 +7,7 @@
 #include "host_sim/diagnose/verdict/curves.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
 
 namespace armcal::verdict {
 
@@ -84,7 +85,7 @@ std::string CauseText(const DiagnosisView& v, std::size_t term) {
     const VectorXd after = calibration::Rms(*v.test, v.held_out->after, true),
                    before = calibration::Rms(*v.test, v.held_out->before, true);
     OverError(v, term).maxCoeff(&main);
-    const char* unit = TorqueUnit(v.model->robot().joint[static_cast<std::size_t>(main)]);
+    const char* unit = calibration::TorqueUnit(v.model->robot().joint[static_cast<std::size_t>(main)]);
     out += fmt::format(
         ": {:.3g} {} RMS of joint {} on the held-out log; the error there is {:.3g} {} with the declared model and "
         "{:.3g} {} with all terms",

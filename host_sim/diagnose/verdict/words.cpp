@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "host_sim/identify/calibration/log_check.hpp"
 #include "host_sim/identify/excitation/target.hpp"
 
 namespace armcal::verdict {
@@ -151,9 +152,8 @@ std::string WhyNotConfirmed(const Term& t, const codegen::Robot& robot) {
         "all joints together are predicted worse with it than {}: the product of their errors is {:.4g} "
         "times as large",
         without, why.factor);
-  const bool slides = robot.joint[why.joint].kinematics.type == codegen::JointType::kPrismatic;
   return fmt::format("joint {} is predicted worse with it than {}: {:.4g} instead of {:.4g} {}", why.joint + 1, without,
-                     why.with[why.joint], why.without[why.joint], slides ? "N" : "N m");
+                     why.with[why.joint], why.without[why.joint], calibration::TorqueUnit(robot.joint[why.joint]));
 }
 
 std::string InTheModel(const Term& t, const codegen::Robot& robot) {

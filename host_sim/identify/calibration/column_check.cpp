@@ -267,7 +267,7 @@ class Examiner {
     const std::string what = fmt::format(
         "friction of {:.3g} {} would drive the joint at every speed, where it must brake it; is the sign of "
         "tau{} or q{} right?",
-        drag.mean, Slides(model_.robot().joint[j]) ? "N" : "N m", j + 1, j + 1);
+        drag.mean, TorqueUnit(model_.robot().joint[j]), j + 1, j + 1);
     if (gain > kClearGain) Fail(j, what);
     return fmt::format("joint {}: suspect: {}", j + 1, what);
   }

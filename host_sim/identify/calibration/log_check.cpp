@@ -33,7 +33,6 @@ constexpr double kHeld_s = 0.1, kSilent_s = 0.5;
 std::string Joint(int j) { return fmt::format("joint {}: ", j + 1); }
 
 const char* PositionUnit(const codegen::Joint& joint) { return Slides(joint) ? "m" : "rad"; }
-const char* TorqueUnit(const codegen::Joint& joint) { return Slides(joint) ? "N" : "N m"; }
 
 // At a true gap in time the joints move on by as many samples as are missing. If they move on by one sample only, the
 // clock jumped.

@@ -13,6 +13,7 @@ namespace armcal::calibration {
 
 inline constexpr double kDegPerRad = 180 / std::numbers::pi;
 inline bool Slides(const codegen::Joint& joint) { return joint.kinematics.type == codegen::JointType::kPrismatic; }
+inline const char* TorqueUnit(const codegen::Joint& joint) { return Slides(joint) ? "N" : "N m"; }
 
 // What a log says beside its samples. No text names the file.
 struct SignalCheck {

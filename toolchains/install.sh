@@ -7,7 +7,7 @@
 #   toolchains/install.sh fresh   debootstrap, for the long test of the Debian package
 #   toolchains/install.sh peers   Python, its headers, pip, a browser, colcon and stunnel, for tests/run.sh peers
 #   toolchains/install.sh docs    Sphinx and Doxygen, for the target docs_site
-# Does nothing when all is there. Needs root or sudo only when something is missing.
+# Several may be named. Does nothing when all is there. Needs root or sudo only when something is missing.
 set -euo pipefail
 
 host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
@@ -23,16 +23,19 @@ peers_packages=(python3 python3-dev python3-venv python3-pip chromium colcon pyt
   stunnel4 openssl)
 docs_packages=(python3 python3-sphinx python3-myst-parser doxygen)
 
-case "${1:-}" in
-  host) wanted=("${host_packages[@]}") ;;
-  cross) wanted=("${cross_packages[@]}") ;;
-  fuzz) wanted=("${fuzz_packages[@]}") ;;
-  fleet) wanted=("${fleet_packages[@]}") ;;
-  fresh) wanted=("${fresh_packages[@]}") ;;
-  peers) wanted=("${peers_packages[@]}") ;;
-  docs) wanted=("${docs_packages[@]}") ;;
-  *) sed -n '2,10p' "$0" >&2; exit 2 ;;
-esac
+wanted=()
+for group in "${@:-none}"; do
+  case $group in
+    host) wanted+=("${host_packages[@]}") ;;
+    cross) wanted+=("${cross_packages[@]}") ;;
+    fuzz) wanted+=("${fuzz_packages[@]}") ;;
+    fleet) wanted+=("${fleet_packages[@]}") ;;
+    fresh) wanted+=("${fresh_packages[@]}") ;;
+    peers) wanted+=("${peers_packages[@]}") ;;
+    docs) wanted+=("${docs_packages[@]}") ;;
+    *) sed -n '2,10p' "$0" >&2; exit 2 ;;
+  esac
+done
 
 missing=()
 for package in "${wanted[@]}"; do

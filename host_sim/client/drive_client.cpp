@@ -74,8 +74,11 @@ const char* Remedy(core::Status status) {
 
 }  // namespace
 
-DriveClient::DriveClient(std::string name, int unit, std::function<_modbus*()> open)
-    : name_(std::move(name)), unit_(unit), open_(std::move(open)), connection_(nullptr, CloseAndFree) {}
+DriveClient::DriveClient(const std::string& line, int unit, std::function<_modbus*()> open)
+    : name_(unit == 1 ? line : fmt::format("{}, unit {}", line, unit)),
+      unit_(unit),
+      open_(std::move(open)),
+      connection_(nullptr, CloseAndFree) {}
 
 DriveClient::DriveClient(const std::string& host, int port, int unit)
     : DriveClient(fmt::format("{}:{}", host, port), unit, [=] { return ToHost(host, std::to_string(port)); }) {

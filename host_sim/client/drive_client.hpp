@@ -114,7 +114,7 @@ class DriveClient {
  private:
   using Connection = std::unique_ptr<_modbus, void (*)(_modbus*)>;
 
-  DriveClient(std::string name, int unit, std::function<_modbus*()> open);
+  DriveClient(const std::string& line, int unit, std::function<_modbus*()> open);
   void Connect();
   void Request(const std::string& what, const std::function<int(_modbus*)>& call, Patience patience = Patience::kNormal,
                bool reads = false);

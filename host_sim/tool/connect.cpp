@@ -2,6 +2,7 @@
 #include "host_sim/tool/connect.hpp"
 
 #include <fmt/core.h>
+#include <algorithm>
 #include <charconv>
 #include <vector>
 
@@ -29,13 +30,18 @@ std::vector<std::string> Parts(const std::string& address) {
 
 bool IsSerialLine(const std::string& address) { return address.rfind('/', 0) == 0; }
 
-std::optional<std::pair<std::string, int>> HostAndPort(const std::string& address) {
-  const auto colon = address.rfind(':');
-  int port = 0;
-  if (colon == std::string::npos || !TakeNumber(address.substr(colon + 1), 1, 65535, port)) return std::nullopt;
-  std::string host = address.substr(0, colon);
-  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  return std::pair{host, port};
+std::optional<HostAddress> HostAndPort(const std::string& address) {
+  const bool bracket = address.starts_with('[');
+  const auto colon = bracket                                                ? address.find("]:")
+                     : std::count(address.begin(), address.end(), ':') <= 2 ? address.find(':')
+                                                                            : address.rfind(':');  // IPv6, no brackets
+  if (colon == std::string::npos) return std::nullopt;
+  HostAddress out;
+  out.host = address.substr(bracket, colon - bracket);
+  const std::vector<std::string> numbers = Parts(address.substr(colon + bracket + 1));
+  if (numbers.size() > 2 || !TakeNumber(numbers[0], 1, 65535, out.port)) return std::nullopt;
+  if (numbers.size() == 2 && !TakeNumber(numbers[1], 1, kLastUnit, out.unit)) return std::nullopt;
+  return out;
 }
 
 std::optional<SerialAddress> LineAndUnit(const std::string& address) {
@@ -47,7 +53,7 @@ std::optional<SerialAddress> LineAndUnit(const std::string& address) {
     if (parts[2].size() != 1 || std::string("NEO").find(parts[2]) == std::string::npos) return std::nullopt;
     out.line.parity = parts[2][0];
   }
-  if (parts.size() > 4 || (parts.size() == 4 && !TakeNumber(parts[3], 1, 247, out.unit))) return std::nullopt;
+  if (parts.size() > 4 || (parts.size() == 4 && !TakeNumber(parts[3], 1, kLastUnit, out.unit))) return std::nullopt;
   return out;
 }
 
@@ -60,12 +66,12 @@ client::DriveClient ConnectTo(const std::string& address) {
                            "12000000 baud, parity N, E or O, unit 1 to 247");
     return client::DriveClient(serial->line, serial->unit == 0 ? 1 : serial->unit);
   }
-  const auto host_and_port = HostAndPort(address);
-  if (!host_and_port)
+  const std::optional<HostAddress> at = HostAndPort(address);
+  if (!at)
     throw io::InputError("--connect " + address +
-                         ": expected HOST:PORT, for instance 127.0.0.1:1502, or a serial line, for instance "
-                         "/dev/ttyUSB0:115200");
-  return client::DriveClient(host_and_port->first, host_and_port->second);
+                         ": expected HOST:PORT, for instance 127.0.0.1:1502, HOST:PORT:UNIT with a unit from 1 to 247 "
+                         "behind a gateway, or a serial line, for instance /dev/ttyUSB0:115200");
+  return client::DriveClient(at->host, at->port, at->unit);
 }
 
 void AddKeyOption(CLI::App& verb, std::string& path) {

@@ -12,19 +12,24 @@
 
 namespace armcal::tool {
 
-// What --connect takes: "HOST:PORT", or a serial line "DEVICE[:BAUD[:PARITY[:UNIT]]]" whose device is a path from the
-// root; 115200, E and 1 if left out. The host may be an IPv6 address, in brackets or without. Throws io::InputError
-// (form), client::LinkError.
+// What --connect takes: "HOST:PORT[:UNIT]", or a serial line "DEVICE[:BAUD[:PARITY[:UNIT]]]" whose device is a path
+// from the root; 115200, E and unit 1 if left out. The host may be an IPv6 address, in brackets, or without them and
+// without a unit. Throws io::InputError (form), client::LinkError.
 client::DriveClient ConnectTo(const std::string& address);
 // IsSerialLine tells the two forms apart. The others split them; nothing if an address has not this form.
 bool IsSerialLine(const std::string& address);
-std::optional<std::pair<std::string, int>> HostAndPort(const std::string& address);
+struct HostAddress {
+  std::string host;
+  int port = 0, unit = 1;
+};
+std::optional<HostAddress> HostAndPort(const std::string& address);
 struct SerialAddress {
   client::SerialLine line;
   int unit = 0;  // 0: left out
 };
 std::optional<SerialAddress> LineAndUnit(const std::string& address);
-inline constexpr char kConnectHelp[] = "drive: HOST:PORT, or a serial line as /dev/ttyUSB0[:115200[:E[:1]]]";
+inline constexpr int kLastUnit = 247;  // of Modbus
+inline constexpr char kConnectHelp[] = "drive: HOST:PORT[:UNIT], or a serial line as /dev/ttyUSB0[:115200[:E[:1]]]";
 
 // The file with the key of a drive that takes signed tables only. Throws io::InputError.
 void AddKeyOption(CLI::App& verb, std::string& path);

@@ -38,7 +38,7 @@ struct DeviceOptions {
   bool csv = false, markdown = false;
 };
 
-constexpr int kModbusPort = 502, kLastUnit = 247;
+constexpr int kModbusPort = 502;
 constexpr char kNameHelp[] = "name, as armcal map lists it; an element in brackets, from 0";
 constexpr char kWhoMayWrite[] = "Without a key anyone who reaches the line may write within the ceilings.";
 constexpr char kNobodyMayWrite[] = "The board refuses all writing now.";

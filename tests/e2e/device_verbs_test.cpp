@@ -173,6 +173,24 @@ TEST_F(DeviceVerbs, ADatabaseThatFailsAfterTheFlash_LeavesTheTruthInTheJson) {
 }
 
 // A device that answers Modbus and is no armcal drive: the magic number of the identity is another one.
+// A gateway of several drives tells them apart by the unit in each request.
+TEST_F(DeviceVerbs, ADriveBehindAGateway_IsAskedByItsUnit) {
+  std::atomic<int> unit = -1;
+  const test::LoopbackProxy gateway(drive_.port(), Seen([&](std::span<char> bytes, bool replies) {
+                                      constexpr std::size_t kUnitByte = 6;
+                                      if (!replies && bytes.size() > kUnitByte) unit = bytes[kUnitByte];
+                                      return true;
+                                    }));
+  const std::string address = fmt::format("127.0.0.1:{}", gateway.port());
+  EXPECT_EQ(Ask({"info"}, address + ":17").code, 0);
+  EXPECT_EQ(unit, 17);
+  EXPECT_EQ(Ask({"info"}, address).code, 0);
+  EXPECT_EQ(unit, 1);
+  ExpectOneLine(Ask({"info"}, address + ":248"), 2, "unit from 1 to 247");
+  const TakenPort silent(false);
+  ExpectOneLine(Ask({"info"}, silent.address() + ":17"), 3, fmt::format("127.0.0.1:{}, unit 17: ", silent.port()));
+}
+
 TEST_F(DeviceVerbs, OnAnotherDevice_NothingIsReadOrWritten) {
   ASSERT_EQ(Ask({"set", "scratch[3]", "5"}).code, 0);
   test::LoopbackProxy other(drive_.port(), Seen([](std::span<char> bytes, bool replies) {

@@ -430,7 +430,7 @@ TEST_F(Mistakes, WithADriveOrASimulatedOne) {
       {"health --connect [::1]:1", {"::1:1: cannot connect"}, {"is a drive running there"}, kLink},
       {"scan /dev/does-not-exist --to 248", {"--to 248"}, {"a unit from 1 to 247"}},
       {"scan /dev/does-not-exist:9600:X", {"scan /dev/does-not-exist:9600:X"}, {"DEVICE[:BAUD[:PARITY]]"}},
-      {"scan /dev/does-not-exist:9600:N --to 2", {"/dev/does-not-exist: cannot connect"}, {"plugged in"}, kLink},
+      {"scan /dev/does-not-exist:9600:N --to 2", {"/dev/does-not-exist, unit 2: cannot connect"}, {"plugged in"}, kLink},
       {"scan 127.0.0.1 --from 502", {"scan 127.0.0.1"}, {"expected --from and --to"}},
       {"scan 127.0.0.1:502 --from 1 --to 2", {"scan 127.0.0.1:502: has a port"}, {"a host alone"}},
       {"scan 127.0.0.1:0", {"scan 127.0.0.1:0"}, {"a port from 1 to 65535"}},

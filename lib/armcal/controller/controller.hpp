@@ -117,7 +117,7 @@ class Controller {
     const std::uint32_t since = clock_.Ticks() - adopted_tick_.load(std::memory_order_relaxed);
     const core::Status status =
         feed_forward_.Evaluate(set.q, set.qd, set.qdd, temperature_degC,
-                               static_cast<float>(since) / static_cast<float>(Model::kTickRate_Hz), tau_Nm);
+                               static_cast<float>(since) / static_cast<float>(Model::kTickRate_Hz), enabled(), tau_Nm);
     feedforward_state_.store(!feed_forward_.valid()     ? 0u
                              : feed_forward_.blending() ? 2u
                                                         : 1u,
@@ -304,7 +304,9 @@ class Controller {
   static core::Status Adopt(void* self) {
     auto& c = *static_cast<Controller*>(self);
     if (!c.spare_is_checked_) return core::Status::kWrongOrder;
-    const core::Status offered = c.feed_forward_.Offer(c.Spare().committed, c.enabled());
+    model::Committed<Model>& committed = c.Spare().committed;
+    committed.blend_ticks = math::Max(committed.blend_ticks, c.LeastFade_ticks());  // if an axis is enabled meanwhile
+    const core::Status offered = c.feed_forward_.Offer(committed, c.enabled());
     if (core::IsOk(offered)) c.PutInForce();
     return offered;
   }
@@ -328,12 +330,15 @@ class Controller {
     model::Committed<Model>& committed = Spare().committed;
     committed.generation = generation_ + 1;
     committed.bumpless = true;
-    committed.blend_ticks = static_cast<std::uint32_t>(static_cast<float>(ceilings_.table->least_fade_ms) *
-                                                       (Model::kTickRate_Hz / 1000.0f));
+    committed.blend_ticks = LeastFade_ticks();
     (void)feed_forward_.Offer(committed, enabled());  // a bumpless table is never refused
     PutInForce();
   }
 
+  std::uint32_t LeastFade_ticks() const {
+    return static_cast<std::uint32_t>(static_cast<float>(ceilings_.table->least_fade_ms) *
+                                      (Model::kTickRate_Hz / 1000.0f));
+  }
   bool enabled() const { return enabled_axes_.load(std::memory_order_relaxed) != 0; }
   // The adopted table that nobody reads: the estimators read the other one, and the feed-forward has a copy.
   estimator::AdoptedTable<Model>& Spare() { return adopted_[1 - in_force_.load(std::memory_order_relaxed)]; }

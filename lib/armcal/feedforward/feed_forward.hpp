@@ -7,8 +7,7 @@
 
 namespace armcal::feedforward {
 
-// The shortest cross-fade of a bumpless table. If a table asks for less, this time is used, so that the torque does not
-// step.
+// The shortest cross-fade. If a table that fades asks for less, this time is used, so that the torque does not step.
 inline constexpr float kShortestFade_s = 0.05f;
 
 // The torque of a set-point by the table in force. Context: background for Offer, tick for all others.
@@ -28,18 +27,19 @@ class FeedForward {
   }
 
   // Torque of the set-point. Shapes: all [kJoints]. q, qd, qdd: rad (m), rad/s, rad/s^2. temperature_degC: NaN where
-  // there is no sensor. t_s: seconds since the table was adopted. A joint whose set-point speed is below v_min counts
-  // as standing, so that friction does not chatter. tau_Nm: N m (N).
+  // there is no sensor. t_s: seconds since the table was adopted. any_axis_enabled: at this tick. A joint whose
+  // set-point speed is below v_min counts as standing, so that friction does not chatter. tau_Nm: N m (N).
   // kOk; kClamped (a joint was cut to its limit, and that was counted); kEmpty (no valid table; torque zero);
   // kNotFinite (set-point or model of a joint is not finite; the torque of that joint is zero).
   // Constant time: the old and the new parameters are always both evaluated. Only the tick that takes over a new table
   // takes longer.
   // A cross-fade starts from the present torque, also if another one is running. Each table is evaluated with its own
   // v_min, and its torque is cut to its own limit before the two are mixed. So if the set-point does not change, the
-  // torque changes in one tick by at most (old limit + new limit) / ticks of the fade. Context: tick.
+  // torque changes in one tick by at most (old limit + new limit) / ticks of the fade. A table that is not bumpless is
+  // taken over at once, unless an axis was enabled after its Offer; then it fades, too. Context: tick.
   core::Status Evaluate(const float* q, const float* qd, const float* qdd, const float* temperature_degC, float t_s,
-                        float* tau_Nm) {
-    Adopt();
+                        bool any_axis_enabled, float* tau_Nm) {
+    Adopt(any_axis_enabled);
     constexpr float kTick_s = 1.0f / static_cast<float>(Model::kTickRate_Hz);
     model::ModelInput<float, n> state;
     for (int i = 0; i < n; ++i) {
@@ -93,13 +93,14 @@ class FeedForward {
  private:
   static float Positive(std::uint32_t ticks) { return static_cast<float>(math::Max<std::uint32_t>(ticks, 1)); }
 
-  void Adopt() {
+  void Adopt(bool any_axis_enabled) {
     if (!offered_.Refresh()) return;
     StartFromHere();
     active_ = offered_.latest();
     active_memory_.running = false;
     constexpr auto kShortest = static_cast<std::uint32_t>(kShortestFade_s * Model::kTickRate_Hz);
-    active_.blend_ticks = active_.bumpless ? math::Max(active_.blend_ticks, kShortest) : 0u;
+    const bool fades = active_.bumpless || any_axis_enabled;
+    active_.blend_ticks = fades ? math::Max(active_.blend_ticks, kShortest) : 0u;
     blended_ticks_ = 0;
     for (int i = 0; i < n; ++i) next_gain_[i] = 1.0f / active_.torque_scale[i];
   }

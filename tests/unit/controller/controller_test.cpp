@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -130,6 +131,30 @@ TEST(Controller, WhileAxesAreEnabled_AdoptsABumplessTableOnly) {
   table.blend_ms = 500;
   EXPECT_EQ(bench->Flash(table), Status::kOk);
   EXPECT_EQ(bench->controller.generation(), 2u);
+}
+
+// The background adopts a table while all axes are disabled. Then, before the next tick, an axis is enabled.
+TEST(Controller, ATableAdoptedJustBeforeAnAxisIsEnabled_FadesOverTheLeastTime) {
+  const auto bench = std::make_unique<Bench<Forgetting>>();
+  auto table = estimator::DefaultTable<Model>();
+  ASSERT_EQ(bench->Flash(table), Status::kOk);
+  const controller::SetPoint<n> outstretched = {};
+  const float degC[n] = {30, 30, 30, 30, 30, 30};
+  float before[n], after[n];
+  const auto torque = [&](float* tau) { return bench->controller.FeedForward(outstretched, degC, tau); };
+  ASSERT_EQ(torque(before), Status::kOk);
+  ASSERT_GT(std::abs(before[1]), 100.0f) << "gravity";
+  table.joint[1].torque_limit_Nm = 10.0f;
+  ASSERT_EQ(bench->Flash(table), Status::kOk);
+  bench->controller.SetEnabledAxes(kAllAxes);
+  constexpr auto kTicks = static_cast<float>(Model::kCeilings.table.least_fade_ms);  // of 1 ms
+  const float most = (std::abs(before[1]) + 10.0f) / kTicks;
+  for (int tick = 0; tick < 2000; ++tick) {
+    (void)torque(after);
+    ASSERT_LE(std::abs(after[1] - before[1]), most * 1.001f) << "tick " << tick;
+    before[1] = after[1];
+  }
+  EXPECT_FLOAT_EQ(std::abs(after[1]), 10.0f);
 }
 
 TEST(Controller, OnABoardThatDoesNotAllowIt_RefusesABumplessTable) {

@@ -135,7 +135,7 @@ class Feed {
   bool Evaluate(const SetPoint& set, double* tau) {
     const float degC[n] = {30, 30, 30, 30, 30, 30};
     float out[n];
-    const Status status = feed_.Evaluate(set.q, set.qd, set.qdd, degC, 0.0f, out);
+    const Status status = feed_.Evaluate(set.q, set.qd, set.qdd, degC, 0.0f, false, out);
     for (int j = 0; j < n; ++j) {
       tau[j] = out[j];
       EXPECT_LE(std::abs(tau[j]), robot_.joint[j].torque_limit_Nm * (1 + 1e-6)) << "joint " << j + 1;

@@ -38,7 +38,7 @@ Set Example(std::uint32_t generation) {
 struct FeedForwardTest : testing::Test {
   std::unique_ptr<FeedForward<TwoLink>> ff = std::make_unique<FeedForward<TwoLink>>();
   float q[2] = {0.4f, -0.9f}, qd[2] = {0.7f, -1.1f}, qdd[2] = {2.0f, 3.0f}, temp[2] = {30, 30}, tau[2] = {-1, -1};
-  Status Evaluate() { return ff->Evaluate(q, qd, qdd, temp, 0.0f, tau); }
+  Status Evaluate(bool enabled = false) { return ff->Evaluate(q, qd, qdd, temp, 0.0f, enabled, tau); }
   double Exact(const Set& c, int joint) const {
     model::ModelInput<double, 2> x{{q[0], q[1]}, {qd[0], qd[1]}, {qdd[0], qdd[1]}, {30, 30}, 0, 0};
     const double eta[1] = {c.eta[0]};
@@ -108,6 +108,21 @@ TEST_F(FeedForwardTest, PlainTableWhileEnabled_IsRefusedAndChangesNothing) {
   EXPECT_EQ(ff->Offer(Example(2), true), Status::kAxisEnabled);
   std::memcpy(after.data(), static_cast<void*>(ff.get()), sizeof *ff);
   EXPECT_EQ(before, after);
+}
+
+// The tick may enable an axis after the background has offered the table.
+TEST_F(FeedForwardTest, PlainTable_IsCrossFadedIfAnAxisIsEnabledAfterItsOffer) {
+  ASSERT_EQ(ff->Offer(Example(1), false), Status::kOk);
+  ASSERT_EQ(Evaluate(), Status::kOk);
+  const float from = tau[0];
+  Set c = Example(2);
+  for (float& p : c.p) p *= 2;
+  c.blend_ticks = 100;
+  ASSERT_EQ(ff->Offer(c, false), Status::kOk);
+  for (int tick = 1; tick <= 120; ++tick) {
+    ASSERT_EQ(Evaluate(true), Status::kOk);
+    EXPECT_NEAR(tau[0], from * (1 + std::min(tick, 100) / 100.0), 1e-4);
+  }
 }
 
 TEST_F(FeedForwardTest, BumplessTable_IsCrossFadedWithoutAStep) {

@@ -42,7 +42,7 @@ TEST(SpecialModels, NextTable_StartsEffectsWithMemoryAnew) {
   for (int table = 0; table < 2; ++table) {
     ASSERT_EQ(ff->Offer(Table<CountingTwoLink>(3, 1.0f), false), Status::kOk);
     for (int tick = 0; tick < 5; ++tick) {
-      ASSERT_EQ(ff->Evaluate(kQ, kQd, kQdd, kTemp, 0.0f, tau), Status::kOk);
+      ASSERT_EQ(ff->Evaluate(kQ, kQd, kQdd, kTemp, 0.0f, false, tau), Status::kOk);
       EXPECT_EQ(tau[1], static_cast<float>(tick)) << table;
     }
   }
@@ -52,7 +52,7 @@ TEST(SpecialModels, PairEffectInStandby_AddsNothingEvenIfItsValueIsNotFinite) {
   auto ff = std::make_unique<FeedForward<WithoutSensor>>();
   float tau[2];
   ASSERT_EQ(ff->Offer(Table<WithoutSensor>(1, 2.0f), false), Status::kOk);
-  EXPECT_EQ(ff->Evaluate(kQ, kQd, kQdd, kTemp, 0.0f, tau), Status::kOk);
+  EXPECT_EQ(ff->Evaluate(kQ, kQd, kQdd, kTemp, 0.0f, false, tau), Status::kOk);
   EXPECT_EQ(tau[0], 2.0f * kQd[0]);
   EXPECT_EQ(tau[1], 0.0f);
 }

@@ -36,12 +36,15 @@ void Print(const analysis::Diagnosed& run, const DiagnoseOptions& o) {
     const bool held = std::any_of(json["terms"].begin(), json["terms"].end(),
                                   [](const auto& t) { return t["in_model"].template get<bool>(); });
     const bool confirmed = verdict::AnyConfirmed(*run.view.finding);
-    fmt::print("new model: {} ({})\n", o.model_out,
-               !confirmed ? "the declared one: no term is confirmed"
-               : !held    ? "with what was found as comments: no model can hold it"
-               : json["model"]["by_table"].get<bool>()
-                   ? "a table switches it on"
-                   : "build the drive with it; without a drive: armcal identify --robot " + o.model_out);
+    fmt::print(
+        "new model: {} ({})\n", o.model_out,
+        !confirmed ? "the declared one: no term is confirmed"
+        : !held    ? "with what was found as comments: no model can hold it"
+        : json["model"]["by_table"].get<bool>()
+            ? "a table switches it on"
+            : fmt::format("fit it: armcal identify --robot {0} --table-out TABLE; for a drive build its firmware "
+                          "from {0}, then flash TABLE",
+                          o.model_out));
   }
 }
 

@@ -3,13 +3,16 @@
 
 #include <algorithm>
 
+#include "armcal/core/words.hpp"
 #include "armcal/link/event_log.hpp"
+#include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/client/table_seal.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/fleet.hpp"
+#include "host_sim/tool/table_values.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -19,7 +22,7 @@ namespace reg = link::reg;
 using nlohmann::ordered_json;
 
 struct TableOptions {
-  std::string connect, json, file, key;
+  std::string connect, json, file, key, robot;
   FleetOptions fleet;
   bool confirm = false, end = false, another_drive = false;
 };
@@ -85,24 +88,48 @@ int RunRestore(const TableOptions& o, ordered_json& said) {
   return kOk;
 }
 
+// The layout of drive and backup; nothing without a robot file.
+std::optional<calibration::TableFile> LayoutOfBoth(const TableOptions& o, client::DriveClient& drive,
+                                                   const std::vector<std::uint16_t>& words) {
+  if (o.robot.empty()) return std::nullopt;
+  const codegen::Model model = LoadModel(o.robot);
+  calibration::TableFile layout = LayoutOf(drive, model);
+  if (const std::uint32_t schema = words.size() < 2 ? 0 : core::GetU32(words.data()); schema != layout.schema)
+    throw io::InputError(
+        fmt::format("{}: has schema {:08X}, expected {:08X} of robot {}; without --robot its words are "
+                    "compared",
+                    o.file, schema, layout.schema, model.robot().name));
+  return layout;
+}
+
 int RunDiff(const TableOptions& o, ordered_json&) {
   const client::TableBackup backup = ReadUnsealed(o.file);
   const std::vector<std::uint16_t>& words = backup.words;
   client::DriveClient drive = ConnectTo(o.connect);
+  const std::optional<calibration::TableFile> layout = LayoutOfBoth(o, drive, words);
   const std::string other = OfAnotherDrive(o, drive, backup);
   if (!other.empty()) fmt::print("{}\n", other);
   const auto active = client::UnsealTable(client::ReadActiveTable(drive));
-  ordered_json differ = ordered_json::array();
+  ordered_json differ = ordered_json::array(), said;
   for (std::size_t k = 0; k < std::max(words.size(), active.size()); ++k) {
     const auto is = k < active.size() ? ordered_json(active[k]) : ordered_json(),
                was = k < words.size() ? ordered_json(words[k]) : ordered_json();
     if (is == was) continue;
     differ.push_back({{"word", k}, {"drive", is}, {"file", was}});
-    fmt::print("word {}: drive {}, file {}\n", k, is.dump(), was.dump());
+    if (!layout) fmt::print("word {}: drive {}, file {}\n", k, is.dump(), was.dump());
+  }
+  said = {{"same", differ.empty()}, {"differ", differ}, {"another_drive", !other.empty()}};
+  if (layout) {
+    said["values"] = ordered_json::array();
+    for (const ValueChange& c :
+         ChangesOf(calibration::DecodeTable(active, *layout), calibration::DecodeTable(words, *layout))) {
+      said["values"].push_back({{"name", c.name}, {"drive", c.from}, {"file", c.to}});
+      fmt::print("{}: drive {}, file {}\n", c.name, ValueText(c.from), ValueText(c.to));
+    }
   }
   fmt::print("{}: {}\n", drive.name(),
              differ.empty() ? "the table in force is this file's" : fmt::format("{} words differ", differ.size()));
-  WriteJson(o.json, {{"same", differ.empty()}, {"differ", differ}, {"another_drive", !other.empty()}});
+  WriteJson(o.json, said);
   return differ.empty() ? kOk : kMismatch;
 }
 
@@ -234,9 +261,10 @@ void AddDriveTable(CLI::App& app, Action& action) {
   o = std::make_shared<TableOptions>();
   verb = AddVerb(app, action, "diff",
                  "compare the table in force with a backup\nexit code 5: they differ\nexample: armcal diff drive.json "
-                 "--connect 127.0.0.1:1502",
+                 "--robot er20_like --connect 127.0.0.1:1502",
                  o, RunDiff);
   verb->add_option("file", o->file, "file of armcal backup")->required();
+  verb->add_option("--robot", o->robot, "robot file or name: name the values that differ (default: numbers of words)");
   o = std::make_shared<TableOptions>();
   verb =
       AddVerb(app, action, "rollback",

@@ -6,6 +6,7 @@
 
 #include "armcal/core/crc.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/data/report/progress.hpp"
@@ -13,6 +14,7 @@
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/fleet.hpp"
+#include "host_sim/tool/table_values.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -23,7 +25,7 @@ using nlohmann::ordered_json;
 struct FlashOptions {
   std::string connect, robot, table, json, key;
   FleetOptions fleet;
-  bool force = false, dry_run = false, trial = false;
+  bool force = false, leave_out = false, dry_run = false, trial = false;
   int limit_s = link::reg::kUsualTrial_s;  // of a trial
 };
 
@@ -33,6 +35,11 @@ struct ToFlash {
     calibration::TableFile layout = calibration::DefaultTable(model);
     carried = calibration::CarryOver(file, layout, o.table);
     other_version = file.schema != layout.schema;
+    if (!carried.unknown.empty() && !o.leave_out)
+      throw io::InputError(fmt::format(
+          "{}: {}: not in the model of {}, and the other values were fitted together with it; build the drive "
+          "from the robot file of this table, or give --leave-out",
+          o.table, fmt::join(carried.unknown, ", "), model.robot().name));
   }
   codegen::Model model;
   calibration::TableFile file;
@@ -91,48 +98,30 @@ std::vector<std::string> DrivesOwn(const ToFlash& read, const Sending& sending) 
   return names;
 }
 
-// Each value of a table by its name.
-std::vector<std::pair<std::string, ordered_json>> ValuesOf(const calibration::TableFile& t) {
-  std::vector<std::pair<std::string, ordered_json>> out;
-  out.emplace_back("bumpless", t.bumpless), out.emplace_back("blend_ms", t.blend_ms);
-  for (int g = 0; g < 4; ++g) out.emplace_back(fmt::format("forgetting[{}]", g), t.forgetting[g]);
-  for (std::size_t j = 0; j < t.joint.size(); ++j) {
-    const calibration::TableJoint& joint = t.joint[j];
-    for (const auto& [name, value] : {std::pair{"sigma_Nm", joint.sigma_Nm},
-                                      {"v_min_radps", joint.v_min_radps},
-                                      {"torque_limit_Nm", joint.torque_limit_Nm},
-                                      {"torque_scale", joint.torque_scale},
-                                      {"gate_sigma", joint.gate_sigma}})
-      out.emplace_back(fmt::format("joint {} {}", j + 1, name), value);
-  }
-  for (const calibration::TableRow& r : t.row) {
-    out.emplace_back(r.name, r.mean), out.emplace_back(r.name + " sd", r.sd);
-    out.emplace_back(r.name + " process_noise", r.process_noise), out.emplace_back(r.name + " state", r.state);
-    out.emplace_back(r.name + " group", r.group);
-  }
-  return out;
-}
-
 // What would be sent, without sending it.
 int DryRun(const FlashOptions& o, client::DriveClient& drive, const Sending& sending, const client::Key* key,
            ordered_json json) {
   (void)client::NextCounter(drive, key);  // throws if the drive would not take a table with this key
-  const auto is = ValuesOf(sending.active), sent = ValuesOf(calibration::DecodeTable(sending.words, sending.active));
-  const auto text = [](const ordered_json& v) {
-    return v.is_number_float() ? fmt::format("{:.9g}", v.get<double>())
-           : v.is_string()     ? v.get<std::string>()
-                               : v.dump();
-  };
   json["dry_run"] = true, json["changes"] = ordered_json::array();
-  for (std::size_t k = 0; k < is.size(); ++k) {
-    if (is[k].second == sent[k].second) continue;
-    fmt::print("{}: {} -> {}\n", is[k].first, text(is[k].second), text(sent[k].second));
-    json["changes"].push_back({{"name", is[k].first}, {"from", is[k].second}, {"to", sent[k].second}});
+  for (const ValueChange& c : ChangesOf(sending.active, calibration::DecodeTable(sending.words, sending.active))) {
+    fmt::print("{}: {} -> {}\n", c.name, ValueText(c.from), ValueText(c.to));
+    json["changes"].push_back({{"name", c.name}, {"from", c.from}, {"to", c.to}});
   }
   fmt::print("dry run: {} registers would be sent, nothing was; values that would change: {}\n", sending.words.size(),
              json["changes"].size());
   WriteJson(o.json, json);
   return kOk;
+}
+
+// The end of a trial puts the stored table in force again.
+void RequireWayBack(client::DriveClient& drive) {
+  const core::Status table = drive.ReadStatus().table_status;
+  if (table != core::Status::kOk)
+    throw client::RefusedError(
+        fmt::format("{}: has no valid table to which a trial could go back ({}); flash the first "
+                    "table without --trial",
+                    drive.name(), client::StatusName(table)),
+        0, table);
 }
 
 // said: what the JSON says if something fails after the flash.
@@ -144,6 +133,7 @@ int Flash(const FlashOptions& o, ordered_json& said) {
   const Sending sending = SendingOf(drive, o, read);
   if (const std::string beyond = calibration::BeyondCeiling(read.model, sending.table); !beyond.empty())
     throw io::InputError(fmt::format("{}: {}, by [ceilings] of {}", o.table, beyond, o.robot));
+  if (o.trial) RequireWayBack(drive);
   PrintVersion(o, read);
   for (const std::string& name : read.carried.missing)
     fmt::print("not in {}, kept as in the drive: {}\n", o.table, name);
@@ -223,6 +213,7 @@ CLI::App* AddCommon(CLI::App& app, const char* name, const char* help, const std
   verb->add_flag(
       "--force", o->force,
       "take friction and effects that rest on the prior from the table, too; without it the drive's values count");
+  verb->add_flag("--leave-out", o->leave_out, "leave out parameters of the table that this model does not have");
   return verb;
 }
 

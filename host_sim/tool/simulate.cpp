@@ -3,6 +3,7 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/atomic_write.hpp"
+#include "host_sim/machine/plant/scenario.hpp"
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/compiled_firmware.hpp"
 #include "host_sim/tool/process.hpp"
@@ -37,8 +38,10 @@ int RunSimulate(const SimulateOptions& o) {
   const fs::path scenario = ScenarioPath(o.scenario);
   if (!o.drive.empty() && !fs::is_regular_file(o.drive)) throw io::InputError(o.drive + ": no such program");
   if (const auto folder = fs::path(o.storage).parent_path(); !folder.empty()) io::MakeFolder(folder);
+  const codegen::Robot arm = codegen::ReadRobot(robot);
+  plant::RequireRobot(plant::ReadScenario(scenario.string()), arm.name, robot.string());  // before anything is compiled
   std::vector<std::string> words =
-      o.drive.empty() ? DriveFor({codegen::ReadRobot(robot), LoadCatalogue()}) : std::vector<std::string>{o.drive};
+      o.drive.empty() ? DriveFor({arm, LoadCatalogue()}) : std::vector<std::string>{o.drive};
   words.insert(words.end(), {"--scenario", scenario.string(), "--robot", robot.string(), "--storage", o.storage,
                              "--port", std::to_string(o.port)});
   if (!o.truth_log.empty()) words.insert(words.end(), {"--truth-log", o.truth_log});

@@ -2,9 +2,13 @@
 #include "port/linux/file_storage.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <chrono>
+#include <thread>
 #include <vector>
 
 namespace armcal::port_linux {
@@ -14,10 +18,20 @@ using core::Status;
 namespace {
 
 constexpr std::uint8_t kErased = 0xFF;
+constexpr int kTries = 200;  // a drive that has just been told to end may need some of them
+constexpr auto kPause = std::chrono::milliseconds(10);
 
 Status WriteAll(int file, std::uint32_t address, const std::vector<std::uint8_t>& bytes) {
   const ssize_t written = ::pwrite(file, bytes.data(), bytes.size(), static_cast<off_t>(address));
   return written == static_cast<ssize_t>(bytes.size()) ? Status::kOk : Status::kStorageFault;
+}
+
+bool IsTaken(int file) {
+  for (int k = 0; k < kTries; ++k) {
+    if (::flock(file, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return false;
+    std::this_thread::sleep_for(kPause);
+  }
+  return true;
 }
 
 }  // namespace
@@ -33,6 +47,7 @@ Status FileStorage::Open(const std::string& path) {
   file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   struct stat info;
   if (file_ < 0 || ::fstat(file_, &info) != 0) return Status::kStorageFault;
+  if (IsTaken(file_)) return Status::kBusy;
   const auto wanted = static_cast<std::size_t>(sector_count_) * sector_bytes_;
   const auto there = static_cast<std::size_t>(info.st_size);
   if (there >= wanted) return Status::kOk;

@@ -17,8 +17,9 @@ class FileStorage {
   FileStorage(const FileStorage&) = delete;
   FileStorage& operator=(const FileStorage&) = delete;
 
-  // Opens the file. A file that is missing or too short is filled up with erased bytes. kStorageFault: the file cannot
-  // be opened or written.
+  // Opens the file, for this object alone until it is destroyed. A file that is missing or too short is filled up with
+  // erased bytes. kStorageFault: the file cannot be opened or written. kBusy: another object has it, also after two
+  // seconds.
   core::Status Open(const std::string& path);
 
   // Valid while this object lives. Context: background.

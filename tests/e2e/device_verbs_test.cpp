@@ -1,6 +1,7 @@
 // end-to-end tests - the verbs for a technician at a drive, and a port that may only be read.
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -96,6 +97,15 @@ TEST_F(DeviceVerbs, ABackup_ComesBackWordForWord_AndADamagedOneIsRefused) {
   write(words, core::Crc32Words(words.data(), words.size()));
   EXPECT_EQ(Ask({"diff", file}).code, 5);
   EXPECT_EQ(Json()["differ"][0]["word"], 17);
+  const Outcome named = Ask({"diff", file, "--robot", "er20_like"});
+  EXPECT_EQ(named.code, 5);
+  EXPECT_EQ(named.out.rfind("joint 1 sigma_Nm: drive ", 0), 0u) << named.out;
+  ASSERT_EQ(Json()["values"].size(), 1u);
+  EXPECT_EQ(Json()["values"][0]["name"], "joint 1 sigma_Nm");
+  ExpectOneLine(Ask({"diff", file, "--robot", "puma560"}), 4, "schema");
+  words[1] ^= 1;
+  write(words, core::Crc32Words(words.data(), words.size()));
+  ExpectOneLine(Ask({"diff", file, "--robot", "er20_like"}), 2, "of robot er20_like");
 }
 
 TEST_F(DeviceVerbs, ABackupOfAnotherDrive_IsRestoredOnlyIfThatIsSaid) {
@@ -223,7 +233,7 @@ TEST_F(DeviceVerbs, ATrial_IsStoredOnlyByConfirm_AndRollbackBringsTheOlderTable)
     const auto words = Json()["value"].get<std::vector<std::uint16_t>>();
     return core::GetF32(&words[16 + 6]);
   };
-  ExpectOneLine(flash(1.01, {"--trial"}), 4, "WrongOrder");
+  ExpectOneLine(flash(1.01, {"--trial"}), 4, "no valid table to which a trial could go back");
   ExpectOneLine(Ask({"rollback"}), 4, "Empty");
   ASSERT_EQ(flash(1.01).code, 0);
   const Outcome tried = flash(1.02, {"--trial", "--limit", "1200"});
@@ -279,6 +289,20 @@ TEST_F(DeviceVerbs, WatchScanAndMap_WriteWhatTheyShow) {
   EXPECT_NE(csv.out.find("holding,337,1,u16,rw,learning_reset,,1 to 17"), std::string::npos);
   EXPECT_NE(Tool({"map", "--md"}).out.find("### Holding registers"), std::string::npos);
   EXPECT_EQ(nlohmann::json::parse(Tool({"map", "--json"}).out)["map_minor"], 6);
+}
+
+TEST_F(DeviceVerbs, CtrlC_EndsAScan_WhichKeepsWhatItHasFound) {
+  const std::string printed = (folder_ / "scan.txt").string();
+  const int out = open(printed.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  const pid_t scan = Start({ARMCAL_TOOL, "scan", "127.0.0.1", "--from", std::to_string(drive_.port()), "--to", "65535",
+                            "--json", (folder_ / "out.json").string()},
+                           out, out);
+  close(out);
+  for (int k = 0; k < 10000 && ReadText(printed).find(drive_.address()) == std::string::npos; ++k) usleep(1000);
+  kill(scan, SIGINT);
+  EXPECT_EQ(WaitFor(scan), 6);
+  ASSERT_EQ(Json().size(), 1u);
+  EXPECT_EQ(Json()[0]["address"], drive_.address());
 }
 
 TEST(Watch, KeepsItsReadingsWhenTheLinkDrops) {

@@ -114,6 +114,17 @@ TEST_F(Import, OfBadBodiesAndMissingLimits_SaysSoAndGoesOn) {
   ExpectOneLine(Tool({"import", Path("arm.urdf"), "-o", Path("arm.toml")}), 2, "--overwrite");
 }
 
+TEST_F(Import, OfLimitsInDegrees_TakesThemAsAGuess) {
+  const Outcome o = Try(Replaced(Scara().urdf, "lower=\"-2.2\" upper=\"2.2\"", "lower=\"-91\" upper=\"115\""));
+  ASSERT_EQ(o.code, 0) << o.err;
+  const nlohmann::json json = ReadJson(Path("out.json"));
+  const auto limit = std::find_if(json.at("guessed").begin(), json.at("guessed").end(),
+                                  [](const auto& g) { return g.at("key") == "position_limit_deg"; });
+  ASSERT_NE(limit, json.at("guessed").end());
+  EXPECT_EQ(limit->at("value"), "[-91.0, 115.0]");
+  EXPECT_NE(o.out.find("the URDF has -91 to 115 rad (degrees?)"), o.out.npos) << o.out;
+}
+
 TEST_F(Import, OfWhatIsNoArm_SaysEveryFaultOnce) {
   ExpectOneLine(Try("<robot"), 2, "expected a URDF robot");
   ExpectOneLine(Try(Scara().urdf, {"--tip", "s5"}), 2,

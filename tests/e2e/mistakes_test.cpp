@@ -249,7 +249,7 @@ TEST_F(Mistakes, WithALog) {
   log("book.xlsx", {"is no text"}, {"expected a CSV file"});
   log("degrees.csv", {"joint 1", "looks like degrees"}, {"rad"});
   log("milliseconds.csv", {"column 't'", "time step is 8 s"}, {"looks like ms"});
-  log("no_torque.csv", {"no column 'tau1'"}, {"expected t, q1..qn, tau1..taun"});
+  log("no_torque.csv", {"no column 'tau1'", "armcal record plays it"}, {"expected t, q1..qn, tau1..taun"});
   log("one_torque.csv", {"no column 'tau1'"}, {"expected t, q1..qn, tau1..taun"});
   log("other_names.csv", {"no column 'q1'"}, {"channel map: --channels"});
   log("twice.csv", {"column 'q1' appears twice"}, {"expected a name for each column"});
@@ -414,8 +414,8 @@ TEST_F(Mistakes, WithADriveOrASimulatedOne) {
       {"estimate --connect CLOSED --robot er20_like", {"CLOSED: cannot connect"}, {"is a drive running there"}, kLink},
       {"flash --connect CLOSED --robot er20_like --table {}/robot.toml", {"is a robot file"}, {"a parameter table"}},
       {"flash --connect CLOSED --robot er20_like --table {}/empty.json",
-       {"empty.json: line 1", "wrong TOML"},
-       {"expected"}},
+       {"empty.json: is JSON"},
+       {"expected a parameter table", "armcal restore takes a backup"}},
       {"verify --connect CLOSED --robot er20_like --table {}/absent.toml",
        {"absent.toml: no such"},
        {"check the path"}},
@@ -430,7 +430,10 @@ TEST_F(Mistakes, WithADriveOrASimulatedOne) {
       {"health --connect [::1]:1", {"::1:1: cannot connect"}, {"is a drive running there"}, kLink},
       {"scan /dev/does-not-exist --to 248", {"--to 248"}, {"a unit from 1 to 247"}},
       {"scan /dev/does-not-exist:9600:X", {"scan /dev/does-not-exist:9600:X"}, {"DEVICE[:BAUD[:PARITY]]"}},
-      {"scan /dev/does-not-exist:9600:N --to 2", {"/dev/does-not-exist, unit 2: cannot connect"}, {"plugged in"}, kLink},
+      {"scan /dev/does-not-exist:9600:N --to 2",
+       {"/dev/does-not-exist, unit 2: cannot connect"},
+       {"plugged in"},
+       kLink},
       {"scan 127.0.0.1 --from 502", {"scan 127.0.0.1"}, {"expected --from and --to"}},
       {"scan 127.0.0.1:502 --from 1 --to 2", {"scan 127.0.0.1:502: has a port"}, {"a host alone"}},
       {"scan 127.0.0.1:0", {"scan 127.0.0.1:0"}, {"a port from 1 to 65535"}},

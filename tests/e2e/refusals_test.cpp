@@ -41,10 +41,14 @@ class Flashing : public testing::Test {
     calibration::WriteTable(folder_ / name, t);
     return (folder_ / name).string();
   }
-  Outcome Verb(const std::string& verb, const std::string& table, const std::string& robot = "er20_like") const {
+  Outcome Verb(const std::string& verb, const std::string& table, const std::string& robot = "er20_like",
+               const std::vector<std::string>& more = {}) const {
     fs::remove(folder_ / "out.json");
-    return Tool({verb, "--connect", drive_.address(), "--robot", robot, "--table", table, "--json",
-                 (folder_ / "out.json").string()});
+    std::vector<std::string> words = {verb,      "--connect", drive_.address(),
+                                      "--robot", robot,       "--table",
+                                      table,     "--json",    (folder_ / "out.json").string()};
+    words.insert(words.end(), more.begin(), more.end());
+    return Tool(words);
   }
   // Refused with this code, reported as not done, and the table before it is still in force.
   void ExpectFlashRefused(const std::string& table, int code, const std::string& named,
@@ -139,17 +143,18 @@ TEST_F(Flashing, APartOfATable_KeepsTheRestAndNamesIt) {
 }
 
 // Of a model with an effect that this drive does not have.
-TEST_F(Flashing, ATableOfAnotherVersionOfTheModel_IsCarriedOverAndSaysSo) {
+TEST_F(Flashing, ATableOfAnotherVersionOfTheModel_IsCarriedOverOnlyIfThatIsSaid) {
   calibration::TableFile t = table_;
   t.schema ^= 1;
   t.row.push_back(t.row[66]);
   t.row.back().name = "stribeck.dFs1";
-  Outcome o = Verb("flash", File("other_version.toml", t));
+  ExpectFlashRefused(File("other_version.toml", t), kBadInput, "stribeck.dFs1: not in the model of er20_like");
+  Outcome o = Verb("flash", File("other_version.toml", t), "er20_like", {"--leave-out"});
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_NE(o.out.find("another version of the model"), std::string::npos) << o.out;
   EXPECT_NE(o.out.find("left out: stribeck.dFs1"), std::string::npos) << o.out;
   t.row = {t.row.back()};
-  o = Verb("verify", File("nothing.toml", t));
+  o = Verb("verify", File("nothing.toml", t), "er20_like", {"--leave-out"});
   EXPECT_EQ(o.code, kMismatch) << o.out;
   EXPECT_NE(o.out.find("no parameter was compared"), std::string::npos) << o.out;
   EXPECT_TRUE(ReadJson(folder_ / "out.json").at("same").is_null());

@@ -114,7 +114,11 @@ class Writer {
       return;
     }
     const double half = slide ? kTravel_m : kTurn_deg;
-    Key(key, "[" + Short(-half) + ", " + Short(half) + "]", chain_.unlimited[j]);
+    const bool guess = found[0] < found[1];
+    Key(key,
+        guess ? "[" + Short(found[0] * unit) + ", " + Short(found[1] * unit) + "]"
+              : "[" + Short(-half) + ", " + Short(half) + "]",
+        chain_.unlimited[j]);
   }
 
   const UrdfChain& chain_;

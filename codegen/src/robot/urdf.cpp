@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <numbers>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -26,7 +27,8 @@ using Eigen::Vector3d;
 constexpr double kSameAngle = 1e-5;   // rad
 constexpr double kSameLength = 1e-5;  // m; no arm is built more exactly
 constexpr double kMostTurn = 20;      // rad; more are degrees, or stand for no limit
-constexpr int kSameBodies = 3;        // moving links with one and the same inertia: not one is computed
+constexpr double kMostDegrees = 1000;
+constexpr int kSameBodies = 3;  // moving links with one and the same inertia: not one is computed
 
 // At joint positions zero, seen from the root link.
 struct Axis {
@@ -382,6 +384,13 @@ urdf::ModelInterfaceSharedPtr Parse(const std::filesystem::path& path) {
   return model;
 }
 
+// Limits that are no angles in rad, and may be some in degrees.
+bool AreDegrees(const urdf::Joint& joint) {
+  const auto& limits = joint.limits;
+  return joint.type == urdf::Joint::REVOLUTE && limits && limits->lower < limits->upper &&
+         std::max(-limits->lower, limits->upper) > kMostTurn && std::max(-limits->lower, limits->upper) <= kMostDegrees;
+}
+
 std::string WhyUnlimited(const urdf::Joint& joint) {
   const auto& limits = joint.limits;
   if (joint.type == urdf::Joint::CONTINUOUS) return "it is continuous";
@@ -389,7 +398,7 @@ std::string WhyUnlimited(const urdf::Joint& joint) {
   const std::string found = "the URDF has " + Number(limits->lower) + " to " + Number(limits->upper);
   if (!(limits->lower < limits->upper)) return found;
   if (joint.type == urdf::Joint::REVOLUTE && std::max(-limits->lower, limits->upper) > kMostTurn)
-    return found + " rad" + (limits->upper <= 1000 ? " (degrees?)" : "");
+    return found + " rad" + (AreDegrees(joint) ? " (degrees?)" : "");
   return "";
 }
 
@@ -493,7 +502,9 @@ UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
     joint.kinematics = kinematics[i];
     const auto& limits = axis.joint->limits;
     chain.unlimited.push_back(WhyUnlimited(*axis.joint));
-    if (chain.unlimited.back().empty()) joint.position_limit_rad = {limits->lower, limits->upper};
+    const double unit = AreDegrees(*axis.joint) ? std::numbers::pi / 180 : 1;
+    if (chain.unlimited.back().empty() || unit != 1)
+      joint.position_limit_rad = {unit * limits->lower, unit * limits->upper};
     if (limits) joint.speed_limit_radps = limits->velocity, joint.torque_limit_Nm = limits->effort;
     if (const auto& d = axis.joint->dynamics) joint.nominal = {{"Fc", d->friction}, {"Fv", d->damping}};
     joint.wide = {"Fc", "Fv", "Ia"};

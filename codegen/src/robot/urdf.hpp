@@ -22,7 +22,8 @@ struct UrdfPart {
 struct UrdfChain {
   // Outward: name, kinematics, limits, friction ("Fc", "Fv") and the link with all that is fixed to it.
   std::vector<Joint> joint;
-  // Why the URDF's position limits cannot be used, and position_limit_rad is not set; empty: they can.
+  // Why the URDF's position limits cannot be used; empty: they can. position_limit_rad is then not set, or a guess: the
+  // URDF's numbers as degrees.
   std::vector<std::string> unlimited;
   // Of each joint: the link that it moves, then all that is fixed to it.
   std::vector<std::vector<UrdfPart>> part;

@@ -50,6 +50,8 @@ ChannelMap OurNames(const std::string& file, const std::vector<std::string>& hea
   if (joints == 0) {
     throw io::InputError(file + ":1: no column 'q1', " + kOurColumns);
   }
+  if (!std::count(present.begin(), present.end(), "tau"))
+    throw io::InputError(file + ":1: no column 'tau1'; if it is a trajectory, armcal record plays it; " + kOurColumns);
   ChannelMap map{joints, {"t"}, {}, file};
   for (const char* quantity : kQuantities) {
     const bool required = std::string(quantity) == "q" || std::string(quantity) == "tau";

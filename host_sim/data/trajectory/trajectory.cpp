@@ -39,7 +39,8 @@ Trajectory ReadTrajectory(const std::filesystem::path& path, int joints) {
   const files::NumericTable table = files::ReadCsv(path);
   const std::string file = path.string();
   if (table.names != Header(joints))
-    throw io::InputError(file + ":1: expected the columns t,q1" + (joints > 1 ? "..q" + std::to_string(joints) : ""));
+    throw io::InputError(file + ":1: expected the columns t,q1" + (joints > 1 ? "..q" + std::to_string(joints) : "") +
+                         " and no others (armcal excite writes such a file)");
   const Eigen::Index rows = table.values.rows();
   if (rows < kFewestPoints)
     throw io::InputError(file + ": " + std::to_string(rows) + " rows, expected " + std::to_string(kFewestPoints) +

@@ -94,9 +94,9 @@ void AddNextSteps(report::Page& page, const ordered_json& json) {
     steps.push_back(fmt::format("The new model is {}. {}", json["model"].at("file").get<std::string>(),
                                 Holds(json["model"], "by_table", true)
                                     ? "A table switches its terms on: identify the new model, and flash its table."
-                                    : "Identify it: armcal identify --robot takes the file. For a drive generate it "
-                                      "first, and build the drive with it; then flash "
-                                      "its table."));
+                                    : "Fit it: armcal identify --robot takes the file, and --table-out writes the "
+                                      "table. For a drive, build its firmware from the file (armcal generate, or "
+                                      "armcal_add_model in CMake); then flash the table."));
   for (const ordered_json& term : json.at("terms")) {
     if (!(new_model && InModel(term))) steps.push_back(Words(term, "name") + ": " + Words(term, "to_do") + ".");
     for (const ordered_json& apart : term.at("separate")) {

@@ -197,6 +197,7 @@ std::string JointGroup(const std::vector<int>& joints) {
 }
 
 std::vector<std::string> MotionText(const calibration::HeldOutMotion& m) {
+  constexpr double kHardlyMore = 1.1;  // as a variance, which one digit of a deviation does not show
   std::vector<std::string> out;
   if (m.samples.share > 0.5)
     out.push_back(fmt::format("the held-out log is not held out: {:.0f} % of its samples are those of {}",
@@ -209,11 +210,12 @@ std::vector<std::string> MotionText(const calibration::HeldOutMotion& m) {
     if (!o.beyond()) continue;
     out.push_back(fmt::format(
         "joint {}: extrapolation: {:.0f} % of its positions and {:.0f} % of its speeds are outside "
-        "of the training logs' range; {}",
+        "of the training logs' range{}",
         j + 1, 100 * o.position, 100 * o.speed,
-        std::isfinite(o.leverage)
-            ? fmt::format("the model's torque is {:.1f} times as uncertain there", std::sqrt(std::max(0.0, o.leverage)))
-            : "no row of its torque could be fitted"));
+        !std::isfinite(o.leverage) ? "; no row of its torque could be fitted"
+        : o.leverage < kHardlyMore
+            ? ""
+            : fmt::format("; the model's torque is {:.1f} times as uncertain there", std::sqrt(o.leverage))));
   }
   for (const auto& group : m.in_phase) {
     out.push_back(

@@ -16,7 +16,8 @@ using diagnosis::Term;
 namespace {
 
 std::string Value(const std::string& name, double value, double sd, const std::string& unit) {
-  return fmt::format("{} = {:.4g}{} {}", name, value, sd > 0 ? fmt::format(" +- {:.2g}", sd) : "", unit);
+  return fmt::format("{} = {:.4g}{}{}", name, value, sd > 0 ? fmt::format(" +- {:.2g}", sd) : "",
+                     unit == "1" ? "" : " " + unit);
 }
 
 bool Apart(const std::vector<int>& a, const std::vector<int>& b) {

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <set>
 
@@ -217,6 +218,11 @@ void WriteTable(const std::filesystem::path& path, const TableFile& t) {
 }
 
 TableFile ReadTable(const std::filesystem::path& path) {
+  if (std::ifstream(path).peek() == '{')
+    throw io::InputError(
+        path.string() +
+        ": is JSON, expected a parameter table (armcal identify --table-out writes it); armcal restore "
+        "takes a backup");
   const toml::table toml = io::ParseToml(path);
   io::RequireKind(toml, path, io::FileKind::kTable);
   const io::TomlReader in(toml, path.string());

@@ -47,7 +47,9 @@ class Compiled final : public Firmware {
   }
 
   std::string Start(const std::string& storage, const Access& access, PlayedMotion& motion) override {
-    if (!core::IsOk(storage_.Open(storage))) return storage + ": expected a file that can be written";
+    const core::Status opened = storage_.Open(storage);
+    if (opened == core::Status::kBusy) return storage + ": another drive uses it; give each drive its own --storage";
+    if (!core::IsOk(opened)) return storage + ": expected a file that can be written";
     vendor_ = std::make_unique<VendorBlock>(motion, n);
     if (!core::IsOk(controller_.Record(raw_trace_)) || !core::IsOk(sample_trace_.Serve(controller_.map(), 1)) ||
         !core::IsOk(vendor_->Serve(controller_.map())))

@@ -49,8 +49,7 @@ Arm::Arm(const Scenario& scenario, const std::string& robot_path)
       stops_(robot_.joint.size(), 0),
       cut_(robot_.joint.size(), false) {
   const int n = joints();
-  if (!scenario.robot.empty() && scenario.robot != robot_.name)
-    throw io::InputError(scenario.path + ": robot: expected \"" + robot_.name + "\", the robot of " + robot_path);
+  RequireRobot(scenario, robot_.name, robot_path);
   Eigen::VectorXd rotor(n);
   for (int j = 0; j < n; ++j) {
     const JointData& joint = robot_.joint[static_cast<std::size_t>(j)];

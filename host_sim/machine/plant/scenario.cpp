@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "codegen/src/io/faults.hpp"
 #include "codegen/src/io/file_kind.hpp"
 #include "host_sim/machine/plant/frame_keys.hpp"
 
@@ -46,10 +47,11 @@ PayloadStep ReadPayload(const io::TomlReader& keys) {
   return payload;
 }
 
-std::string EffectKinds() {
-  std::string kinds = "payload_step, base_tilt, rotor_inertia, belt_elasticity, joint_compliance, backlash";
+std::vector<std::string> EffectKinds() {
+  std::vector<std::string> kinds = {"payload_step",    "base_tilt",        "rotor_inertia",
+                                    "belt_elasticity", "joint_compliance", "backlash"};
   const auto add = [&](const auto& readers) {
-    for (const auto& [name, reader] : readers) kinds += ", " + name;
+    for (const auto& [name, reader] : readers) kinds.push_back(name);
   };
   add(AllLinkForces()), add(AllReadingEffects()), add(AllJointEffects());
   return kinds;
@@ -88,7 +90,11 @@ void ReadEffect(const io::TomlReader& keys, Scenario& scenario) {
     if (std::shared_ptr<const JointEffect> there = effect->AtTheOtherJoint())
       scenario.joint_effects.push_back({kind, effect->other_joint(), there, from_s(), true});
   } else {
-    keys.Fail("kind", "one of: " + EffectKinds());
+    std::string all;
+    for (const std::string& known : EffectKinds()) all += (all.empty() ? "" : ", ") + known;
+    const std::string nearest = io::Nearest(kind, EffectKinds());
+    keys.Fail("kind", nearest.empty() ? "one of: " + all
+                                      : "a kind of effect, found \"" + kind + "\"; the nearest is " + nearest);
   }
   keys.Finish();
 }
@@ -111,6 +117,13 @@ std::vector<Undeclared> Scenario::undeclared() const {
   if (payload) list.push_back({"payload_step", "flange"});
   if (tilted()) list.push_back({"base_tilt", "base"});
   return list;
+}
+
+void RequireRobot(const Scenario& scenario, const std::string& robot, const std::string& robot_path) {
+  if (!scenario.robot.empty() && scenario.robot != robot)
+    throw io::InputError(scenario.path + ": is of robot \"" + scenario.robot + "\", expected \"" + robot +
+                         "\", the robot of " + robot_path +
+                         "; give --scenario any, or write one (host_sim/scenarios/README.md)");
 }
 
 Scenario ReadScenario(const std::string& path) {

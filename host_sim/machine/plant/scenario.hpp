@@ -99,5 +99,7 @@ struct Scenario {
 // Throws io::InputError (file, key, what was expected); unknown keys are refused. Whether joint numbers and list
 // lengths fit the robot is judged by Arm, which knows it.
 Scenario ReadScenario(const std::string& path);
+// Throws io::InputError if the scenario is of another robot than the one in robot_path.
+void RequireRobot(const Scenario& scenario, const std::string& robot, const std::string& robot_path);
 
 }  // namespace armcal::plant

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <memory>
 #include <vector>
 
 #include "armcal/table/table_store.hpp"
@@ -58,6 +59,14 @@ TEST_F(FileStorage, Programming_ClearsBitsOnly_AndEraseSetsThem) {
   EXPECT_EQ(storage.Erase(2), Status::kStorageFault);
   EXPECT_EQ(storage.Program(2, bytes, 4), Status::kStorageFault);
   EXPECT_EQ(storage.Read(510, bytes, 4), Status::kStorageFault);
+}
+
+TEST_F(FileStorage, ThatAnotherDriveUses_IsBusyUntilThatEnds) {
+  auto first = std::make_unique<port_linux::FileStorage>(2, 256, 4);
+  ASSERT_EQ(first->Open(path_), Status::kOk);
+  EXPECT_EQ(port_linux::FileStorage(2, 256, 4).Open(path_), Status::kBusy);
+  first.reset();
+  EXPECT_EQ(port_linux::FileStorage(2, 256, 4).Open(path_), Status::kOk);
 }
 
 TEST_F(FileStorage, InAFolderThatIsNotThere_IsAFault) {

@@ -96,8 +96,10 @@ TEST(Log, BadFile_NamesLineColumnAndExpected) {
   EXPECT_EQ(ErrorFor(Small("t,q1,")), ":1: column 3 has no name");
   EXPECT_EQ(ErrorFor(Small("time,q1,tau1")),
             ":1: no column 't', expected t, q1..qn, tau1..taun (other names need a channel map: --channels)");
-  EXPECT_EQ(ErrorFor(Small("t,q1,torque1")),
-            ":1: no column 'tau1', expected t, q1..qn, tau1..taun (other names need a channel map: --channels)");
+  EXPECT_EQ(
+      ErrorFor(Small("t,q1,torque1")),
+      ":1: no column 'tau1'; if it is a trajectory, armcal record plays it; expected t, q1..qn, tau1..taun (other "
+      "names need a channel map: --channels)");
   EXPECT_EQ(ErrorFor(Small("t,q2,tau2")),
             ":1: no column 'q1', expected t, q1..qn, tau1..taun (other names need a channel map: --channels)");
   EXPECT_EQ(ErrorFor(Small("t,pos,torque")),

@@ -62,6 +62,8 @@ TEST(ScenarioReader, OfABadFile_NamesFileKeyAndWhatWasExpected) {
   EXPECT_MESSAGE(error(ripple + "per_motor_turn = 1\n"), "effect[1].first_Nm", "missing, expected a number");
   EXPECT_MESSAGE(error(ripple + "per_motor_turn = 1\nfirst_Nm = 1\nfirst = 2\n"), "effect[1].first: unknown key");
   EXPECT_MESSAGE(error("[[effect]]\nkind = \"magic\"\njoint = 1\n"), "effect[1].kind", "stribeck", "payload_step");
+  EXPECT_MESSAGE(error("[[effect]]\nkind = \"stribek\"\njoint = 1\n"), "effect[1].kind",
+                 "found \"stribek\"; the nearest is stribeck");
   EXPECT_MESSAGE(error("[[effect]]\nkind = \"stribeck\"\njoint = 0\n"), "effect[1].joint", "an integer from 1");
   EXPECT_MESSAGE(error("[truth]\nfriction_spread = 1.5\n"), "truth.friction_spread", "below 1");
   EXPECT_MESSAGE(error("[thermal]\ntime_constant_s = [1.0, 0.0]\n"), "thermal.time_constant_s");
@@ -70,7 +72,7 @@ TEST(ScenarioReader, OfABadFile_NamesFileKeyAndWhatWasExpected) {
 
 TEST(Arm, GivenAScenarioThatDoesNotFit_SaysWhichKey) {
   const std::string one = WriteText("one.toml", RobotText({JointText{}}));
-  EXPECT_MESSAGE(ErrorOf([&] { Arm(MakeScenario("", "other"), one); }), "robot: expected \"test_arm\"");
+  EXPECT_MESSAGE(ErrorOf([&] { Arm(MakeScenario("", "other"), one); }), "is of robot \"other\", expected \"test_arm\"");
   EXPECT_MESSAGE(ErrorOf([&] { Arm(MakeScenario("start_rad = [0.0, 0.0]\n"), one); }), "start_rad: expected 1 numbers");
   const std::string joint_2 = "[[effect]]\nkind = \"torque_offset\"\njoint = 2\ntorque_Nm = 1\n";
   EXPECT_MESSAGE(ErrorOf([&] { Arm(MakeScenario(joint_2), one); }), "joint: expected a joint from 1 to 1");

@@ -114,7 +114,10 @@ int RunHealth(const HealthOptions& o, ordered_json& said) {
   if (!together.empty())
     fmt::print("joints {} changed at the same time: another payload, or the base was moved?\n",
                fmt::join(together, ", "));
-  if (unnamed) fmt::print("take a log: armcal record ..., then armcal diagnose ...\n");
+  if (unnamed)
+    fmt::print(
+        "a joint has changed, or it moves in another way and its model lacks something; take a log: armcal record ..., "
+        "then armcal diagnose ...\n");
   json["changed_together"] = together;
   json["verdict"] = misfit ? "misfit" : early ? "too_early" : "fits";
   said = json;

@@ -88,7 +88,7 @@ void AddVerdict(report::Page& page, const ordered_json& json) {
 
 void AddNextSteps(report::Page& page, const ordered_json& json) {
   page.Section("What to do next");
-  std::vector<std::string> steps, commands;
+  std::vector<std::string> steps, commands, left_out;
   const bool new_model = json.contains("model") && std::any_of(json.at("terms").begin(), json["terms"].end(), InModel);
   if (new_model)
     steps.push_back(fmt::format("The new model is {}. {}", json["model"].at("file").get<std::string>(),
@@ -98,13 +98,17 @@ void AddNextSteps(report::Page& page, const ordered_json& json) {
                                       "table. For a drive, build its firmware from the file (armcal generate, or "
                                       "armcal_add_model in CMake); then flash the table."));
   for (const ordered_json& term : json.at("terms")) {
-    if (!(new_model && InModel(term))) steps.push_back(Words(term, "name") + ": " + Words(term, "to_do") + ".");
+    if (!Holds(term, "confirmed", true)) left_out.push_back(Words(term, "name"));
+    else if (!(new_model && InModel(term))) steps.push_back(Words(term, "name") + ": " + Words(term, "to_do") + ".");
+    if (term.contains("refuted")) continue;  // nothing more is to be known of it
     for (const ordered_json& apart : term.at("separate")) {
       steps.push_back(fmt::format("To tell {} from {}: {}.", Words(term, "name"), apart.at("from").get<std::string>(),
                                   apart.at("how").get<std::string>()));
       if (apart.at("command") != "") commands.push_back(apart["command"]);
     }
   }
+  if (!left_out.empty())
+    steps.push_back(fmt::format("Leave out what is not confirmed: {}.", fmt::join(left_out, "; ")));
   if (!json.at("too_short").empty())
     steps.push_back(fmt::format("Record longer training logs: too few rows are left to search effects on joint {}.",
                                 fmt::join(json["too_short"].get<std::vector<int>>(), ", ")));

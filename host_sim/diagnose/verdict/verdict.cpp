@@ -84,6 +84,7 @@ std::string DiagnosisText(const DiagnosisView& v) {
     if (!t.confirmed)
       out += fmt::format("    {}{}\n", t.refuted ? "refuted on the held-out log: " : "",
                          WhyNotConfirmed(t, v.model->robot()));
+    if (!t.in_fit && t.not_held_out) continue;  // the page and the JSON say more of what was rejected
     out += fmt::format("    score {}; {}\n", ScoreText(t), FoldText(t));
     out += fmt::format("    runner-up: {}; fits equally: {}\n", RunnerUp(t), AlsoFits(t));
     for (const Separation& s : v.separation[k]) {

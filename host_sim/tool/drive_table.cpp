@@ -110,7 +110,7 @@ int RunDiff(const TableOptions& o, ordered_json&) {
   const std::string other = OfAnotherDrive(o, drive, backup);
   if (!other.empty()) fmt::print("{}\n", other);
   const auto active = client::UnsealTable(client::ReadActiveTable(drive));
-  ordered_json differ = ordered_json::array(), said;
+  ordered_json differ = ordered_json::array();
   for (std::size_t k = 0; k < std::max(words.size(), active.size()); ++k) {
     const auto is = k < active.size() ? ordered_json(active[k]) : ordered_json(),
                was = k < words.size() ? ordered_json(words[k]) : ordered_json();
@@ -118,7 +118,7 @@ int RunDiff(const TableOptions& o, ordered_json&) {
     differ.push_back({{"word", k}, {"drive", is}, {"file", was}});
     if (!layout) fmt::print("word {}: drive {}, file {}\n", k, is.dump(), was.dump());
   }
-  said = {{"same", differ.empty()}, {"differ", differ}, {"another_drive", !other.empty()}};
+  ordered_json said = {{"same", differ.empty()}, {"differ", differ}, {"another_drive", !other.empty()}};
   if (layout) {
     said["values"] = ordered_json::array();
     for (const ValueChange& c :

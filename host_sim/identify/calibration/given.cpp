@@ -169,10 +169,7 @@ Given GivenByJson(const codegen::Model& model, const std::filesystem::path& path
 
 Given GivenByFile(const codegen::Model& model, const std::filesystem::path& path) {
   io::RequireFile(path);
-  std::ifstream in(path);
-  char first = 0;
-  in >> first;
-  return first == '{' ? GivenByJson(model, path) : GivenByTable(model, ReadTable(path), path.string());
+  return IsJson(path) ? GivenByJson(model, path) : GivenByTable(model, ReadTable(path), path.string());
 }
 
 void AddPayload(const codegen::Model& model, const codegen::Payload& payload, const std::string& source, Given& given) {

@@ -217,8 +217,15 @@ void WriteTable(const std::filesystem::path& path, const TableFile& t) {
   files::WriteWholeFile(path, o);
 }
 
+bool IsJson(const std::filesystem::path& path) {
+  std::ifstream in(path);
+  char first = 0;
+  in >> first;
+  return first == '{';
+}
+
 TableFile ReadTable(const std::filesystem::path& path) {
-  if (std::ifstream(path).peek() == '{')
+  if (IsJson(path))
     throw io::InputError(
         path.string() +
         ": is JSON, expected a parameter table (armcal identify --table-out writes it); armcal restore "

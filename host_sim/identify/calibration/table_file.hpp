@@ -47,6 +47,8 @@ TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const Fit
 // Friction and effect columns whose posterior / prior ratio is above kFromPrior.
 std::vector<int> HardlyDetermined(const codegen::Model& model, const Fit& fit);
 
+// A table is TOML. True: the file is JSON, or begins like it.
+bool IsJson(const std::filesystem::path& path);
 // Throws io::InputError: file, key, what was expected.
 TableFile ReadTable(const std::filesystem::path& path);
 void WriteTable(const std::filesystem::path& path, const TableFile& table);

@@ -90,9 +90,10 @@ void ReadEffect(const io::TomlReader& keys, Scenario& scenario) {
     if (std::shared_ptr<const JointEffect> there = effect->AtTheOtherJoint())
       scenario.joint_effects.push_back({kind, effect->other_joint(), there, from_s(), true});
   } else {
+    const std::vector<std::string> kinds = EffectKinds();
     std::string all;
-    for (const std::string& known : EffectKinds()) all += (all.empty() ? "" : ", ") + known;
-    const std::string nearest = io::Nearest(kind, EffectKinds());
+    for (const std::string& known : kinds) all += (all.empty() ? "" : ", ") + known;
+    const std::string nearest = io::Nearest(kind, kinds);
     keys.Fail("kind", nearest.empty() ? "one of: " + all
                                       : "a kind of effect, found \"" + kind + "\"; the nearest is " + nearest);
   }

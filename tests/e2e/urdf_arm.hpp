@@ -82,6 +82,7 @@ inline std::string SevenAxisUrdf(const std::vector<UrdfJoint>& joints, const std
 // What the arm has and its URDF does not say.
 struct TrueDrive {
   double coulomb_Nm, viscous_Nmsprad, rotor_kgm2, noise_Nm;
+  double load_friction = 0;  // friction per torque of the links
 };
 
 class UrdfArm {
@@ -138,8 +139,9 @@ class UrdfArm {
       for (int j = 0; j < n; ++j) {
         const TrueDrive& d = drive_[static_cast<std::size_t>(j)];
         const unsigned at = order_[static_cast<std::size_t>(j)];
-        log.tau(k, j) = tau(at) + d.rotor_kgm2 * a(at) + d.coulomb_Nm * (v(at) > 0 ? 1 : -1) +
-                        d.viscous_Nmsprad * v(at) + d.noise_Nm * normal(random);
+        const double sliding_Nm = d.coulomb_Nm + d.load_friction * std::abs(tau(at));
+        log.tau(k, j) = tau(at) + d.rotor_kgm2 * a(at) + sliding_Nm * (v(at) > 0 ? 1 : -1) + d.viscous_Nmsprad * v(at) +
+                        d.noise_Nm * normal(random);
       }
     }
     return log;

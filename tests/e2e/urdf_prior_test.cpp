@@ -1,5 +1,7 @@
 // end-to-end tests - an arm whose URDF holds placeholders for friction and no word of rotors: all of it is found.
+#include <fmt/core.h>
 #include <unistd.h>
+
 #include <fstream>
 
 #include "tests/e2e/urdf_arm.hpp"
@@ -14,7 +16,7 @@ const std::vector<TrueDrive> kDrive = {{1.2, 2.0, 0.6, 0.2}, {1.0, 1.8, 0.6, 0.2
 class UrdfPrior : public testing::Test {
  protected:
   // The declared URDF with this <dynamics>, its robot file, and two logs of the true arm.
-  void Make(const std::string& name, const std::string& dynamics) {
+  void Make(const std::string& name, const std::string& dynamics, const std::vector<TrueDrive>& drive = kDrive) {
     folder_ = FreshFolder("urdf_prior_" + name);
     std::vector<UrdfJoint> joints = SevenJoints();
     std::ofstream(Path("arm.urdf")) << SevenAxisUrdf(joints, dynamics);
@@ -28,7 +30,7 @@ class UrdfPrior : public testing::Test {
     for (std::size_t j = 0; j < joints.size(); ++j) joints[j].mass *= j % 2 ? 1.15 : 0.88;
     std::vector<std::string> names;
     for (std::size_t j = 0; j < joints.size(); ++j) names.push_back("joint" + std::to_string(j + 1));
-    const UrdfArm arm(SevenAxisUrdf(joints, ""), names, joints, kDrive);
+    const UrdfArm arm(SevenAxisUrdf(joints, ""), names, joints, drive);
     logs::WriteLog(Path("train.csv"), arm.Run(60, 125, 3));
     logs::WriteLog(Path("test.csv"), arm.Run(30, 125, 4));
   }
@@ -73,6 +75,25 @@ TEST_F(UrdfPrior, OfPlaceholders_MakesNoEffect) {
                           Path("test.csv"), "--json", Path("verdict.json")});
   ASSERT_EQ(o.code, 0) << o.err << o.out;
   EXPECT_EQ(ReadJson(Path("verdict.json")).at("verdict"), "none") << o.out;
+}
+
+// The gears carry the links and not the rotors, which the URDF does not state. A rotor that counts as load makes other
+// terms of the load beside the true one.
+TEST_F(UrdfPrior, LoadFrictionBesideUnstatedRotors_IsAllThatIsNamed) {
+  for (const std::size_t joint : {0, 2}) {
+    std::vector<TrueDrive> drive = kDrive;
+    drive[joint].load_friction = 0.08;
+    Make("load_friction", "<dynamics damping=\"0.003\" friction=\"0\"/>", drive);
+    const Outcome o = Tool({"diagnose", "--robot", Path("arm.toml"), "--train", Path("train.csv"), "--test",
+                            Path("test.csv"), "--json", Path("verdict.json")});
+    ASSERT_EQ(o.code, 0) << o.err << o.out;
+    const nlohmann::json terms = ReadJson(Path("verdict.json")).at("terms");
+    ASSERT_EQ(terms.size(), 1u) << o.out;
+    EXPECT_EQ(terms[0].at("kind"), "load_friction");
+    EXPECT_EQ(terms[0].at("joint"), joint + 1);
+    EXPECT_TRUE(terms[0].at("confirmed").get<bool>());
+    EXPECT_NEAR(terms[0].at("parameters").at(fmt::format("load_friction.mu{}", joint + 1)).get<double>(), 0.08, 0.004);
+  }
 }
 
 }  // namespace

@@ -14,12 +14,12 @@ ArmTorque::ArmTorque(const Model& model) : joints_(model.joints()) {
   };
   const BodyRows moving = BodyRegressor(graph_, robot);
   for (int i = 0; i < joints_; ++i)
-    keep({Quantity::kRigidTorque, i}, LoadTorque(graph_, moving, model.base_columns(), robot, i));
+    keep({Quantity::kRigidTorque, i}, LoadTorque(graph_, moving, model.base_columns(), model.rotors(), i));
   add(BodyRegressor(graph_, robot, false), [](int i) { return InputId{Quantity::kGravityTorque, i}; });
   for (int j = 0; j < joints_; ++j) {
     const BodyRows rows = AccelerationRows(graph_, robot, j);
     for (int i = 0; i < joints_; ++i)
-      keep({Quantity::kMassMatrix, i, j}, LoadTorque(graph_, rows, model.base_columns(), robot, i));
+      keep({Quantity::kMassMatrix, i, j}, LoadTorque(graph_, rows, model.base_columns(), model.rotors(), i));
   }
   for (int axis = 0; axis < 3; ++axis) {
     Robot tilted = robot;

@@ -22,22 +22,27 @@ Robot Weightless(Robot robot) {
   return robot;
 }
 
+Expr BaseValue(Graph& g, int d) { return g.Input({.quantity = Quantity::kBaseParameter, .parameter = d}); }
+
 }  // namespace
 
 Expr BaseTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_columns, int i) {
   Expr sum = g.Constant(0);
   for (std::size_t d = 0; d < base_columns.size(); ++d)
-    sum = sum +
-          rows[i][base_columns[d]] * g.Input({.quantity = Quantity::kBaseParameter, .parameter = static_cast<int>(d)});
+    sum = sum + rows[i][base_columns[d]] * BaseValue(g, static_cast<int>(d));
   return sum;
 }
 
-Expr LoadTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_columns, const Robot& robot, int i) {
+Expr LoadTorque(Graph& g, const BodyRows& rows, const std::vector<int>& base_columns,
+                const std::vector<RotorInertia>& rotors, int i) {
   Expr sum = BaseTorque(g, rows, base_columns, i);
-  for (int j = 0; j < robot.joints(); ++j) {
-    const Motor& motor = robot.joint[static_cast<std::size_t>(j)].motor;
-    const double rotor_kgm2 = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2;
-    sum = sum - rotor_kgm2 * rows[i][kBodyBlock * j + kBodyBlock - 1];
+  for (std::size_t j = 0; j < rotors.size(); ++j) {
+    const Expr row = rows[i][kBodyBlock * j + kBodyBlock - 1];
+    if (row.IsZero()) continue;
+    Expr inertia = g.Constant(rotors[j].rest);
+    for (int d = 0; d < rotors[j].share.size(); ++d)
+      if (rotors[j].share[d] != 0) inertia = inertia + rotors[j].share[d] * BaseValue(g, d);
+    sum = sum - inertia * row;
   }
   return sum;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "codegen/src/generator/rigid_body.hpp"
+#include "codegen/src/generator/robot_prior.hpp"
 
 namespace armcal::codegen {
 
@@ -17,9 +18,9 @@ Dynamics MakeDynamics(Graph& graph, const Robot& robot, const std::vector<int>& 
 // Torque of joint i: its row times the base parameters.
 Expr BaseTorque(Graph& graph, const BodyRows& rows, const std::vector<int>& base_columns, int i);
 
-// The same without the rotors as the robot file has them: what the gears carry. Base parameters alone do not tell a
-// rotor from its link.
-Expr LoadTorque(Graph& graph, const BodyRows& rows, const std::vector<int>& base_columns, const Robot& robot, int i);
+// The same without the rotors: what the gears carry.
+Expr LoadTorque(Graph& graph, const BodyRows& rows, const std::vector<int>& base_columns,
+                const std::vector<RotorInertia>& rotors, int i);
 
 // Body rows of an arm without weight that stands still and accelerates by one at a joint: times parameters, a column of
 // M.

@@ -7,6 +7,7 @@
 
 #include "codegen/src/generator/derivative.hpp"
 #include "codegen/src/generator/dynamics.hpp"
+#include "codegen/src/generator/robot_prior.hpp"
 #include "codegen/src/io/input_error.hpp"
 
 namespace armcal::codegen {
@@ -23,6 +24,7 @@ bool Contains(const std::vector<int>& list, int value) {
 Model::Model(const Robot& robot, const Catalogue& catalogue) : robot_(robot) {
   body_rows_ = BodyRegressor(*graph_, robot_);
   base_ = FindBaseParameters(*graph_, body_rows_, robot_, TiltRows(catalogue));
+  rotor_ = MakeRotors(robot_, base_.map);
   rigid_ = static_cast<int>(base_.column.size());
   gravity_rows_ = BodyRegressor(*graph_, robot_, false);
   AddEffects(catalogue);
@@ -70,7 +72,7 @@ Expr Model::QuantityOf(const InputId& id) {
   switch (id.quantity) {
     case Quantity::kRigidTorque:
       depends_on_estimate_ = true;
-      return LoadTorque(*graph_, body_rows_, base_.column, robot_, id.row);
+      return LoadTorque(*graph_, body_rows_, base_.column, rotor_, id.row);
     case Quantity::kGravityTorque:
       return CommittedTorque(gravity_rows_, id.row);
     case Quantity::kBodyColumn: {  // about the file's frame: slid parameters = S parameters, a sum of slid columns
@@ -83,7 +85,7 @@ Expr Model::QuantityOf(const InputId& id) {
     }
     case Quantity::kMassMatrix:
       depends_on_estimate_ = true;
-      return LoadTorque(*graph_, AccelerationRows(*graph_, robot_, id.body), base_.column, robot_, id.row);
+      return LoadTorque(*graph_, AccelerationRows(*graph_, robot_, id.body), base_.column, rotor_, id.row);
     case Quantity::kGravitySlope:
       return CommittedTorque(TiltedRows(id.parameter), id.row);
     case Quantity::kGravityStiffness:
@@ -231,67 +233,15 @@ const char* const kBodyUnit[] = {"kg",     "kg*m",   "kg*m",   "kg*m",   "kg*m^2
                                  "kg*m^2", "kg*m^2", "kg*m^2", "kg*m^2", "kg*m^2"};
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// m, m c, I about the link origin from mass, centre and I about the centre.
-std::array<double, 10> AboutOrigin(const Link& l) {
-  const auto& c = l.center_m;
-  const auto& I = l.inertia_kgm2;
-  const double m = l.mass_kg, x = c[0], y = c[1], z = c[2];
-  return {m,
-          m * x,
-          m * y,
-          m * z,
-          I[0] + m * (y * y + z * z),
-          I[1] - m * x * y,
-          I[2] - m * x * z,
-          I[3] + m * (x * x + z * z),
-          I[4] - m * y * z,
-          I[5] + m * (x * x + y * y)};
-}
-
-// Prior standard deviations of (m, c, I about the centre).
-std::array<double, 10> LinkDeviation(const Robot& r, const Link& l) {
-  std::array<double, 10> sd{};
-  sd[0] = r.link_relative_sd * l.mass_kg;
-  for (int k = 0; k < 3; ++k) sd[1 + k] = std::max(r.link_relative_sd * std::abs(l.center_m[k]), r.center_floor_m);
-  const double largest = std::max({l.inertia_kgm2[0], l.inertia_kgm2[3], l.inertia_kgm2[5]});
-  for (int k = 0; k < 6; ++k)
-    sd[4 + k] = std::max(r.link_relative_sd * std::abs(l.inertia_kgm2[k]), r.inertia_floor_ratio * largest);
-  return sd;
-}
-
-// A URDF's friction is a placeholder more often than not, and it has no word for a rotor. So these priors come from
-// what the joint can give. A speed limit that is a placeholder, too, must not make them narrow.
-constexpr double kFastest = 20, kFastestSlide = 5;          // rad/s, m/s; a limit above counts as this
-constexpr double kCoulombShare = 0.1, kViscousShare = 0.3;  // of the torque limit: at rest, at the speed limit
-constexpr double kRunUp_s = 0.2;  // in which the torque limit brings a rotor of one deviation to the speed limit
-constexpr double kRotorMeanShare = 1e-3;  // of its deviation: above zero, as the barrier needs, and next to nothing
-
-double SpeedFor(const Joint& j) {
-  return std::min(j.speed_limit_radps, j.kinematics.type == JointType::kRevolute ? kFastest : kFastestSlide);
-}
-double WideFriction(const Joint& j, const std::string& name) {
-  return name == "Fv" ? kViscousShare * j.torque_limit_Nm / SpeedFor(j) : kCoulombShare * j.torque_limit_Nm;
-}
-double WideRotor(const Joint& j) { return kRunUp_s * j.torque_limit_Nm / SpeedFor(j); }
-
 }  // namespace
 
 void Model::MakeTable() {
-  for (int j = 0; j < joints(); ++j) {
-    const Joint& joint = robot_.joint[j];
-    const std::string number = std::to_string(j + 1);
-    // Without a prior every link starts as a small ball: physical, and so wide that it says nothing.
-    const Link& link = robot_.has_prior ? joint.link : Link{1, {}, {0.01, 0, 0, 0.01, 0, 0.01}};
-    const auto mean = AboutOrigin(link);
-    const auto sd = robot_.has_prior ? LinkDeviation(robot_, link)
-                                     : std::array<double, 10>{1e3, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3};
-    for (int p = 0; p < 10; ++p)
-      table_.push_back({kBodyParameterName[p] + number, kBodyUnit[p], mean[p], sd[p], p == 0 ? 0 : -kInfinity,
-                        kInfinity, 0, "estimated", 0, j, ""});
-    double rotor = joint.motor.gear_ratio * joint.motor.gear_ratio * joint.motor.rotor_inertia_kgm2;
-    double rotor_sd = robot_.has_prior ? robot_.link_relative_sd * rotor : 1e3;
-    if (robot_.has_prior && joint.wide.contains("Ia")) rotor_sd = WideRotor(joint), rotor = kRotorMeanShare * rotor_sd;
-    table_.push_back({"Ia" + number, "kg*m^2", rotor, rotor_sd, 0, kInfinity, 0, "estimated", 0, j, ""});
+  const BodyPrior prior = MakeBodyPrior(robot_);
+  for (int k = 0; k < body_parameters(); ++k) {
+    const int p = k % kBodyBlock;
+    const bool positive = p == 0 || p == kBodyBlock - 1;
+    table_.push_back({kBodyParameterName[p] + std::to_string(k / kBodyBlock + 1), kBodyUnit[p], prior.mean[k],
+                      prior.deviation[k], positive ? 0 : -kInfinity, kInfinity, 0, "estimated", 0, k / kBodyBlock, ""});
   }
   for (std::size_t k = 0; k < effect_column_.size(); ++k) {
     const EffectColumn& c = effect_column(static_cast<int>(k));

@@ -12,6 +12,7 @@
 #include "codegen/src/generator/base_parameters.hpp"
 #include "codegen/src/generator/effect.hpp"
 #include "codegen/src/generator/instance.hpp"
+#include "codegen/src/generator/robot_prior.hpp"
 #include "codegen/src/generator/tape.hpp"
 #include "codegen/src/robot/robot.hpp"
 
@@ -63,6 +64,7 @@ class Model {
   std::string column_unit(int column) const;
   const std::vector<int>& base_columns() const { return base_.column; }  // body parameters, indices into 11n
   const Eigen::MatrixXd& base_map() const { return base_.map; }          // rigid x 11n
+  const std::vector<RotorInertia>& rotors() const { return rotor_; }     // [joints]
   const std::vector<EffectInstance>& effects() const { return effect_; }
   const std::vector<EffectUnknown>& unknowns() const { return unknown_; }
   bool depends_on_estimate() const { return depends_on_estimate_; }
@@ -114,6 +116,7 @@ class Model {
   Robot robot_;
   std::unique_ptr<Graph> graph_ = std::make_unique<Graph>();
   BaseParameters base_;
+  std::vector<RotorInertia> rotor_;
   int front_ = 0, rigid_ = 0, dense_ = 0;
   std::vector<int> front_begin_, row_begin_, column_joint_;
   Catalogue record_;  // those in use; effect_ points into it

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "host_sim/diagnose/verdict/common_rows.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
@@ -47,7 +48,8 @@ void Diagnosed::Judge(const logs::Log& log, const std::string& robot, const std:
   view.motion = calibration::CompareMotion(*model, finding.declared, calibration::Pointers(train), test);
   if (view.motion.repeats()) diagnosis->ConfirmNothing(verdict::MotionText(view.motion)[0]);
   view.model = model.get(), view.finding = &finding, view.test = &test, view.held_out = &held_out, view.train = &train;
-  view.term_torque = diagnosis->TermTorque(test);
+  const std::vector<calibration::Dataset> judged{test};
+  view.term_torque = verdict::CommonRows(*model, judged, finding.declared).Beyond(diagnosis->TermTorque(test), 0);
   for (const diagnosis::Term& t : finding.terms)
     view.separation.push_back(verdict::Separations(t, finding, *model, catalogue, robot, file));
   WriteJson();

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::verdict {
@@ -18,29 +19,26 @@ constexpr int kRowsOfARun = 4000;  // enough for a form; memory stays below 100 
 }  // namespace
 
 CommonRows::CommonRows(const codegen::Model& model, const std::vector<Dataset>& runs)
-    : model_(model), runs_(runs), declared_(calibration::WeightedFit(model, calibration::Pointers(runs))) {
+    : CommonRows(model, runs, calibration::WeightedFit(model, calibration::Pointers(runs))) {}
+
+CommonRows::CommonRows(const codegen::Model& model, const std::vector<Dataset>& runs, calibration::Fit declared)
+    : model_(model), runs_(runs), declared_(std::move(declared)) {
   const int n = model.joints(), columns = model.columns();
-  const auto active = static_cast<Index>(declared_.active.size());
   row_.resize(n);
   for (int j = 0; j < n; ++j)
     for (std::size_t r = 0; r < runs.size(); ++r)
       for (int k = 0, step = std::max(1, runs[r].samples() / kRowsOfARun); k < runs[r].samples(); k += step)
         if (runs[r].used(k, j)) row_[j].emplace_back(r, k);
-  for (int j = 0; j < n; ++j) design_.emplace_back(MatrixXd::Zero(static_cast<Index>(row_[j].size()), active));
+  for (int j = 0; j < n; ++j)
+    design_.emplace_back(static_cast<Index>(row_[j].size()), static_cast<Index>(declared_.active.size()));
   calibration::Information information(n, columns + n);
   std::vector<Index> filled(n, 0);
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    std::vector<MatrixXd> regressor;
-    model.Regressor(runs[r].s, {declared_.x.data(), static_cast<std::size_t>(columns)}, declared_.eta, regressor);
+    const std::vector<MatrixXd> rows = Rows(runs[r]);
     for (int j = 0; j < n; ++j)
       for (; filled[j] < static_cast<Index>(row_[j].size()) && row_[j][filled[j]].first == static_cast<int>(r);
            ++filled[j])
-        for (Index a = 0; a < active; ++a) {
-          const int c = declared_.active[static_cast<std::size_t>(a)];
-          const auto row = regressor[j].row(row_[j][filled[j]].second);
-          if (c < columns) design_[j](filled[j], a) = row[c];
-          else if (c == columns + j) design_[j](filled[j], a) = row.dot(declared_.x.head(columns));
-        }
+        design_[j].row(filled[j]) = rows[j].row(row_[j][filled[j]].second);
   }
   VectorXd weight = VectorXd::Ones(n);
   for (int j = 0; j < n; ++j) {
@@ -52,21 +50,66 @@ CommonRows::CommonRows(const codegen::Model& model, const std::vector<Dataset>& 
   inverse_ = covariance(declared_.active, declared_.active);
 }
 
+// [n] N x active: torque of each joint per unit of the declared model's active coordinates.
+std::vector<MatrixXd> CommonRows::Rows(const Dataset& run) const {
+  const int columns = model_.columns();
+  std::vector<MatrixXd> regressor, out;
+  model_.Regressor(run.s, {declared_.x.data(), static_cast<std::size_t>(columns)}, declared_.eta, regressor);
+  calibration::PassThroughChannel(run, regressor);
+  for (int j = 0; j < model_.joints(); ++j) {
+    out.push_back(MatrixXd::Zero(run.samples(), static_cast<Index>(declared_.active.size())));
+    for (Index a = 0; a < out[j].cols(); ++a) {
+      const int c = declared_.active[static_cast<std::size_t>(a)];
+      if (c < columns) out[j].col(a) = regressor[j].col(c);
+      else if (c == columns + j) out[j].col(a) = regressor[j] * declared_.x.head(columns);
+    }
+  }
+  return out;
+}
+
+Index CommonRows::rows() const {
+  Index sum = 0;
+  for (const auto& own : row_) sum += static_cast<Index>(own.size());
+  return sum;
+}
+
 // torque: rows of all joints, one below the other, a column each; over the joints' noise.
-MatrixXd CommonRows::Left(MatrixXd torque) const {
+MatrixXd CommonRows::TakenUp(const MatrixXd& torque) const {
   MatrixXd right = MatrixXd::Zero(inverse_.rows(), torque.cols());
   Index at = 0;
   for (const MatrixXd& d : design_) right += d.transpose() * torque.middleRows(at, d.rows()), at += d.rows();
-  const MatrixXd taken_up = inverse_ * right;
-  at = 0;
+  return inverse_ * right;
+}
+
+MatrixXd CommonRows::Left(MatrixXd torque) const {
+  const MatrixXd taken_up = TakenUp(torque);
+  Index at = 0;
   for (const MatrixXd& d : design_) torque.middleRows(at, d.rows()) -= d * taken_up, at += d.rows();
   return torque;
 }
 
+std::vector<MatrixXd> CommonRows::Beyond(const std::vector<MatrixXd>& torques, std::size_t run) const {
+  const auto count = static_cast<Index>(torques.size());
+  MatrixXd seen = MatrixXd::Zero(rows(), count);
+  Index at = 0;
+  for (int j = 0; j < model_.joints(); ++j)
+    for (const auto& [r, k] : row_[j]) {
+      for (Index t = 0; t < count && r == static_cast<int>(run); ++t)
+        seen(at, t) = torques[static_cast<std::size_t>(t)](k, j) / declared_.sigma[j];
+      ++at;
+    }
+  const MatrixXd taken_up = TakenUp(seen);
+  const std::vector<MatrixXd> declared = Rows(runs_[run]);
+  std::vector<MatrixXd> left = torques;
+  for (Index t = 0; t < count; ++t)
+    for (int j = 0; j < model_.joints(); ++j)
+      if (auto own = left[static_cast<std::size_t>(t)].col(j); !own.isZero(0))
+        own -= declared[static_cast<std::size_t>(j)] * taken_up.col(t);
+  return left;
+}
+
 Trace CommonRows::Of(const diagnosis::KnownTerm& term, const MatrixXd& covariance) const {
-  Index rows = 0;
-  for (const auto& own : row_) rows += static_cast<Index>(own.size());
-  MatrixXd torque(rows, 1 + static_cast<Index>(term.eta.size()) + term.amplitude.size());
+  MatrixXd torque(rows(), 1 + static_cast<Index>(term.eta.size()) + term.amplitude.size());
   std::vector<diagnosis::TermTorques> of_run;
   for (const Dataset& run : runs_) of_run.push_back(diagnosis::TorquesOf(term, model_, declared_, run));
   Index at = 0;

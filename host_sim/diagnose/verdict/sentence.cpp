@@ -87,8 +87,8 @@ std::string CauseText(const DiagnosisView& v, std::size_t term) {
     OverError(v, term).maxCoeff(&main);
     const char* unit = calibration::TorqueUnit(v.model->robot().joint[static_cast<std::size_t>(main)]);
     out += fmt::format(
-        ": {:.3g} {} RMS of joint {} on the held-out log; the error there is {:.3g} {} with the declared model and "
-        "{:.3g} {} with all terms",
+        ": {:.3g} {} RMS of joint {} on the held-out log beyond what declared parameters can give; the error there is "
+        "{:.3g} {} with the declared model and {:.3g} {} with all terms",
         torque[main], unit, main + 1, before[main], unit, after[main], unit);
     if (t.record->search.at_turns) out += "; it shows near turns and at rest, where a joint that sticks looks the same";
     out += InPhase(t, v.motion);

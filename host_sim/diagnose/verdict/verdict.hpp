@@ -23,7 +23,9 @@ struct DiagnosisView {
   const diagnosis::Finding* finding = nullptr;
   const calibration::Dataset* test = nullptr;
   const diagnosis::HeldOut* held_out = nullptr;
-  std::vector<Eigen::MatrixXd> term_torque;  // on the test log
+  // On the test log, less what parameters of the declared model could give: a friction curve with a large constant part
+  // and as much less Coulomb friction is a small term.
+  std::vector<Eigen::MatrixXd> term_torque;
   double seconds = 0;
   calibration::Exogeneity exogeneity;               // of the training logs, with the terms in
   std::vector<std::vector<Separation>> separation;  // per term

@@ -11,56 +11,7 @@ namespace armcal::calibration {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-VectorXd ToCentre(const VectorXd& o) {
-  VectorXd c = o;
-  const double m = o[0];
-  const double x = o[1] / m, y = o[2] / m, z = o[3] / m;
-  c[1] = x, c[2] = y, c[3] = z;
-  c[4] -= m * (y * y + z * z), c[5] += m * x * y, c[6] += m * x * z;
-  c[7] -= m * (x * x + z * z), c[8] += m * y * z, c[9] -= m * (x * x + y * y);
-  return c;
-}
-
-VectorXd ToOrigin(const VectorXd& c) {
-  VectorXd o = c;
-  const double m = c[0], x = c[1], y = c[2], z = c[3];
-  o[1] = m * x, o[2] = m * y, o[3] = m * z;
-  o[4] += m * (y * y + z * z), o[5] -= m * x * y, o[6] -= m * x * z;
-  o[7] += m * (x * x + z * z), o[8] -= m * y * z, o[9] += m * (x * x + y * y);
-  return o;
-}
-
-MatrixXd OriginJacobian(const VectorXd& c) {
-  const double m = c[0], x = c[1], y = c[2], z = c[3];
-  MatrixXd J = MatrixXd::Identity(10, 10);
-  J.col(0) << 1, x, y, z, y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y;
-  J.col(1) << 0, m, 0, 0, 0, -m * y, -m * z, 2 * m * x, 0, 2 * m * x;
-  J.col(2) << 0, 0, m, 0, 2 * m * y, -m * x, 0, 0, -m * z, 2 * m * y;
-  J.col(3) << 0, 0, 0, m, 2 * m * z, 0, -m * x, 2 * m * z, -m * y, 0;
-  return J;
-}
-
-VectorXd BodyMean(const codegen::Model& model) {
-  VectorXd mean(model.body_parameters());
-  for (int k = 0; k < mean.size(); ++k) mean[k] = model.table()[k].mean;
-  return mean;
-}
-
-MatrixXd BodyCovariance(const codegen::Model& model) {
-  const VectorXd mean = BodyMean(model);
-  MatrixXd P = MatrixXd::Zero(mean.size(), mean.size());
-  for (int j = 0; j < model.joints(); ++j) {
-    VectorXd sd(11);
-    for (int k = 0; k < 11; ++k) {
-      const auto& p = model.table()[11 * j + k];
-      sd[k] = p.state == "estimated" || p.state == "considered" ? p.sd : 0;
-    }
-    const MatrixXd J = OriginJacobian(ToCentre(mean.segment(11 * j, 10)));
-    P.block(11 * j, 11 * j, 10, 10) = J * sd.head(10).cwiseAbs2().asDiagonal() * J.transpose();
-    P(11 * j + 10, 11 * j + 10) = sd[10] * sd[10];
-  }
-  return P;
-}
+VectorXd BodyMean(const codegen::Model& model) { return codegen::MakeBodyPrior(model.robot()).mean; }
 
 std::vector<double> MeanUnknowns(const codegen::Model& model) {
   std::vector<double> eta;
@@ -122,9 +73,10 @@ Prior MakePrior(const codegen::Model& model) {
   prior.covariance = MatrixXd::Zero(columns + n, columns + n);
   if (prior.informative) {
     const MatrixXd& B = model.base_map();
-    prior.mean.segment(model.front(), model.rigid()) = B * BodyMean(model);
+    const codegen::BodyPrior bodies = codegen::MakeBodyPrior(model.robot());
+    prior.mean.segment(model.front(), model.rigid()) = B * bodies.mean;
     prior.covariance.block(model.front(), model.front(), model.rigid(), model.rigid()) =
-        B * BodyCovariance(model) * B.transpose();
+        B * bodies.covariance * B.transpose();
   }
   for (int c = 0; c < columns; ++c) {
     if (model.is_rigid(c)) {
@@ -150,10 +102,8 @@ Prior MakePrior(const codegen::Model& model) {
 }
 
 VectorXd ReadOutBodies(const codegen::Model& model, const VectorXd& base) {
-  const MatrixXd P0 = BodyCovariance(model);
-  const VectorXd phi0 = BodyMean(model);
-  const MatrixXd& B = model.base_map();
-  return phi0 + P0 * B.transpose() * (B * P0 * B.transpose()).ldlt().solve(base - B * phi0);
+  const codegen::BodyPrior prior = codegen::MakeBodyPrior(model.robot());
+  return prior.mean + codegen::ReadOut(prior, model.base_map()) * (base - model.base_map() * prior.mean);
 }
 
 Eigen::Matrix4d PseudoInertia(const double* b) {

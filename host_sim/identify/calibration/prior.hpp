@@ -20,10 +20,9 @@ struct Prior {
   int columns = 0;
 };
 
-// Bodies about their link origins (10 values) <-> (m, c, I about the centre), and the Jacobian d(origin)/d(table).
-Eigen::VectorXd ToCentre(const Eigen::VectorXd& origin);
-Eigen::VectorXd ToOrigin(const Eigen::VectorXd& centre);
-Eigen::MatrixXd OriginJacobian(const Eigen::VectorXd& centre);
+using codegen::OriginJacobian;
+using codegen::ToCentre;
+using codegen::ToOrigin;
 
 // From the model's table: means, deviations and states.
 Prior MakePrior(const codegen::Model& model);
@@ -34,8 +33,7 @@ std::vector<double> MeanUnknowns(const codegen::Model& model);
 // R with R R' = covariance, which may be singular; found in units of its deviations.
 Eigen::MatrixXd CovarianceRoot(const Eigen::MatrixXd& covariance);
 
-// Covariance of the body parameters (about origins), 11n x 11n, at the table's means.
-Eigen::MatrixXd BodyCovariance(const codegen::Model& model);
+// Means of the body parameters about the link origins, [11n].
 Eigen::VectorXd BodyMean(const codegen::Model& model);
 
 // Standard parameters from base ones: phi = phi0 + G (b - B phi0), G = P0 B' (B P0 B')^-1.

@@ -102,7 +102,7 @@ TEST(StatefulEffects, BacklashUnderLoad_EqualsFineIntegration) {
   ASSERT_EQ(run.instance().columns[0].rows.size(), 6u);
   for (const int row : {0, 1, 5}) {
     const auto column = run.Column(0, row, log, {{"T", T}});
-    double first = 0, place = 0;
+    double first = Sign(load[0]), place = first;  // the link rests on its side
     for (std::size_t k = 1; k < load.size(); ++k) {
       constexpr int kSteps = 2000;
       const double h = kDt / kSteps;

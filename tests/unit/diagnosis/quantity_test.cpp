@@ -98,9 +98,9 @@ class EveryQuantity : public testing::Test {
     q[joint] += further_rad, qd[joint] += faster_radps;
     return KdlArm(arm_.model().robot(), arm_.bodies()).Torque(q, qd, At(data_.s.qdd, sample));
   }
-  double Rotor(int joint) const {
-    const codegen::Motor& motor = arm_.model().robot().joint[static_cast<std::size_t>(joint)].motor;
-    return motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kgm2;
+  double Rotor(int joint) const {  // tests/unit/codegen/robot_prior_test.cpp judges what base parameters say of it
+    const codegen::RotorInertia& rotor = arm_.model().rotors()[static_cast<std::size_t>(joint)];
+    return rotor.rest + rotor.share.dot(arm_.model().base_map() * arm_.bodies());
   }
   VectorXd Rigid(int sample) const {
     return Torque(arm_.bodies(), sample, At(data_.s.qd, sample), At(data_.s.qdd, sample));
@@ -128,7 +128,7 @@ class EveryQuantity : public testing::Test {
         return data_.s.t[sample];
       case Quantity::kTimeStep:
         return kStep_s;
-      case Quantity::kRigidTorque:  // the rotor of the file is no load of the gear
+      case Quantity::kRigidTorque:  // the rotor is no load of the gear
         return Rigid(sample)[joint] - Rotor(joint) * data_.s.qdd(sample, joint);
       case Quantity::kModelTorque:  // the model of this test has no friction
         return Rigid(sample)[joint];

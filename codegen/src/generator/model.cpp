@@ -7,7 +7,6 @@
 
 #include "codegen/src/generator/derivative.hpp"
 #include "codegen/src/generator/dynamics.hpp"
-#include "codegen/src/generator/robot_prior.hpp"
 #include "codegen/src/io/input_error.hpp"
 
 namespace armcal::codegen {
@@ -21,10 +20,10 @@ bool Contains(const std::vector<int>& list, int value) {
 
 }  // namespace
 
-Model::Model(const Robot& robot, const Catalogue& catalogue) : robot_(robot) {
+Model::Model(const Robot& robot, const Catalogue& catalogue) : robot_(robot), body_prior_(MakeBodyPrior(robot)) {
   body_rows_ = BodyRegressor(*graph_, robot_);
   base_ = FindBaseParameters(*graph_, body_rows_, robot_, TiltRows(catalogue));
-  rotor_ = MakeRotors(robot_, base_.map);
+  rotor_ = MakeRotors(robot_, body_prior_, base_.map);
   rigid_ = static_cast<int>(base_.column.size());
   gravity_rows_ = BodyRegressor(*graph_, robot_, false);
   AddEffects(catalogue);
@@ -236,12 +235,12 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 void Model::MakeTable() {
-  const BodyPrior prior = MakeBodyPrior(robot_);
   for (int k = 0; k < body_parameters(); ++k) {
     const int p = k % kBodyBlock;
     const bool positive = p == 0 || p == kBodyBlock - 1;
-    table_.push_back({kBodyParameterName[p] + std::to_string(k / kBodyBlock + 1), kBodyUnit[p], prior.mean[k],
-                      prior.deviation[k], positive ? 0 : -kInfinity, kInfinity, 0, "estimated", 0, k / kBodyBlock, ""});
+    table_.push_back({kBodyParameterName[p] + std::to_string(k / kBodyBlock + 1), kBodyUnit[p], body_prior_.mean[k],
+                      body_prior_.deviation[k], positive ? 0 : -kInfinity, kInfinity, 0, "estimated", 0, k / kBodyBlock,
+                      ""});
   }
   for (std::size_t k = 0; k < effect_column_.size(); ++k) {
     const EffectColumn& c = effect_column(static_cast<int>(k));

@@ -64,7 +64,8 @@ class Model {
   std::string column_unit(int column) const;
   const std::vector<int>& base_columns() const { return base_.column; }  // body parameters, indices into 11n
   const Eigen::MatrixXd& base_map() const { return base_.map; }          // rigid x 11n
-  const std::vector<RotorInertia>& rotors() const { return rotor_; }     // [joints]
+  const BodyPrior& body_prior() const { return body_prior_; }
+  const std::vector<RotorInertia>& rotors() const { return rotor_; }  // [joints]
   const std::vector<EffectInstance>& effects() const { return effect_; }
   const std::vector<EffectUnknown>& unknowns() const { return unknown_; }
   bool depends_on_estimate() const { return depends_on_estimate_; }
@@ -114,6 +115,7 @@ class Model {
   Bound Bind(const Signals& s, std::span<const double> committed, std::span<const double> eta, int states) const;
 
   Robot robot_;
+  BodyPrior body_prior_;
   std::unique_ptr<Graph> graph_ = std::make_unique<Graph>();
   BaseParameters base_;
   std::vector<RotorInertia> rotor_;

@@ -2,7 +2,6 @@
 #include "codegen/src/generator/robot_prior.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -115,11 +114,10 @@ MatrixXd ReadOut(const BodyPrior& prior, const MatrixXd& B) {
   return (across * B.transpose()).ldlt().solve(across).transpose();
 }
 
-std::vector<RotorInertia> MakeRotors(const Robot& robot, const MatrixXd& B) {
+std::vector<RotorInertia> MakeRotors(const Robot& robot, const BodyPrior& prior, const MatrixXd& B) {
   std::vector<RotorInertia> out;
   for (const Joint& joint : robot.joint) out.push_back({StatedRotor(joint), VectorXd::Zero(B.rows())});
   if (!robot.has_prior) return out;
-  const BodyPrior prior = MakeBodyPrior(robot);
   const MatrixXd gain = ReadOut(prior, B);
   const VectorXd base_mean = B * prior.mean, base_sd = (B * prior.covariance * B.transpose()).diagonal().cwiseSqrt();
   for (int j = 0; j < robot.joints(); ++j) {

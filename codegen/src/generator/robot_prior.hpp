@@ -34,6 +34,6 @@ struct RotorInertia {
   double rest = 0;
   Eigen::VectorXd share;  // [rigid]
 };
-std::vector<RotorInertia> MakeRotors(const Robot& robot, const Eigen::MatrixXd& base_map);
+std::vector<RotorInertia> MakeRotors(const Robot& robot, const BodyPrior& prior, const Eigen::MatrixXd& base_map);
 
 }  // namespace armcal::codegen

@@ -48,8 +48,10 @@ void Diagnosed::Judge(const logs::Log& log, const std::string& robot, const std:
   view.motion = calibration::CompareMotion(*model, finding.declared, calibration::Pointers(train), test);
   if (view.motion.repeats()) diagnosis->ConfirmNothing(verdict::MotionText(view.motion)[0]);
   view.model = model.get(), view.finding = &finding, view.test = &test, view.held_out = &held_out, view.train = &train;
-  const std::vector<calibration::Dataset> judged{test};
-  view.term_torque = verdict::CommonRows(*model, judged, finding.declared).Beyond(diagnosis->TermTorque(test), 0);
+  if (!finding.terms.empty()) {
+    const std::vector<calibration::Dataset> judged{test};
+    view.term_torque = verdict::CommonRows(*model, judged, finding.declared).Beyond(diagnosis->TermTorque(test));
+  }
   for (const diagnosis::Term& t : finding.terms)
     view.separation.push_back(verdict::Separations(t, finding, *model, catalogue, robot, file));
   WriteJson();

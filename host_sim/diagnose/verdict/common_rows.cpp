@@ -34,7 +34,7 @@ CommonRows::CommonRows(const codegen::Model& model, const std::vector<Dataset>& 
   calibration::Information information(n, columns + n);
   std::vector<Index> filled(n, 0);
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    const std::vector<MatrixXd> rows = Rows(runs[r]);
+    const std::vector<MatrixXd> rows = DeclaredRows(runs[r]);
     for (int j = 0; j < n; ++j)
       for (; filled[j] < static_cast<Index>(row_[j].size()) && row_[j][filled[j]].first == static_cast<int>(r);
            ++filled[j])
@@ -51,7 +51,7 @@ CommonRows::CommonRows(const codegen::Model& model, const std::vector<Dataset>& 
 }
 
 // [n] N x active: torque of each joint per unit of the declared model's active coordinates.
-std::vector<MatrixXd> CommonRows::Rows(const Dataset& run) const {
+std::vector<MatrixXd> CommonRows::DeclaredRows(const Dataset& run) const {
   const int columns = model_.columns();
   std::vector<MatrixXd> regressor, out;
   model_.Regressor(run.s, {declared_.x.data(), static_cast<std::size_t>(columns)}, declared_.eta, regressor);
@@ -67,7 +67,7 @@ std::vector<MatrixXd> CommonRows::Rows(const Dataset& run) const {
   return out;
 }
 
-Index CommonRows::rows() const {
+Index CommonRows::AllRows() const {
   Index sum = 0;
   for (const auto& own : row_) sum += static_cast<Index>(own.size());
   return sum;
@@ -88,28 +88,24 @@ MatrixXd CommonRows::Left(MatrixXd torque) const {
   return torque;
 }
 
-std::vector<MatrixXd> CommonRows::Beyond(const std::vector<MatrixXd>& torques, std::size_t run) const {
-  const auto count = static_cast<Index>(torques.size());
-  MatrixXd seen = MatrixXd::Zero(rows(), count);
-  Index at = 0;
-  for (int j = 0; j < model_.joints(); ++j)
-    for (const auto& [r, k] : row_[j]) {
-      for (Index t = 0; t < count && r == static_cast<int>(run); ++t)
-        seen(at, t) = torques[static_cast<std::size_t>(t)](k, j) / declared_.sigma[j];
-      ++at;
-    }
-  const MatrixXd taken_up = TakenUp(seen);
-  const std::vector<MatrixXd> declared = Rows(runs_[run]);
-  std::vector<MatrixXd> left = torques;
-  for (Index t = 0; t < count; ++t)
+std::vector<MatrixXd> CommonRows::Beyond(const std::vector<MatrixXd>& torques) const {
+  MatrixXd seen(AllRows(), static_cast<Index>(torques.size()));
+  for (std::size_t t = 0; t < torques.size(); ++t) {
+    Index at = 0;
     for (int j = 0; j < model_.joints(); ++j)
-      if (auto own = left[static_cast<std::size_t>(t)].col(j); !own.isZero(0))
-        own -= declared[static_cast<std::size_t>(j)] * taken_up.col(t);
+      for (const auto& [r, k] : row_[j]) seen(at++, static_cast<Index>(t)) = torques[t](k, j) / declared_.sigma[j];
+  }
+  const MatrixXd taken_up = TakenUp(seen);
+  const std::vector<MatrixXd> declared = DeclaredRows(runs_[0]);
+  std::vector<MatrixXd> left = torques;
+  for (std::size_t t = 0; t < torques.size(); ++t)
+    for (int j = 0; j < model_.joints(); ++j)
+      if (auto own = left[t].col(j); !own.isZero(0)) own -= declared[j] * taken_up.col(static_cast<Index>(t));
   return left;
 }
 
 Trace CommonRows::Of(const diagnosis::KnownTerm& term, const MatrixXd& covariance) const {
-  MatrixXd torque(rows(), 1 + static_cast<Index>(term.eta.size()) + term.amplitude.size());
+  MatrixXd torque(AllRows(), 1 + static_cast<Index>(term.eta.size()) + term.amplitude.size());
   std::vector<diagnosis::TermTorques> of_run;
   for (const Dataset& run : runs_) of_run.push_back(diagnosis::TorquesOf(term, model_, declared_, run));
   Index at = 0;

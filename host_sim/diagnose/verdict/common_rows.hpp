@@ -24,17 +24,17 @@ class CommonRows {
  public:
   // Throws io::InputError where the runs do not fit the model.
   CommonRows(const codegen::Model& model, const std::vector<calibration::Dataset>& runs);
-  // declared: an estimate of the model, as far as its columns depend on one.
+  // declared: which coordinates count, each joint's noise, and the estimate that columns may depend on.
   CommonRows(const codegen::Model& model, const std::vector<calibration::Dataset>& runs, calibration::Fit declared);
   // covariance: of the term's eta, then amplitudes.
   Trace Of(const diagnosis::KnownTerm& term, const Eigen::MatrixXd& covariance) const;
-  // What of each torque [N x n] on one of the runs the declared model cannot take up. A joint on which a torque has no
-  // part keeps none.
-  std::vector<Eigen::MatrixXd> Beyond(const std::vector<Eigen::MatrixXd>& torques, std::size_t run) const;
+  // For rows over a single run: what of each torque [N x n] the declared model cannot take up. A joint on which a
+  // torque has no part keeps none.
+  std::vector<Eigen::MatrixXd> Beyond(const std::vector<Eigen::MatrixXd>& torques) const;
 
  private:
-  std::vector<Eigen::MatrixXd> Rows(const calibration::Dataset& run) const;
-  Eigen::Index rows() const;
+  std::vector<Eigen::MatrixXd> DeclaredRows(const calibration::Dataset& run) const;
+  Eigen::Index AllRows() const;
   Eigen::MatrixXd TakenUp(const Eigen::MatrixXd& torque) const;
   Eigen::MatrixXd Left(Eigen::MatrixXd torque) const;
 

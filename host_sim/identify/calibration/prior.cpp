@@ -11,7 +11,7 @@ namespace armcal::calibration {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-VectorXd BodyMean(const codegen::Model& model) { return codegen::MakeBodyPrior(model.robot()).mean; }
+VectorXd BodyMean(const codegen::Model& model) { return model.body_prior().mean; }
 
 std::vector<double> MeanUnknowns(const codegen::Model& model) {
   std::vector<double> eta;
@@ -73,7 +73,7 @@ Prior MakePrior(const codegen::Model& model) {
   prior.covariance = MatrixXd::Zero(columns + n, columns + n);
   if (prior.informative) {
     const MatrixXd& B = model.base_map();
-    const codegen::BodyPrior bodies = codegen::MakeBodyPrior(model.robot());
+    const codegen::BodyPrior& bodies = model.body_prior();
     prior.mean.segment(model.front(), model.rigid()) = B * bodies.mean;
     prior.covariance.block(model.front(), model.front(), model.rigid(), model.rigid()) =
         B * bodies.covariance * B.transpose();
@@ -102,7 +102,7 @@ Prior MakePrior(const codegen::Model& model) {
 }
 
 VectorXd ReadOutBodies(const codegen::Model& model, const VectorXd& base) {
-  const codegen::BodyPrior prior = codegen::MakeBodyPrior(model.robot());
+  const codegen::BodyPrior& prior = model.body_prior();
   return prior.mean + codegen::ReadOut(prior, model.base_map()) * (base - model.base_map() * prior.mean);
 }
 

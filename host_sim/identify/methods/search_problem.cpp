@@ -173,11 +173,9 @@ SearchSpace::SearchSpace(const Problem& problem, const char* method) : model_(*p
   lower_ = Eigen::Map<const VectorXd>(lower.data(), static_cast<Eigen::Index>(lower.size()));
   upper_ = Eigen::Map<const VectorXd>(upper.data(), static_cast<Eigen::Index>(upper.size()));
   width_ = upper_ - lower_;
-  // ReadOutBodies is affine: its value at zero, and the rest column by column.
-  offset_ = ReadOutBodies(model_, VectorXd::Zero(model_.rigid()));
-  map_.resize(offset_.size(), model_.rigid());
-  for (int k = 0; k < model_.rigid(); ++k)
-    map_.col(k) = ReadOutBodies(model_, VectorXd::Unit(model_.rigid(), k)) - offset_;
+  const codegen::BodyPrior& prior = model_.body_prior();
+  map_ = codegen::ReadOut(prior, model_.base_map());
+  offset_ = prior.mean - map_ * (model_.base_map() * prior.mean);
   if (!model_.robot().has_prior) return;
   const VectorXd bodies = Bodies(start_);
   for (int j = 0; j < model_.joints(); ++j)

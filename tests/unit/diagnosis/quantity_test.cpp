@@ -98,7 +98,7 @@ class EveryQuantity : public testing::Test {
     q[joint] += further_rad, qd[joint] += faster_radps;
     return KdlArm(arm_.model().robot(), arm_.bodies()).Torque(q, qd, At(data_.s.qdd, sample));
   }
-  double Rotor(int joint) const {  // tests/unit/codegen/robot_prior_test.cpp judges what base parameters say of it
+  double Rotor(int joint) const {  // robot_prior_test.cpp judges what base parameters say of it
     const codegen::RotorInertia& rotor = arm_.model().rotors()[static_cast<std::size_t>(joint)];
     return rotor.rest + rotor.share.dot(arm_.model().base_map() * arm_.bodies());
   }

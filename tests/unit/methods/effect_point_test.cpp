@@ -34,8 +34,7 @@ TEST(EffectPoint, FrictionThatGrowsWithTheLoad_ReadsTheBodiesAsKdlHasThem) {
     point.Set(0, at.q, at.qd, at.qdd, {}, z);
     const VectorXd torque = point.Torque(), rigid = kdl.Torque(at.q, at.qd, at.qdd);
     for (int j = 0; j < 2; ++j) {
-      // The rotor is no load of the gear; tests/unit/codegen/robot_prior_test.cpp judges what base parameters say of
-      // it.
+      // The rotor is no load of the gear. robot_prior_test.cpp judges what base parameters say of it.
       const codegen::RotorInertia& inertia = model.rotors()[static_cast<std::size_t>(j)];
       const double rotor = (inertia.rest + inertia.share.dot(model.base_map() * arm.bodies())) * at.qdd[j];
       const double sign = at.qd[j] > 0 ? 1 : -1, load = mu[j] * std::abs(rigid[j] - rotor) * sign;

@@ -84,6 +84,23 @@ TEST_F(SplitTerms, AreComparedBesideWhatTheDeclaredModelTakesUp) {
   EXPECT_NEAR(ripple.rms_Nm[kJoint], std::sqrt(0.5), 0.05);
 }
 
+// A curve with a large constant part is a ripple with Coulomb friction that the declared model has: the ripple is left.
+TEST_F(SplitTerms, OfOneRun_LeaveWhatTheDeclaredModelCannotGive) {
+  const std::vector<Dataset> one{runs()[1]};
+  const Dataset& run = one[0];
+  Eigen::MatrixXd curve = Eigen::MatrixXd::Zero(run.samples(), 2), ripple = curve;
+  for (int k = 0; k < run.samples(); ++k) {
+    ripple(k, kJoint) = std::cos(30 * run.s.q(k, kJoint));
+    curve(k, kJoint) = ripple(k, kJoint) + (run.s.qd(k, kJoint) > 0 ? 5 : -5);
+  }
+  const std::vector<Eigen::MatrixXd> left = CommonRows(arm().model(), one).Beyond({curve, ripple});
+  ASSERT_EQ(left.size(), 2u);
+  const auto rms = [&](int t) { return calibration::Rms(run, left[static_cast<std::size_t>(t)], true); };
+  EXPECT_NEAR(rms(0)[kJoint], std::sqrt(0.5), 0.1);  // of 5 N m; the prior holds friction back a little
+  EXPECT_NEAR(rms(1)[kJoint], std::sqrt(0.5), 0.05);
+  EXPECT_TRUE(left[0].col(1 - kJoint).isZero(0));
+}
+
 TEST_F(SplitTerms, WhoseDifferenceIsUncertain_AreNotCalledOfAnotherForm) {
   const Agreed agreed = Compare({{"a", Verdict("load_friction", 2, {kJoint}, {}, {0.06}, 0.04)},
                                  {"b", Verdict("load_friction", 2, {kJoint}, {}, {0.01}, 0.04)}});

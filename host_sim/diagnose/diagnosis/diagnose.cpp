@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numbers>
 
 #include "host_sim/diagnose/diagnosis/determined.hpp"
+#include "host_sim/diagnose/diagnosis/gain_on_log.hpp"
 #include "host_sim/diagnose/diagnosis/limits.hpp"
 #include "host_sim/diagnose/diagnosis/run_state.hpp"
 #include "host_sim/diagnose/diagnosis/selector.hpp"
@@ -107,6 +107,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
     w.narrow = std::make_unique<Work>(model, codegen::Catalogue{}, std::move(narrow));
     w.narrow->all_reads = w.all_reads;
   }
+  w.WeighKnocks(true);
   Selector select(w);
   // What friction does near turns and at rest is larger there than most of what else is missing, so it comes first.
   if (at_turns != AtTurns::kNever) w.chosen = select.FirstAtTurns(at_turns == AtTurns::kWhereAveraged);
@@ -136,6 +137,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   }
   std::stable_sort(w.chosen.begin(), w.chosen.end(),
                    [](const Chosen& a, const Chosen& b) { return a.found.score > b.found.score; });
+  w.WeighKnocks(false);
   w.Polish();
   finding_.declared = w.declared;
   LeaveOutUndetermined(w, finding_);
@@ -153,8 +155,8 @@ Diagnosis::~Diagnosis() = default;
 namespace {
 
 constexpr double kWorse = 1.005;        // what gets worse by more refutes a term
+constexpr double kOfAllGains = 0.2;     // of what a term's joints gain: one of them may lose that much
 constexpr double kOfThePromise = 0.15;  // of the gain that training promises: what gains less is not on this log
-constexpr double kKnock = 4;            // deviations: what is larger is no noise
 constexpr double kShows = 25;           // a gain that a term without any freedom never has by chance
 
 bool IsOfTheRun(const Chosen& c) { return c.candidate->record().effect_class == codegen::EffectClass::kRunState; }
@@ -236,12 +238,14 @@ Errors ErrorsOf(const Diagnosis::Work& w, const calibration::Dataset& log, const
   return out;
 }
 
-// Compares the errors with a term to those without it. One of its own joints can refute it, or all joints together.
+// Compares the errors with a term to those without it. One of its own joints can refute it, or all joints together. A
+// term that acts on many joints may be a little wrong on one of them where it explains much of the others.
 std::optional<Refutation> Worse(const Chosen& term, const VectorXd& with, const VectorXd& without) {
   const VectorXd change = (with.array().max(1e-12) / without.array().max(1e-12)).log();
   const auto& own = term.candidate->rows();
   const auto worst = std::max_element(own.begin(), own.end(), [&](int a, int b) { return change[a] < change[b]; });
-  if (worst != own.end() && change[*worst] > std::log(kWorse))
+  const double gained = -change(own).cwiseMin(0).sum();
+  if (worst != own.end() && change[*worst] > std::log(kWorse) && change[*worst] > kOfAllGains * gained)
     return Refutation{*worst, false, std::exp(change[*worst]), with, without};
   // All joints together: the base fit moves with every term, so a term may help one joint and harm another.
   if (change.sum() > std::log(kWorse)) return Refutation{-1, false, std::exp(change.sum()), with, without};
@@ -273,36 +277,6 @@ Share ShareOf(const Diagnosis::Work& w, const Chosen& c, const VectorXd& amplitu
     }
   }
   return out;
-}
-
-// 1.48 times the median of |e|: the standard deviation of normal noise, whatever a few large values are.
-double RobustDeviation(const VectorXd& e) {
-  const VectorXd size = e.cwiseAbs();
-  return 1.4826 * Median({size.begin(), size.end()});
-}
-
-// How much more likely a log is with a term than without it, twice the logarithm, over the term's joints. The largest
-// of four figures: with white noise, and with noise of the colour of what is left; with all of the residuals, and with
-// residuals cut at four deviations. What the base model does not predict of another motion is slow, and whitening takes
-// slow terms for it. A few knocks on the log would hide what the term gains in all other rows.
-double GainOn(const calibration::Dataset& log, const Candidate& candidate, const MatrixXd& without,
-              const MatrixXd& with) {
-  std::array<double, 4> sum{};
-  for (const int j : candidate.rows()) {
-    const RowIndex rows = UsedRows({&log}, j);
-    VectorXd before(rows.size()), after(rows.size());
-    rows.Take(0, without.col(j), before), rows.Take(0, with.col(j), after);
-    const double most = kKnock * RobustDeviation(before);
-    const auto add = [&](std::size_t at, const VectorXd& of, const VectorXd& to) {
-      const auto gain = [&](double a, double b) { return b > 0 ? rows.size() * std::log(a / b) : 0; };
-      const NoiseModel noise = FitNoise(rows, to);
-      sum[at] += gain(of.squaredNorm(), to.squaredNorm());
-      sum[at + 1] += gain(Whiten(noise, rows, of).squaredNorm(), Whiten(noise, rows, to).squaredNorm());
-    };
-    add(0, before, after);
-    add(2, before.cwiseMax(-most).cwiseMin(most), after.cwiseMax(-most).cwiseMin(most));
-  }
-  return *std::max_element(sum.begin(), sum.end());
 }
 
 // Of the terms that predict one of their joints, or all joints together, worse than the declared model does, the one
@@ -354,12 +328,14 @@ Chosen* Refuted(Diagnosis::Work& w, const calibration::Dataset& log, const calib
       return &*c;
     }
     if (IsOfTheRun(*c)) continue;
-    const double gained = GainOn(seen, *c->candidate, without, after);
+    double gained = GainOn(seen, *c->candidate, without, after);
     if (gained >= kShows) continue;
     const Share trained = ShareOf(w, *c, amplitude.at(&*c), w.train),
                 shown = ShareOf(w, *c, amplitude.at(&*c), {&seen});
     const double promised = c->found.rated * std::min(shown.square / trained.square, shown.rows / trained.rows);
-    if (gained < kOfThePromise * promised) {
+    const double least = kOfThePromise * promised;
+    if (gained < least && !payload.named) gained = std::max(gained, AddedBy(w, seen, *c, others));
+    if (gained < least) {
       c->unconfirmed =
           fmt::format("the held-out log gains {:.0f} by it, where {:.0f} was to be expected from the training logs",
                       gained, promised);

@@ -18,7 +18,8 @@ namespace armcal::diagnosis {
 struct Evidence {
   const codegen::Model* model = nullptr;
   std::vector<Quantities> logs;
-  std::vector<RowIndex> index;  // [n] used rows over all logs
+  std::vector<RowIndex> index;               // [n] used rows over all logs
+  std::vector<Eigen::VectorXd> steady = {};  // [n] of each row: 1 where the sign of friction hardly changes, else 0
 };
 
 // The candidate's columns at eta over the used rows of its joints.

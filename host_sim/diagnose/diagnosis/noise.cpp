@@ -74,6 +74,11 @@ double Median(std::vector<double> x) {
   return *middle;
 }
 
+double UsualDeviation(const VectorXd& e) {
+  const VectorXd size = e.cwiseAbs();
+  return 1.4826 * Median({size.begin(), size.end()});
+}
+
 bool IsWhite(const NoiseModel& noise) { return noise.order() == 0; }
 
 double SlowNoise(const NoiseModel& noise) { return noise.innovation / (1 - noise.a.sum()); }

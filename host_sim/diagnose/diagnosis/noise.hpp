@@ -39,6 +39,9 @@ struct NoiseModel {
 // The upper one of the two in the middle, if their number is even; 0 of none.
 double Median(std::vector<double> x);
 
+// 1.48 times the median of |e|: the standard deviation of normal noise, whatever a few large values are.
+double UsualDeviation(const Eigen::VectorXd& e);
+
 bool IsWhite(const NoiseModel& noise);
 
 // The deviation of white noise that would be as large as this one for what is slow.

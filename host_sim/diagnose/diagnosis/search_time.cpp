@@ -92,7 +92,7 @@ void Searcher::Onset() {
 }
 
 // Isolated windows one after the other, each where a half sine, the shape of these records, fits best what the ones
-// before have left.
+// before have left. Where the sign of friction changes, an error of the derived speed looks like an event.
 void Searcher::Windows() {
   if (e_.logs.size() != 1) return;
   const auto& time = e_.logs[0].data->s.t;
@@ -122,12 +122,15 @@ void Searcher::Windows() {
     for (std::size_t r = 0; r < rows.size(); ++r) {
       const int j = joints[r];
       const RowIndex& index = e_.index[j];
+      const VectorXd& steady = e_.steady[j];
       const VectorXd residual =
           (found.empty() ? g_.metric.RawResidual(j) : g_.metric.ResidualWith(GatherColumns(c_, e_, found), j)) /
           g_.metric.noise()[j].innovation;
       rows[r].left = rows[r].used = VectorXd::Zero(samples);
       for (int i = 0; i < index.size(); ++i)
-        rows[r].left[index.sample[i]] = std::clamp(residual[i], -kOutlier, kOutlier), rows[r].used[index.sample[i]] = 1;
+        if (steady[i] > 0)
+          rows[r].left[index.sample[i]] = std::clamp(residual[i], -kOutlier, kOutlier),
+          rows[r].used[index.sample[i]] = 1;
     }
     double tried = 0;
     const Window best = Strongest(shapes, rows, time, tried);

@@ -31,6 +31,8 @@ constexpr double kOnce = 0.8;              // of a trace in one fold: the others
 constexpr double kIndistinguishable = 25;  // chi^2 left at most when one kind imitates another
 constexpr double kImitated = 0.1;          // and of the trace's own
 constexpr double kNear = 0.05;             // of a score: the logs do not tell which of two it is
+constexpr double kOddsOf20 = 6;            // of a score: twice the logarithm
+constexpr double kSameTorque = 0.5;        // of a term's trace: what explains less is another effect
 constexpr double kStays = 0.5;             // of the gain, at a lower bandwidth
 constexpr double kLogSurely = -11.5;       // of a chance, for what imitates much else or loses more than that
 constexpr double kAsLarge = 0.5;           // of what it would gain there if it was as large as it seemed
@@ -39,6 +41,7 @@ constexpr int kSharpenings = 3;
 constexpr double kNothing = 6;            // a gain that chance often has
 constexpr double kCauseExplains = 0.9;    // of what a curve explains: forms differ a little from any record
 constexpr double kSimplerExplains = 0.5;  // of what a surface explains
+constexpr double kMemoryGains = 16;       // chi^2 of one parameter that chance has once in 10^4
 constexpr int kFewTurns = 100;            // rows
 constexpr double kTurnShare = 0.03;       // of a joint's rows
 constexpr std::size_t kOtherNames = 2;    // a verdict with more than three names says nothing
@@ -73,6 +76,17 @@ bool IsFiltered(const calibration::Dataset& log) {
 bool IsRare(const Found& f, const calibration::Dataset& log) {
   const bool is_sensor = f.candidate->record().effect_class == codegen::EffectClass::kSensor;
   return f.log_chance < (is_sensor || IsFiltered(log) ? kLogSurely : kLogRare) && f.score > 0;
+}
+
+// Of these rows alone: where one is left out a segment ends.
+RowIndex Segments(const RowIndex& all, const std::vector<int>& kept) {
+  RowIndex out;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const auto k = static_cast<std::size_t>(kept[i]);
+    out.dataset.push_back(all.dataset[k]), out.sample.push_back(all.sample[k]);
+    out.segment_begin.push_back(all.segment_begin[k] || i == 0 || kept[i - 1] + 1 != kept[i]);
+  }
+  return out;
 }
 
 }  // namespace
@@ -459,6 +473,40 @@ bool Selector::ShowsInSliding(const Found& f, const Columns& columns, const std:
   return LogChance(f, Metric(rows, white).Try(c).gain) < kLogRare;
 }
 
+// Where friction changes its sign, an error of the derived speed is a large error of torque. An event has few rows, and
+// one such error may be all that it fits. If the torque passed a filter, the error is in all turns alike. Presliding
+// and play are about these rows.
+bool Selector::ShowsWhereSignIsSteady(const Found& f, const Columns& columns,
+                                      const std::vector<NoiseModel>& noise) const {
+  const bool filtered =
+      IsFiltered(*w_.train[0]) && !f.candidate->has_memory() && !f.candidate->record().search.at_turns;
+  if (!f.candidate->is_event() && !filtered) return true;
+  Columns c = columns;
+  BaseRows rows = w_.rows;
+  for (std::size_t r = 0; r < c.joints.size(); ++r) {
+    const auto j = static_cast<std::size_t>(c.joints[r]);
+    std::vector<int> kept;
+    for (int k = 0; k < rows.index[j].size(); ++k)
+      if (w_.evidence.steady[j][k] > 0) kept.push_back(k);
+    rows.index[j] = Segments(rows.index[j], kept);
+    rows.design[j] = MatrixXd(rows.design[j](kept, Eigen::all));
+    rows.target[j] = VectorXd(rows.target[j](kept));
+    rows.Multiply(c.joints[r]);
+    c.block[r] = MatrixXd(c.block[r](kept, Eigen::all));
+  }
+  return LogChance(f, Metric(rows, noise).Try(c).gain) < kLogRare;
+}
+
+// Without its memory such a record takes a little off the sign of friction, or adds to it: that is another form of the
+// declared law. The first unknown of a record with memory is the memory's length. A hysteresis has many lengths.
+bool Selector::ShowsMemory(const Found& f, const Gain& gain, const Metric& metric) const {
+  const codegen::EffectRecord& record = f.candidate->record();
+  if (record.state.empty() || record.search.at_turns || f.eta.empty()) return true;
+  std::vector<double> shortest = f.eta;
+  shortest[0] = f.candidate->unknowns()[0].lower;
+  return gain.gain - metric.Try(GatherColumns(*f.candidate, w_.evidence, shortest)).gain > kMemoryGains;
+}
+
 bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
                       std::size_t k, Chosen& out) {
   const Found& f = ranked[k];
@@ -494,8 +542,16 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     refused_[f.candidate] = "it shows near turns and at rest only";
     return false;
   }
+  if (!ShowsWhereSignIsSteady(f, c, noise)) {
+    refused_[f.candidate] = "it shows only where friction changes its sign";
+    return false;
+  }
   if (!ShowsBesideChannel(f, c, metric)) {
     refused_[f.candidate] = "a torque channel that is a little later or earlier explains it";
+    return false;
+  }
+  if (!ShowsMemory(f, gain, metric)) {
+    refused_[f.candidate] = "with hardly any memory it gains as much";
     return false;
   }
   bool on_bound = false;
@@ -531,7 +587,8 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
       refused_[f.candidate] = fmt::format("ends on a bound, and there {} is the same", kind);
       return false;
     }
-    const bool near = std::abs(ranked[other].score - f.score) < kNear * f.score;
+    const bool near =
+        std::abs(ranked[other].score - f.score) < std::max(kNear * f.score, kOddsOf20) && taken > kSameTorque * own;
     if ((!same && !near) || out.also_fits.size() >= kOtherNames) continue;
     out.also_fits.push_back(kind);
     if (!runner_up) out.rivals.push_back(rival);

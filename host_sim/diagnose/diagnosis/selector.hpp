@@ -43,6 +43,8 @@ class Selector {
   bool IsOfTheMotion(const Found& f, const Metric& wide) const;
   bool ShowsBesideChannel(const Found& f, const Columns& columns, const Metric& metric) const;
   bool ShowsInSliding(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const;
+  bool ShowsWhereSignIsSteady(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const;
+  bool ShowsMemory(const Found& f, const Gain& gain, const Metric& metric) const;
   bool Accept(const Grounds& grounds, const std::vector<const Chosen*>& terms, const std::vector<Found>& ranked,
               std::size_t k, Chosen& out);
 

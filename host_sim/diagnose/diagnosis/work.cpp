@@ -10,6 +10,7 @@
 #include "codegen/src/generator/state_path.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/diagnose/diagnosis/noise.hpp"
+#include "host_sim/diagnose/diagnosis/row_trust.hpp"
 #include "host_sim/identify/calibration/band.hpp"
 #include "host_sim/identify/calibration/channel.hpp"
 #include "host_sim/identify/calibration/dataset.hpp"
@@ -148,11 +149,33 @@ RowIndex UsedRows(const std::vector<const calibration::Dataset*>& logs, int join
   return index;
 }
 
+void Diagnosis::Work::WeighKnocks(bool weigh) {
+  knocks = weigh;
+  if (narrow) narrow->WeighKnocks(weigh);
+  regressor.clear();
+  IndexRows();
+}
+
 void Diagnosis::Work::IndexRows() {
-  evidence.index.clear();
+  evidence.index.clear(), evidence.steady.clear();
   gathered.clear();
   kept_columns.Clear();
-  for (int j = 0; j < model.joints(); ++j) evidence.index.push_back(UsedRows(train, j));
+  std::vector<MatrixXd> left;
+  for (const auto* log : train)
+    if (knocks) left.push_back(log->tau - calibration::Predict(model, *log, declared.x, declared.eta));
+  for (int j = 0; j < model.joints(); ++j) {
+    evidence.index.push_back(UsedRows(train, j));
+    VectorXd steady(evidence.index.back().size());
+    for (std::size_t log = 0; log < train.size(); ++log)
+      evidence.index.back().Take(static_cast<int>(log), SteadyFriction(model, *train[log], j), steady);
+    evidence.steady.push_back((steady.array() > 0.5).cast<double>());
+    // What is left of averages, near turns and at rest is the model's error.
+    if (!knocks || evidence.index.back().averaged() || turns[static_cast<std::size_t>(j)]) continue;
+    VectorXd e(evidence.index.back().size());
+    for (std::size_t log = 0; log < left.size(); ++log)
+      evidence.index.back().Take(static_cast<int>(log), left[log].col(j), e);
+    evidence.index.back().weight = KnockWeights(evidence.index.back(), e);
+  }
   WeighRows();
 }
 
@@ -256,7 +279,11 @@ void Diagnosis::Work::Solve(const std::vector<const Chosen*>& terms) {
           e.size() ? std::max(1e-12, std::sqrt(e.squaredNorm() / static_cast<double>(e.size()))) : declared.sigma[j];
       out.innovation[j] = FitNoise(rows.index[j], e).innovation;
     }
-    if (terms.empty()) out.x = declared.x, out.sigma = declared.sigma;  // `before` and `after` are then the same fit
+    if (terms.empty()) {  // `before` and `after` are then the same fit
+      out.x = declared.x;
+      for (int j = 0; j < n; ++j)
+        if (turns[static_cast<std::size_t>(j)] || rows.index[j].weight.size() == 0) out.sigma[j] = declared.sigma[j];
+    }
     const bool settled = (out.sigma - estimate.sigma).cwiseQuotient(out.sigma).cwiseAbs().maxCoeff() < kSettled;
     estimate = out;
     if (settled) break;

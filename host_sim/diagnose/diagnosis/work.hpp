@@ -79,6 +79,8 @@ struct Diagnosis::Work {
   void ShowTurns(const std::vector<char>& joints);
   // Weighs the rows near turns and at rest by what these terms leave there.
   void WeighTurns(const std::vector<const Chosen*>& terms);
+  // From now on, gives rows with knocks less weight, where the noise has heavy tails: for the search.
+  void WeighKnocks(bool weigh);
   void MakeTrain();
   void WeighRows();
   void IndexRows();
@@ -97,6 +99,7 @@ struct Diagnosis::Work {
   std::vector<calibration::Dataset> changed;        // train points here once a delay or turns have been applied
   double delay_s = 0;                               // applied
   std::vector<char> turns;                          // [joint] 1: rows near turns and at rest are fitted, too
+  bool knocks = false;                              // rows are weighed by their knocks
   Eigen::VectorXd turn_weight;                      // [joint] of these rows
   std::vector<Eigen::VectorXd> sliding;             // [joint] share of each row's samples that are not such rows
   calibration::Prior prior;

@@ -24,7 +24,7 @@ VectorXd OverError(const DiagnosisView& v, std::size_t term) {
       .cwiseQuotient(calibration::Rms(*v.test, v.held_out->after, true).cwiseMax(1e-300));
 }
 
-// "on joint 5, over the motion of joint 1". torque: [n] RMS of the term.
+// "joint 5, over the motion of joint 1", or "joint 3, with torque on joints 2 and 4, too". torque: [n] RMS of the term.
 std::string Where(const Term& t, const VectorXd& torque) {
   std::vector<int> on, over;
   for (int j = 0; j < torque.size(); ++j)
@@ -33,6 +33,11 @@ std::string Where(const Term& t, const VectorXd& torque) {
   if (on.empty()) return "joint " + JointName(t);
   for (const int j : t.joints)
     if (std::find(on.begin(), on.end(), j) == on.end()) over.push_back(j);
+  if (t.joints.size() == 1 && over.empty() && on.size() > 1) {
+    std::erase(on, t.joints[0]);
+    return fmt::format("joint {}, with torque on joint{} {}, too", JointName(t), on.size() > 1 ? "s" : "",
+                       JointGroup(on));
+  }
   std::string out = (on.size() > 1 ? "joints " : "joint ") + JointGroup(on);
   if (!over.empty()) out += ", over the motion of joint " + JointGroup(over);
   return out;

@@ -1,6 +1,9 @@
 // diagnosis tests - check the second bandwidth: what the derivation of the motion leaves is no effect.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <random>
 
 #include "host_sim/diagnose/diagnosis/diagnose.hpp"
@@ -71,6 +74,50 @@ TEST(TorqueChannel, ThatIsALittleWrong_IsNoFrictionAtTurns) {
   EXPECT_EQ(logs.Said(log, {}), "");
   for (calibration::JointChannel& c : log.channel) c.late_s -= 0.002;
   EXPECT_EQ(logs.Said(log, {}), "");
+}
+
+// The joint turns, and its derived speed changes sign a little too early: until the true turn, friction has the other
+// sign. As large a torque in the middle of a sweep is a contact.
+TEST(Turn, ThatIsDerivedALittleEarly_IsNoContact) {
+  const Logs logs;
+  constexpr int kJoint = 1, kLate = 18, kSweep = 60, kMiddle = 40;
+  constexpr double kSize_Nm = 1.5;
+  const Dataset truth = Logs::AnotherRun(40);
+  const auto slides_on = [&](int k) {
+    return (truth.s.qd.col(kJoint).segment(k + 1, kSweep).array() * truth.s.qd(k + 1, kJoint) > 0).all();
+  };
+  int turn = truth.samples() / 2;
+  while (truth.s.qd(turn, kJoint) * truth.s.qd(turn + 1, kJoint) > 0 || !slides_on(turn)) ++turn;
+  for (const bool at_turn : {true, false}) {
+    Dataset log = truth;
+    log.cutoff_Hz.setConstant(log.joints(), 3);
+    for (int late = 1; late < kLate; ++late)
+      log.tau(turn + (at_turn ? 0 : kMiddle) + late, kJoint) -= kSize_Nm * std::sin(std::numbers::pi * late / kLate);
+    EXPECT_EQ(logs.Said(log, {}), at_turn ? "" : "external_contact ") << at_turn;
+  }
+}
+
+// Friction that changes its sign faster than the declared law has no length: it is no presliding, even if nothing else
+// may be named. A spring that slips has one.
+TEST(Presliding, HasALength) {
+  codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
+  robot.sign_law = "tanh", robot.sign_width_radps = 0.1;
+  tests::SyntheticArm arm(robot, 9);  // its friction has the sign of speed
+  const codegen::Catalogue only{{"presliding_dahl", tests::Records().at("presliding_dahl")}};
+  constexpr double kLevel_Nm = 3, kLength_rad = 0.02;
+  for (const bool spring : {false, true}) {
+    double force = 0, before = 0;
+    const Dataset log = arm.Run(40, 92, [&](const tests::State& s) {
+      if (s.joint != 1 || !spring) return 0.0;
+      force = std::clamp(force + kLevel_Nm * (s.q - before) / kLength_rad, -kLevel_Nm, kLevel_Nm);
+      before = s.q;
+      return force;
+    });
+    const Diagnosis diagnosis(arm.model(), only, {&log});
+    std::vector<int> named;
+    for (const Term& t : diagnosis.finding().terms) named.push_back(t.joints[0]);
+    EXPECT_EQ(named, spring ? std::vector<int>{1} : std::vector<int>{});
+  }
 }
 
 }  // namespace

@@ -238,5 +238,39 @@ TEST(HeldOutLog, RefutesATermThatHelpsItsJoint_AndHarmsAllTogether) {
   EXPECT_NEAR(why.factor, why.with.prod() / why.without.prod(), 1e-9 * why.factor);
 }
 
+// A term whose torque is on both joints. Of the other joint's torque a third is there on the held-out
+// log: there the term makes the error a little larger, and on its own joint far smaller. If none of it is there, the
+// other joint refutes the term.
+TEST(HeldOutLog, RefutesATermOfManyJoints_OnlyWhereItLosesMuchOnOne) {
+  constexpr int kOther = 0;
+  codegen::EffectRecord record = tests::Records().at("viscous_cubic");
+  record.linear[0].rows = {{"all", record.linear[0].rows.at("j")}};
+  const codegen::Catalogue only{{record.name, record}};
+  tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 8);
+  const auto cubic = [&](Dataset d, double on_other) {
+    constexpr double kCubic = 0.1;
+    const Eigen::ArrayXd torque = kCubic * d.s.qd.col(kChangedJoint).array().cube();
+    d.tau.col(kChangedJoint).array() += torque, d.tau.col(kOther).array() += on_other * torque;
+    return d;
+  };
+  const Dataset train = cubic(arm.Run(20, 80), 1), plain = arm.Run(20, 81);
+  for (const double share : {1.0, 0.35, 0.0}) {
+    Diagnosis diagnosis(arm.model(), only, {&train});
+    ASSERT_EQ(diagnosis.finding().terms.size(), 1u);
+    const Dataset test = cubic(plain, share);
+    const HeldOut held_out = diagnosis.Judge(test);
+    const Term& t = diagnosis.finding().terms[0];
+    EXPECT_EQ(t.confirmed, share > 0) << share;
+    const double change =
+        calibration::Rms(test, held_out.after, true)[kOther] / calibration::Rms(test, held_out.before, true)[kOther];
+    if (share == 0.35) {
+      EXPECT_GT(change, 1.005);
+    }
+    if (share > 0) continue;
+    ASSERT_TRUE(t.refuted);
+    EXPECT_EQ(t.refuted->joint, kOther);
+  }
+}
+
 }  // namespace
 }  // namespace armcal::diagnosis

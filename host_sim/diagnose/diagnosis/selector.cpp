@@ -355,14 +355,18 @@ void Selector::Sort(std::vector<Found>& ranked) {
   // A surface has so many coefficients that it fits a part of much else.
   const bool is_surface = curve.candidate->is_surface();
   const double enough = is_surface ? kSimplerExplains : kCauseExplains;
+  const auto explains = [&](const Found& f) { return f.gain.gain > enough * curve.gain.gain; };
   const auto simpler = std::find_if(ranked.begin(), ranked.end(), [&](const Found& f) {
     const bool is_simpler = is_surface ? !f.candidate->is_surface() : !f.candidate->is_curve();
     return is_simpler && f.candidate->rows() == curve.candidate->rows() && f.log_chance < kLogRare &&
-           f.gain.gain > enough * curve.gain.gain;
+           (explains(f) || f.score > curve.score - kOddsOf20);
   });
   if (simpler == ranked.end()) return;
-  refused_[curve.candidate] = fmt::format("it names no cause, and a {} explains over {:.0f} % of what it explains",
-                                          simpler->candidate->is_curve() ? "curve" : "cause", 100 * enough);
+  const char* what = simpler->candidate->is_curve() ? "curve" : "cause";
+  refused_[curve.candidate] =
+      explains(*simpler)
+          ? fmt::format("it names no cause, and a {} explains over {:.0f} % of what it explains", what, 100 * enough)
+          : fmt::format("it names no cause, and the logs do not tell it from a {}", what);
   std::rotate(ranked.begin(), simpler, simpler + 1);
 }
 
@@ -587,8 +591,8 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
       refused_[f.candidate] = fmt::format("ends on a bound, and there {} is the same", kind);
       return false;
     }
-    const bool near =
-        std::abs(ranked[other].score - f.score) < std::max(kNear * f.score, kOddsOf20) && taken > kSameTorque * own;
+    const bool near = std::abs(ranked[other].score - f.score) < std::max(kNear * f.score, kOddsOf20) &&
+                      (f.candidate->is_curve() || taken > kSameTorque * own);  // a curve's own trace holds noise
     if ((!same && !near) || out.also_fits.size() >= kOtherNames) continue;
     out.also_fits.push_back(kind);
     if (!runner_up) out.rivals.push_back(rival);

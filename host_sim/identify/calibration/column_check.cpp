@@ -36,7 +36,7 @@ constexpr double kNothing = 0.95;  // of the spread left: the model explains not
 constexpr double kWhite = 0.75;    // mean square of steps over twice the variance; noise has 1
 constexpr double kOverNoise = 3;   // times the declared noise: a spread that is more than noise
 constexpr double kSure = 9;        // standard deviations of independent rows; rows are not independent
-constexpr double kFedShare = 0.1;  // of the torque's spread
+constexpr double kFedShare = 0.1;  // of the torque's spread; less than that, but more than the fit leaves, is suspect
 // A joint at rest: RMS of its torque that the pose does not explain, of the torque limit and of the torque's spread.
 // Stiction of measured arms leaves 2 % of the limit; joints that move behind a stuck encoder leave 7 % and more.
 constexpr double kRounding = 1e-9;  // rad (m): what the filter makes of a constant
@@ -216,7 +216,10 @@ class Examiner {
   // 95 % of the rows do not pass.
   struct Drag {
     double mean = 0, sd = 0, high = 0;
-    bool feeds(double spread) const { return high < 0 && -mean > kSure * sd && -mean > kFedShare * spread; }
+    bool is_large(double spread) const { return -mean > kFedShare * spread; }
+    bool feeds(double spread, double left) const {
+      return high < 0 && -mean > kSure * sd && (is_large(spread) || -mean > left);
+    }
   };
   Drag DragOf(int j, const ColumnFit::Motion& motion, const ColumnFitResult& result) const {
     const auto at = static_cast<std::size_t>(j);
@@ -247,7 +250,7 @@ class Examiner {
   // tried first.
   std::string FedEnergy(int j) const {
     const Drag drag = DragOf(j, motion_, result_);
-    if (!drag.feeds(result_.spread[j])) return "";
+    if (!drag.feeds(result_.spread[j], result_.left[j])) return "";
     for (int i = 0; i < model_.joints(); ++i) {
       if (i == j || MovingShare(i) < 0.1) continue;
       const auto& speed = fit_.signals().qd.col(i);
@@ -256,7 +259,8 @@ class Examiner {
       ColumnFit::Motion coupled = motion_;
       coupled.Add(j, other);
       const ColumnFitResult result = fit_.Fit(coupled, given_);
-      if (DragOf(j, coupled, result).feeds(result.spread[j]) || result_.log_left - result.log_left < kClearGain / 4)
+      if (DragOf(j, coupled, result).feeds(result.spread[j], result.left[j]) ||
+          result_.log_left - result.log_left < kClearGain / 4)
         continue;
       return fmt::format("joint {}: its friction follows the speed of joint {}: are their motors coupled?", j + 1,
                          i + 1);
@@ -268,7 +272,7 @@ class Examiner {
         "friction of {:.3g} {} would drive the joint at every speed, where it must brake it; is the sign of "
         "tau{} or q{} right?",
         drag.mean, TorqueUnit(model_.robot().joint[j]), j + 1, j + 1);
-    if (gain > kClearGain) Fail(j, what);
+    if (gain > kClearGain && drag.is_large(result_.spread[j])) Fail(j, what);
     return fmt::format("joint {}: suspect: {}", j + 1, what);
   }
 

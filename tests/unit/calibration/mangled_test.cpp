@@ -138,6 +138,28 @@ TEST(Mangled, RestingJoints_AreNone) {
   }
 }
 
+// The drive takes off more friction than there is. What is left drives the joint, by a twentieth of its torque's
+// spread.
+TEST(Mangled, FrictionThatDrivesAJointALittle_IsSuspect) {
+  tests::SyntheticArm arm(tests::Er20(), 4);
+  const codegen::Model free(WithoutLinkData(tests::Er20()), tests::Records());
+  constexpr int kJoint = 1;
+  constexpr double kShare = 0.05;
+  const Dataset well = arm.Run(15, 7);
+  const Eigen::VectorXd torque = well.tau.col(kJoint);
+  const double spread = std::sqrt((torque.array() - torque.mean()).square().mean());
+  const double level = arm.Friction("Fc", kJoint) + kShare * spread, viscous = arm.Friction("Fv", kJoint);
+  const Dataset fed = arm.Run(15, 7, [=](const tests::State& s) {
+    return s.joint == kJoint ? -std::copysign(level, s.qd) - viscous * s.qd : 0;
+  });
+  for (const codegen::Model* model : {&free, &arm.model()}) {
+    const Said said = Judge(*model, {LogOf(fed)});
+    EXPECT_EQ(said.refused, "");
+    EXPECT_NE(said.notes.find("joint 2: suspect: friction of"), std::string::npos) << said.notes;
+    EXPECT_EQ(Judge(*model, {LogOf(well)}).notes.find("suspect"), std::string::npos);
+  }
+}
+
 // Runs of arms that are well, and yet unlike the usual one.
 struct Healthy {
   std::string name;

@@ -58,6 +58,13 @@ TEST(Sentence, SaysWhatWhereHowMuchAndWhatToDo) {
   EXPECT_TRUE(s.ends_with("put it in the model (--model-out).")) << s;
 }
 
+TEST(Sentence, OfATermThatReachesOtherJoints_NamesItsOwnFirst) {
+  Diagnosed d(81);
+  d.view.term_torque[0].col(0) = 0.1 * d.view.term_torque[0].col(1);
+  const std::string s = Sentence(d.view, 0);
+  EXPECT_TRUE(s.starts_with("torque_ripple on joint 2, with torque on joint 1, too: 0.2")) << s;
+}
+
 // Three copies of the term that was found: one a tenth as large, one twice as large but not confirmed.
 TEST(Verdict, TheLargestConfirmedTermIsShownFirst) {
   const Diagnosed d(81);

@@ -103,10 +103,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
                      AtTurns at_turns)
     : model_(model), work_(std::make_unique<Work>(model, catalogue, std::move(train))) {
   Work& w = *work_;
-  if (!narrow.empty()) {
-    w.narrow = std::make_unique<Work>(model, codegen::Catalogue{}, std::move(narrow));
-    w.narrow->all_reads = w.all_reads;
-  }
+  if (!narrow.empty()) w.narrow = std::make_unique<Work>(w, std::move(narrow));
   w.WeighKnocks(true);
   Selector select(w);
   // What friction does near turns and at rest is larger there than most of what else is missing, so it comes first.

@@ -19,17 +19,11 @@ struct Gains {
   double white = 0, coloured = 0;
 };
 
-// The term's gain over the declared model and the other terms, all fitted to these logs. noise: of each joint; empty:
-// it becomes what the logs show.
-Gains FittedTo(const Diagnosis::Work& w, std::vector<const calibration::Dataset*> logs, const Chosen& term,
+// The term's gain over the declared model and the other terms, all fitted to the logs of `fit`. noise: of each joint;
+// empty: it becomes what these logs show.
+Gains FittedTo(Diagnosis::Work& fit, const Diagnosis::Work& w, const Chosen& term,
                const std::vector<const Chosen*>& others, std::vector<NoiseModel>& noise) {
-  Diagnosis::Work fit(w.model, codegen::Catalogue{}, std::move(logs));
-  fit.all_reads = w.all_reads;
-  fit.turns = w.turns, fit.turn_weight = w.turn_weight;
-  fit.IndexRows();
-  fit.estimate = w.estimate;
-  fit.FollowEstimate(w.Reads(others, term.candidate));
-  fit.Prepare(others);
+  fit.PrepareAsIn(w, others, *term.candidate);
   const Columns columns = GatherColumns(*term.candidate, fit.evidence, term.eta);
   const Metric white(fit.rows, w.WhiteNoise());
   if (noise.empty()) (void)white.RefittedDeviance(columns, &noise);
@@ -58,13 +52,14 @@ double GainOn(const calibration::Dataset& log, const Candidate& candidate, const
   return *std::max_element(sum.begin(), sum.end());
 }
 
-double AddedBy(const Diagnosis::Work& w, const calibration::Dataset& log, const Chosen& term,
+double AddedBy(Diagnosis::Work& w, const calibration::Dataset& log, const Chosen& term,
                const std::vector<const Chosen*>& others) {
   std::vector<NoiseModel> noise;
-  const Gains trained = FittedTo(w, w.train, term, others, noise);
-  std::vector<const calibration::Dataset*> both = w.train;
-  both.push_back(&log);
-  const Gains with_log = FittedTo(w, both, term, others, noise);
+  const Gains trained = FittedTo(w, w, term, others, noise);
+  std::vector<const calibration::Dataset*> logs = w.train;
+  logs.push_back(&log);
+  Diagnosis::Work both(w, logs);
+  const Gains with_log = FittedTo(both, w, term, others, noise);
   return std::max(with_log.white - trained.white, with_log.coloured - trained.coloured);
 }
 

@@ -16,7 +16,7 @@ double GainOn(const calibration::Dataset& log, const Candidate& candidate, const
 // What the log adds to the term's gain beside the others, if the declared model and all amplitudes are fitted to the
 // training logs and this one together. A model that is a little wrong of another motion may hide on it what a term
 // gains. The larger of two figures: with white noise, and with noise of the colour of what is left in training.
-double AddedBy(const Diagnosis::Work& w, const calibration::Dataset& log, const Chosen& term,
+double AddedBy(Diagnosis::Work& w, const calibration::Dataset& log, const Chosen& term,
                const std::vector<const Chosen*>& others);
 
 }  // namespace armcal::diagnosis

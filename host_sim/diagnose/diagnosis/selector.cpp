@@ -387,9 +387,7 @@ bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Cho
                                      const Metric& wide) {
   if (!w_.narrow) return true;
   Diagnosis::Work& narrow = *w_.narrow;
-  narrow.estimate = w_.estimate;
-  narrow.FollowEstimate(w_.Reads(terms, f.candidate));
-  narrow.Prepare(terms);
+  narrow.PrepareAsIn(w_, terms, *f.candidate);
   const Metric metric(narrow.rows, wide.noise());
   const Columns c = GatherColumns(*f.candidate, narrow.evidence, f.eta);
   const double left = metric.Try(c).gain;

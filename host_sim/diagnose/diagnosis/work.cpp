@@ -123,6 +123,21 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
   IndexRows();
 }
 
+Diagnosis::Work::Work(const Work& other, std::vector<const calibration::Dataset*> logs)
+    : Work(other.model, codegen::Catalogue{}, std::move(logs)) {
+  all_reads = other.all_reads;
+  if (turns == other.turns) return;
+  turns = other.turns, turn_weight = other.turn_weight;
+  IndexRows();
+}
+
+void Diagnosis::Work::PrepareAsIn(const Work& other, const std::vector<const Chosen*>& terms,
+                                  const Candidate& further) {
+  estimate = other.estimate;
+  FollowEstimate(other.Reads(terms, &further));
+  Prepare(terms);
+}
+
 RowIndex UsedRows(const std::vector<const calibration::Dataset*>& logs, int joint) {
   RowIndex index;
   for (std::size_t log = 0; log < logs.size(); ++log) {

@@ -43,6 +43,8 @@ std::vector<const Chosen*> Rivals(const std::vector<Chosen>& chosen, const Chose
 struct Diagnosis::Work {
   Work(const codegen::Model& model, const codegen::Catalogue& catalogue,
        std::vector<const calibration::Dataset*> train);
+  // Other logs of the same arm, for the candidates of `other`; it has none of its own.
+  Work(const Work& other, std::vector<const calibration::Dataset*> logs);
 
   // x, amplitudes, sigma and model torque for the given terms (white metric, the same method with and without terms).
   struct Estimate {
@@ -70,6 +72,8 @@ struct Diagnosis::Work {
   const Columns& ColumnsOf(const Chosen& term);
   // Refreshes base rows at the estimate, the given terms' columns included.
   void Prepare(const std::vector<const Chosen*>& terms);
+  // The same, and the evidence, at the estimate of `other`, for one of its candidates beside these terms.
+  void PrepareAsIn(const Work& other, const std::vector<const Chosen*>& terms, const Candidate& further);
   Eigen::VectorXd SlopeOverModelTorque(const std::vector<const Chosen*>& terms, int j);
   std::vector<NoiseModel> WhiteNoise() const;
   // From now on, shifts the motion of the logs against their torque by the delay that the confirmed terms found.

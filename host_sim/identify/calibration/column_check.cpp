@@ -216,10 +216,9 @@ class Examiner {
   // 95 % of the rows do not pass.
   struct Drag {
     double mean = 0, sd = 0, high = 0;
-    bool is_large(double spread) const { return -mean > kFedShare * spread; }
-    bool feeds(double spread, double left) const {
-      return high < 0 && -mean > kSure * sd && (is_large(spread) || -mean > left);
-    }
+    double spread = 0, left = 0;  // of the joint's torque
+    bool is_large() const { return -mean > kFedShare * spread; }
+    bool feeds() const { return high < 0 && -mean > kSure * sd && (is_large() || -mean > left); }
   };
   Drag DragOf(int j, const ColumnFit::Motion& motion, const ColumnFitResult& result) const {
     const auto at = static_cast<std::size_t>(j);
@@ -243,14 +242,15 @@ class Examiner {
     pick /= static_cast<double>(drag.size());
     std::sort(drag.begin(), drag.end());
     return {pick.dot(result.x), std::sqrt(std::max(0.0, pick.dot(result.covariance * pick))),
-            drag[static_cast<std::size_t>(0.95 * static_cast<double>(drag.size() - 1))]};
+            drag[static_cast<std::size_t>(0.95 * static_cast<double>(drag.size() - 1))], result.spread[j],
+            result.left[j]};
   }
 
   // A line if the joint's friction drives it at every speed of the logs. Another joint's motor, coupled to this one, is
   // tried first.
   std::string FedEnergy(int j) const {
     const Drag drag = DragOf(j, motion_, result_);
-    if (!drag.feeds(result_.spread[j], result_.left[j])) return "";
+    if (!drag.feeds()) return "";
     for (int i = 0; i < model_.joints(); ++i) {
       if (i == j || MovingShare(i) < 0.1) continue;
       const auto& speed = fit_.signals().qd.col(i);
@@ -259,9 +259,7 @@ class Examiner {
       ColumnFit::Motion coupled = motion_;
       coupled.Add(j, other);
       const ColumnFitResult result = fit_.Fit(coupled, given_);
-      if (DragOf(j, coupled, result).feeds(result.spread[j], result.left[j]) ||
-          result_.log_left - result.log_left < kClearGain / 4)
-        continue;
+      if (DragOf(j, coupled, result).feeds() || result_.log_left - result.log_left < kClearGain / 4) continue;
       return fmt::format("joint {}: its friction follows the speed of joint {}: are their motors coupled?", j + 1,
                          i + 1);
     }
@@ -272,7 +270,7 @@ class Examiner {
         "friction of {:.3g} {} would drive the joint at every speed, where it must brake it; is the sign of "
         "tau{} or q{} right?",
         drag.mean, TorqueUnit(model_.robot().joint[j]), j + 1, j + 1);
-    if (gain > kClearGain && drag.is_large(result_.spread[j])) Fail(j, what);
+    if (gain > kClearGain && drag.is_large()) Fail(j, what);
     return fmt::format("joint {}: suspect: {}", j + 1, what);
   }
 

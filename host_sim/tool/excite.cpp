@@ -126,6 +126,8 @@ nlohmann::ordered_json PrintAccuracy(const excitation::Target& target, const exc
   return list;
 }
 
+constexpr double kHardlyMoves = 0.05;  // of a joint's range
+
 void PrintPeaks(const codegen::Robot& robot, const std::vector<excitation::JointPeaks>& peaks) {
   fmt::print("peaks on a {:g} ms grid (share of the limit); rad, rad/s, rad/s^2, N m (m, m/s, m/s^2, N)\n",
              1e3 * excitation::kCheckStep_s);
@@ -138,6 +140,13 @@ void PrintPeaks(const codegen::Robot& robot, const std::vector<excitation::Joint
                p.acceleration_radps2, 100 * p.acceleration_share);
     if (robot.has_prior) fmt::print(" {:>8.1f} {:>4.0f}%\n", p.torque_Nm, 100 * p.torque_share);
     else fmt::print(" {:>8} {:>5}\n", "unknown", "");
+  }
+  for (std::size_t j = 0; j < peaks.size(); ++j) {
+    const auto [low, high] = robot.joint[j].position_limit_rad;
+    const double share = (peaks[j].highest_rad - peaks[j].lowest_rad) / (high - low);
+    if (share < kHardlyMoves)
+      fmt::print("  {} moves over {:.1f} % of its range only: such a log says little of it\n", robot.joint[j].name,
+                 100 * share);
   }
 }
 

@@ -114,6 +114,22 @@ TEST_F(Import, OfBadBodiesAndMissingLimits_SaysSoAndGoesOn) {
   ExpectOneLine(Tool({"import", Path("arm.urdf"), "-o", Path("arm.toml")}), 2, "--overwrite");
 }
 
+// Published inertias are rounded. One that is a little beyond what a body can have is no reason to drop them all.
+TEST_F(Import, OfARoundedInertiaAndAFrameWithInertia_KeepsTheBodies) {
+  const std::string frame =
+      "<link name=\"frame\"><inertial><mass value=\"0\"/><inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" "
+      "iyy=\"0.1\" iyz=\"0\" izz=\"0.1\"/></inertial></link>" +
+      JointText("to_frame", {"fixed", "s4", "frame", "xyz=\"0 0 0.1\"", "0 0 1", 0, 0, 0, 0, 0, "", ""}, "");
+  const Outcome o =
+      Try(Replaced(Replaced(Scara().urdf, "izz=\"0.1\"", "izz=\"0.125\""), "</robot>", frame + "</robot>"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_TRUE(ReadJson(Path("out.json")).at("prior").get<bool>()) << o.out;
+  EXPECT_NE(o.out.find("joint \"turn_1\": the body that it moves lacks principal moments"), o.out.npos) << o.out;
+  EXPECT_NE(o.out.find("the nearest body that can exist is taken"), o.out.npos) << o.out;
+  EXPECT_NE(o.out.find("link \"frame\" has an inertia but no mass: it counts as a frame"), o.out.npos) << o.out;
+  EXPECT_EQ(Tool({"generate", "--robot", Path("arm.toml"), "--out", Path("generated")}).code, 0);
+}
+
 TEST_F(Import, OfLimitsInDegrees_TakesThemAsAGuess) {
   const Outcome o = Try(Replaced(Scara().urdf, "lower=\"-2.2\" upper=\"2.2\"", "lower=\"-91\" upper=\"115\""));
   ASSERT_EQ(o.code, 0) << o.err;

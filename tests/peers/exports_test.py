@@ -37,6 +37,9 @@ def urdf(slide):
         kind = "prismatic" if slide and k == 1 else "revolute"
         text += JOINT.format(f"j{k + 1}", kind, "base" if k == 0 else f"l{k}", f"l{k + 1}", origins[k], turns[k], axes[k], "")
     text += LINK.format("flange", 0.4, "0.01 0 0.03", "0 0 0", [0.1 * value for value in inertia])
+    # A frame without mass, with an inertia that others would count.
+    text += LINK.format("frame", 0, "0 0 0", "0 0 0", [0.05 * value for value in inertia])
+    text += '<joint name="to_frame" type="fixed"><parent link="flange"/><child link="frame"/></joint>\n'
     text += '<joint name="to_flange" type="fixed"><parent link="l4"/><child link="flange"/><origin xyz="0 0 0.1" rpy="0 0 0.9"/></joint>\n'
     for name, mimic in (("f1", ""), ("f2", '<mimic joint="to_f1" multiplier="-1"/>')):
         text += LINK.format(name, 0.2, "0.02 0 0", "0 0 0", [0.01 * value for value in inertia])

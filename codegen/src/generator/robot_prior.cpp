@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 
 #include "codegen/src/generator/rigid_body.hpp"
+#include "codegen/src/robot/body.hpp"
 
 namespace armcal::codegen {
 
@@ -63,10 +64,16 @@ double StatedRotor(const Joint& joint) {
   return joint.motor.gear_ratio * joint.motor.gear_ratio * joint.motor.rotor_inertia_kgm2;
 }
 
+// A prior needs bodies that can exist. Published figures are rounded, and some miss that by a little.
+Link Possible(const Link& l) {
+  const Body body{l.mass_kg, Eigen::Vector3d(l.center_m.data()), Symmetric(l.inertia_kgm2)};
+  return l.mass_kg > 0 && !Impossible(body).empty() ? ToLink(NearestPossible(body)) : l;
+}
+
 // (m, c, I about the centre). Without a prior every link starts as a small ball: physical, and so wide that it says
 // nothing.
 VectorXd TableOf(const Robot& robot, const Joint& joint) {
-  const Link& l = robot.has_prior ? joint.link : Link{1, {}, {0.01, 0, 0, 0.01, 0, 0.01}};
+  const Link l = robot.has_prior ? Possible(joint.link) : Link{1, {}, {0.01, 0, 0, 0.01, 0, 0.01}};
   VectorXd table(10);
   table << l.mass_kg, l.center_m[0], l.center_m[1], l.center_m[2], l.inertia_kgm2[0], l.inertia_kgm2[1],
       l.inertia_kgm2[2], l.inertia_kgm2[3], l.inertia_kgm2[4], l.inertia_kgm2[5];

@@ -68,6 +68,17 @@ inline std::string Impossible(const Body& body, double slack = 0) {
   return "";
 }
 
+// Near a body that cannot exist: the second moments of its mass are raised to a thousandth of their sum at least. For
+// moments of inertia above zero.
+inline Body NearestPossible(const Body& body) {
+  constexpr double kLeast = 1e-3;
+  const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(0.5 * body.inertia.trace() * unit - body.inertia);
+  const Eigen::Vector3d second = axes.eigenvalues().cwiseMax(kLeast * axes.eigenvalues().sum());
+  const Eigen::Matrix3d mended = axes.eigenvectors() * second.asDiagonal() * axes.eigenvectors().transpose();
+  return {body.mass, body.center, mended.trace() * unit - mended};
+}
+
 inline Link ToLink(const Body& body) {
   const Eigen::Matrix3d& I = body.inertia;
   return {body.mass, Components(body.center), {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)}};

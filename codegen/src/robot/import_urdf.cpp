@@ -133,13 +133,21 @@ UrdfChain ReadWhatCanBeUsed(const UrdfChoice& choice, bool& bodies, std::vector<
   bodies = faults.Try([&] { chain = ReadUrdf(choice); });
   if (!bodies) chain = ReadUrdf(choice, UrdfBodies::kIgnored);  // throws what has nothing to do with bodies
   for (const std::string& line : faults.lines()) said.push_back(line);
+  for (const std::string& link : chain.massless)
+    said.push_back("link \"" + link + "\" has an inertia but no mass: it counts as a frame");
   if (!bodies) return chain;
   for (const Joint& joint : chain.joint) {
     const Link& link = joint.link;
-    const std::string missing = Impossible({link.mass_kg, Eigen::Vector3d::Zero(), Symmetric(link.inertia_kgm2)});
+    const Body body{link.mass_kg, Eigen::Vector3d::Zero(), Symmetric(link.inertia_kgm2)};
+    const std::string missing = Impossible(body);
     if (missing.empty()) continue;
+    const std::string who = "joint \"" + joint.name + "\": the body that it moves lacks ";
+    if (Impossible(body, kPublished).empty()) {
+      said.push_back(who + missing + "; the nearest body that can exist is taken");
+      continue;
+    }
     bodies = false;
-    said.push_back("joint \"" + joint.name + "\": the body that it moves lacks " + missing);
+    said.push_back(who + missing);
   }
   if (chain.same_inertia.empty()) return chain;
   bodies = false;
@@ -177,10 +185,13 @@ ImportedRobot ImportUrdf(const UrdfChoice& asked, const std::string& name, const
   out.choice = ChooseChain(asked, out.said);
   bool bodies = true;
   const UrdfChain chain = ReadWhatCanBeUsed(out.choice, bodies, out.said);
-  if (chain.joint.size() > kMostJoints)
-    throw io::InputError(asked.path.string() + ": " + std::to_string(chain.joint.size()) +
-                         " movable joints, expected at most 7; name an end nearer to the base with --tip, or hold a "
-                         "joint with --fixed");
+  if (chain.joint.size() > kMostJoints) {
+    std::string names;
+    for (const Joint& joint : chain.joint) names += (names.empty() ? "" : ", ") + joint.name;
+    throw io::InputError(asked.path.string() + ": " + std::to_string(chain.joint.size()) + " movable joints (" + names +
+                         "), expected at most 7; name an end nearer to the base with --tip, or hold a joint with "
+                         "--fixed");
+  }
   for (const std::string& line : MissingMeshes(chain)) out.said.push_back(line);
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
   const auto from_file = [&folder](const std::filesystem::path& path) {

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "codegen/src/io/require_file.hpp"
+#include "codegen/src/io/xacro.hpp"
 #include "codegen/src/robot/frames.hpp"
 #include "codegen/src/robot/mesh_path.hpp"
 
@@ -203,7 +204,8 @@ class Walk {
       axes.push_back(Axis{joint, at_.translation(), (at_.linear() * direction).normalized(), Body(), at_});
       parts.emplace_back();
       Collect(*model.getLink(joint->child_link_name), axes.back().link, parts.back());
-      for (const UrdfPart& part : parts.back()) Merge(axes.back().body, Moved(part.pose, part.body));
+      for (const UrdfPart& part : parts.back())
+        if (part.body.mass != 0) Merge(axes.back().body, Moved(part.pose, part.body));
     }
     if (axes.empty()) Say("link", model.getRoot()->name, "at least one movable joint after it");
   }
@@ -272,21 +274,29 @@ void CheckLengths(const std::string& file, const urdf::ModelInterface& model, io
   }
 }
 
-// Centres and inertias in millimetres, and bodies that cannot exist.
-void CheckBodies(const std::string& file, const urdf::ModelInterface& model, io::Faults& faults) {
-  for (const auto& [name, link] : model.links_) {
-    if (!link->inertial) continue;
-    const std::string who = file + ": link \"" + name + "\": expected ";
-    const Body body = BodyOf(*link);
-    if (body.mass == 0 && body.inertia.isZero()) continue;  // a frame that somebody gave an empty <inertial>
-    if (body.center.norm() > kLongest)
-      faults.Add(who + "a centre of mass in metres, not " + Number(body.center.norm()) + " (millimetres?)");
-    const double square = body.mass > 0 ? 0.5 * body.inertia.trace() / body.mass : 0;
-    if (square > kLongest * kLongest)
-      faults.Add(who + "an inertia in kg m^2: this one would be " + Number(std::sqrt(square)) + " m wide (kg mm^2?)");
-    if (body.inertia.isZero() && body.mass > 0) continue;  // a mass point; what it is fixed to may have the inertia
-    if (const std::string missing = Impossible(body, kPublished); !missing.empty()) faults.Add(who + missing);
-  }
+// Of the parts that move: centres and inertias in millimetres, and bodies that cannot exist.
+void CheckBodies(const std::string& file, const std::vector<std::vector<UrdfPart>>& parts, io::Faults& faults) {
+  for (const auto& of_joint : parts)
+    for (const auto& [link, pose, body] : of_joint) {
+      if (body.mass == 0) continue;  // a frame
+      const std::string who = file + ": link \"" + link + "\": expected ";
+      if (body.center.norm() > kLongest)
+        faults.Add(who + "a centre of mass in metres, not " + Number(body.center.norm()) + " (millimetres?)");
+      const double square = body.mass > 0 ? 0.5 * body.inertia.trace() / body.mass : 0;
+      if (square > kLongest * kLongest)
+        faults.Add(who + "an inertia in kg m^2: this one would be " + Number(std::sqrt(square)) + " m wide (kg mm^2?)");
+      if (body.inertia.isZero() && body.mass > 0) continue;  // a mass point; what it is fixed to may have the inertia
+      if (const std::string missing = Impossible(body, kPublished); !missing.empty()) faults.Add(who + missing);
+    }
+}
+
+// Links without mass, but with an inertia that no such link can have.
+std::vector<std::string> Massless(const std::vector<std::vector<UrdfPart>>& parts) {
+  std::vector<std::string> links;
+  for (const auto& of_joint : parts)
+    for (const UrdfPart& part : of_joint)
+      if (part.body.mass == 0 && !part.body.inertia.isZero()) links.push_back(part.link);
+  return links;
 }
 
 // The axes of one frame at joint positions zero.
@@ -463,7 +473,7 @@ std::string UrdfText(const std::filesystem::path& path) {
   std::ifstream in(path);
   std::ostringstream text;
   text << in.rdbuf();
-  const bool macros = path.extension() == ".xacro" || text.str().find("<xacro:") != std::string::npos;
+  const bool macros = path.extension() == ".xacro" || io::HoldsXacro(text.str());
   if (!macros) return text.str();
   const std::string xacro = "xacro " + Quoted(path.string());
   const auto [expanded, code] = OutputOf(xacro + " 2>/dev/null");
@@ -485,8 +495,8 @@ UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
   const Choice choice(asked, *model, faults);
   choice.Check();
   CheckLengths(file, *model, faults);
-  if (bodies == UrdfBodies::kChecked) CheckBodies(file, *model, faults);
   const Walk walk(asked, *model, choice, faults);
+  if (bodies == UrdfBodies::kChecked) CheckBodies(file, walk.parts, faults);
   faults.ThrowIfAny();
   std::vector<JointKinematics> kinematics;
   const std::vector<Frame> frames = LayFrames(walk.axes, kinematics);
@@ -495,6 +505,7 @@ UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
   chain.base_part = walk.base_parts;
   chain.held = choice.held();
   chain.same_inertia = SameInertia(walk.parts);
+  chain.massless = Massless(walk.parts);
   for (std::size_t i = 0; i < walk.axes.size(); ++i) {
     const Axis& axis = walk.axes[i];
     Joint joint;

@@ -1,5 +1,7 @@
 // excitation - blends, slow moves, and the grid that the parts are put on.
 #include "host_sim/identify/excitation/compose.hpp"
+
+#include <fmt/core.h>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -218,21 +220,34 @@ std::vector<double> QuietInstants(const codegen::Robot& robot, const Series& ser
 }
 
 std::string Expected(const Limits& limits) {
-  return limits.clearance ? "; expected wider limits, or more room in the cell" : "; expected wider limits";
+  return limits.clearance ? "; expected wider limits, more room in the cell, or a smaller --clearance"
+                          : "; expected wider limits";
 }
 
 using Parts = std::vector<Part>;
 
+// Empty: `lacks` says what was not found.
 std::optional<Part> SlowPart(const Observation& observation, const Eigen::VectorXd& home, int speeds,
-                             const Limits& limits) {
+                             const Limits& limits, std::string& lacks) {
+  codegen::Signals motion;
   for (const double reach : {1.0, 0.5, 0.25, 0.125}) {
     const SlowMoves moves(observation.model().robot(), home, speeds, limits.share, reach);
     trajectory::Trajectory path;
     path.q.resize(static_cast<Eigen::Index>(moves.duration_s() / path.step_s) + 1, home.size());
     for (Eigen::Index k = 0; k < path.q.rows(); ++k)
       path.q.row(k) = moves.Position(path.step_s * static_cast<double>(k));
-    if (!Keeps(observation, Sampled(trajectory::TrajectorySpline(path), path.step_s), limits)) continue;
+    motion = Sampled(trajectory::TrajectorySpline(path), path.step_s);
+    if (!Keeps(observation, motion, limits)) continue;
     return Part{"slow moves", moves.duration_s(), [moves](double t) { return moves.Position(t); }};
+  }
+  if (limits.clearance && !limits.clearance->Keeps(motion.q)) {
+    const collision::Nearest nearest = limits.clearance->Smallest(motion.q);
+    lacks = fmt::format(
+        "slow moves that keep {} and {} {:.1f} mm apart (they come to {:.1f} mm); expected a smaller --clearance, or "
+        "--no-slow",
+        nearest.a, nearest.b, 1e3 * limits.clearance->margin_m(), 1e3 * nearest.distance_m);
+  } else {
+    lacks = "slow moves within the limits; expected --no-slow or limits that allow them";
   }
   return std::nullopt;
 }
@@ -246,14 +261,14 @@ std::optional<Parts> SlowParts(const Observation& observation, const Eigen::Vect
   };
   Parts parts;
   if (speeds > 0) {
-    const auto slow = SlowPart(observation, home, speeds, limits);
-    if (!slow) return lacks = "slow moves", std::nullopt;
+    const auto slow = SlowPart(observation, home, speeds, limits, lacks);
+    if (!slow) return std::nullopt;
     const auto transfer = move(from, home);
-    if (!transfer) return lacks = "transfer", std::nullopt;
+    if (!transfer) return lacks = "transfer within the limits" + Expected(limits), std::nullopt;
     parts = {AsPart("transfer", *transfer), *slow};
   }
   const auto back = move(speeds > 0 ? home : from, to);
-  if (!back) return lacks = "return", std::nullopt;
+  if (!back) return lacks = "return within the limits" + Expected(limits), std::nullopt;
   parts.push_back(AsPart("return", *back));
   return parts;
 }
@@ -261,7 +276,7 @@ std::optional<Parts> SlowParts(const Observation& observation, const Eigen::Vect
 // The blend in, the periods, the blend out, which ends at rest, and what follows.
 Parts AllParts(const Observation& observation, const Series& series, const ComposeSettings& settings,
                const Limits& limits) {
-  std::string lacks = "blend from rest into the series";
+  std::string lacks = "blend from rest into the series within the limits" + Expected(limits);
   int tried = 0;
   for (const double begin : QuietInstants(observation.model().robot(), series)) {
     const State state = StateAt(series, begin);
@@ -280,8 +295,7 @@ Parts AllParts(const Observation& observation, const Series& series, const Compo
     }
     if (++tried == kMostEntries) break;
   }
-  Fail(observation, "no " + lacks + " within the limits" +
-                        (lacks == "slow moves" ? "; expected --no-slow or limits that allow them" : Expected(limits)));
+  Fail(observation, "no " + lacks);
 }
 
 // One point each step_s of the parts in a row. Where the end falls between two points, its pose is added once more.

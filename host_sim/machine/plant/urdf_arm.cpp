@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/xacro.hpp"
 
 namespace armcal::plant {
 namespace {
@@ -20,7 +21,7 @@ KDL::Frame ToKdl(const urdf::Pose& pose) {
 }
 
 KDL::RigidBodyInertia BodyOf(const urdf::Link& link) {
-  if (!link.inertial) return KDL::RigidBodyInertia::Zero();
+  if (!link.inertial || link.inertial->mass == 0) return KDL::RigidBodyInertia::Zero();  // a frame
   const urdf::Inertial& in = *link.inertial;
   return ToKdl(in.origin) *
          KDL::RigidBodyInertia(in.mass, KDL::Vector::Zero(),
@@ -110,7 +111,7 @@ void ReadUrdfArm(UrdfArm& arm) {
   if (!in) throw io::InputError(arm.file + ": no such file");
   std::ostringstream text;
   text << in.rdbuf();
-  if (text.str().find("<xacro:") != std::string::npos)
+  if (io::HoldsXacro(text.str()))
     throw io::InputError(arm.file + ": a xacro file, expected a URDF to simulate; expand it: xacro " + arm.file +
                          " > arm.urdf");
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text.str());

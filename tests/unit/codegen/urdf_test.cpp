@@ -191,6 +191,28 @@ TEST_F(Urdf, Limits_ComeFromTheUrdfUnlessTheRobotFileSaysOtherwise) {
   EXPECT_NEAR(robot.joint[2].position_limit_rad[1], 400 * M_PI / 180, 1e-12);
 }
 
+// What a base weighs does not matter, and a link without mass is a frame, whatever inertia somebody wrote for it.
+TEST_F(Urdf, InertiasOfTheBaseAndOfFrames_DoNotCount) {
+  const std::string kinematics = JointText("r1", "revolute", "base", "l1", "xyz=\"0 0 0.4\" rpy=\"0.3 0 1\"", "0 1 0") +
+                                 JointText("r2", "revolute", "l1", "l2", "xyz=\"0.3 0 0.1\"", "1 0 0") +
+                                 JointText("fix", "fixed", "l2", "tool", "xyz=\"0 0.1 0.2\"", "0 0 1");
+  const std::string bodies = Link("l1", Inertial(2.5, "xyz=\"0.1 -0.2 0.3\"", kSkewed)) +
+                             Link("l2", Inertial(1.5, "xyz=\"0.1 0.1 0\"", kSkewed));
+  const char* const impossible = "ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.2\" iyz=\"0\" izz=\"9\"";
+  const codegen::Robot robot = Read(RobotText(Link("base", Inertial(0, "xyz=\"-0.1 0 0\"", impossible)) + bodies +
+                                              Link("tool", Inertial(0, "xyz=\"0 0 0\"", impossible)) + kinematics),
+                                    {"r1", "r2"});
+  const std::string plain = RobotText(Link("base") + bodies + Link("tool") + kinematics);
+  EXPECT_LT(ErrorAgainstParser(robot, ChainTo(Parse(plain), "tool"), 200), 1e-10);
+}
+
+// xacro leaves the comments of its input in the URDF that it writes.
+TEST_F(Urdf, MacrosInComments_AreNone) {
+  const std::string comment = "<!-- made by xacro <xacro:property name=\"m\" value=\"1\"/>\n -->";
+  EXPECT_EQ(Read(comment + OddArm() + comment, {"r1", "p2", "c3", "r4", "r5"}).joints(), 5);
+  EXPECT_NE(Refusal(comment + RobotText(comment + "<xacro:arm/>"), {}).find("a xacro file"), std::string::npos);
+}
+
 // "1.5708" in a URDF means a right angle: the frames must come out exact, or every zero would cost operations.
 TEST_F(Urdf, RoundedRightAngles_AreTakenAsExact) {
   const std::string body = Inertial(2.5, "xyz=\"0.1 -0.2 0.3\"", kSkewed);

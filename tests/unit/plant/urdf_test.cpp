@@ -22,10 +22,11 @@ std::string Joint(const std::string& name, const std::string& type, const std::s
 }
 
 // A turn, a slide along a slanting axis and a turn; a flange, and two fingers of which one mimics the other.
-std::string Urdf() {
+// `frame`: the inertial of a link that is fixed to the flange.
+std::string Urdf(const std::string& frame = "") {
   const std::string round = "ixx=\"0.02\" ixy=\"0.001\" ixz=\"-0.002\" iyy=\"0.03\" iyz=\"0.0015\" izz=\"0.025\"";
   const auto limit = [](const std::string& range) { return "<limit " + range + " effort=\"50\" velocity=\"3\"/>"; };
-  return "<robot name=\"r\"><link name=\"base\"/>\n" +
+  return "<!-- <xacro:arm/> --><robot name=\"r\"><link name=\"base\"/>\n" +
          Link("l1", 5, "xyz=\"0.05 0.02 0.1\" rpy=\"0.3 -0.2 0.5\"", round) +
          Link("l2", 3, "xyz=\"0.1 0 -0.05\" rpy=\"1 0.5 0\"", round) + Link("l3", 2, "xyz=\"0 0.08 0.02\"", round) +
          Link("flange", 0.4, "xyz=\"0.01 0 0.03\"", round) + Link("f1", 0.2, "xyz=\"0.02 0 0\"", round) +
@@ -37,6 +38,7 @@ std::string Urdf() {
                "<origin xyz=\"0.2 0 0.1\" rpy=\"0 0.7 0\"/><axis xyz=\"1 1 0\"/>" +
                    limit("lower=\"0.1\" upper=\"0.6\"")) +
          Joint("j3", "continuous", "l2", "l3", "<origin xyz=\"0 0.1 0.3\" rpy=\"0.2 0.3 -1\"/><axis xyz=\"0 0 -1\"/>") +
+         "<link name=\"frame\">" + frame + "</link>" + Joint("to_frame", "fixed", "flange", "frame", "") +
          Joint("to_flange", "fixed", "l3", "flange", "<origin xyz=\"0 0 0.1\" rpy=\"0 0 0.9\"/>") +
          Joint("finger", "prismatic", "flange", "f1",
                "<origin xyz=\"0 0 0.05\"/><axis xyz=\"0 1 0\"/>" + limit("lower=\"0.01\" upper=\"0.04\"")) +
@@ -46,8 +48,11 @@ std::string Urdf() {
          "</robot>\n";
 }
 
+// In its URDF the frame has an inertia and no mass, so it has no body.
 std::string RobotOf(const std::string& head) {
-  WriteText("arm.urdf", Urdf());
+  WriteText("arm.urdf",
+            Urdf("<inertial><mass value=\"0\"/><inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.1\" iyz=\"0\" "
+                 "izz=\"0.1\"/></inertial>"));
   std::string text =
       "name = \"test_arm\"\nsource = \"t\"\nurdf = \"arm.urdf\"\ngravity_mps2 = [1.0, 0.5, -9.7]\n" + head;
   // Another order than the URDF's: tables are found by name.

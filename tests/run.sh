@@ -80,6 +80,7 @@ if [[ $scope == peers ]]; then
   step "build armcal" configure_and_build host --target armcal armcal-generate armcal_analysis practice_robot judged_set judged_score || finish
   step "exports in MuJoCo and Pinocchio" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
   step "excitations in MuJoCo" build/peers/venv/bin/python tests/peers/collisions_test.py build/host/armcal build/peers/collisions
+  step "arms of public collections" build/peers/venv/bin/python tests/peers/arms_test.py build/host/armcal build/peers/arms
   step "logs by other people's libraries" build/peers/venv/bin/python tests/peers/logs_test.py build/host/armcal build/peers/logs
   python_package() { build/peers/venv/bin/pip install -q --disable-pip-version-check -C "cmake.define.ARMCAL_BUILT=$PWD/build/host" ./host_sim/python; }
   step "the Python package" python_package || finish

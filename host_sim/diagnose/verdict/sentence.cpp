@@ -196,10 +196,10 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   }
   if (std::isfinite(saved_Hz))
     out.push_back(fmt::format("torque above {:.3g} Hz: it was filtered away before the logs were saved", saved_Hz));
-  out.push_back(
-      fmt::format("rows at rest, near a turn and beside gaps: {} % of the samples of joints 1 to {}; presliding "
-                  "and breakaway show there",
-                  left_out, n));
+  out.push_back(fmt::format(
+      "rows at rest, near a turn, beside jolts and beside gaps: {} % of the samples of joints 1 to {}; presliding "
+      "and breakaway show there",
+      left_out, n));
   if (const std::vector<int> rested = Rested(v); !rested.empty())
     out.push_back(
         fmt::format("joint{} {}: at rest in the training logs", rested.size() > 1 ? "s" : "", JointGroup(rested)));

@@ -7,6 +7,7 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/quintic_spline.hpp"
 #include "host_sim/identify/calibration/band.hpp"
+#include "host_sim/identify/calibration/jolts.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 
 namespace armcal::calibration {
@@ -24,6 +25,7 @@ constexpr double kAboveBand = 1.5;  // cut-off over band: the filter then takes 
 constexpr double kBesideTurn = 1;   // periods of a filter's edge, from a turn on
 constexpr int kFiner = 4;           // samples of a filtered log for each of its own
 constexpr int kPoses = 8;           // at a single one an entry of the mass matrix may vanish
+
 // Signals and masks for given inertias.
 Dataset Derive(const codegen::Model& model, const logs::Log& log, const logs::Sensitivity& sensitivity,
                const logs::Bandwidth& bandwidth) {
@@ -129,6 +131,32 @@ struct SeenBands {
   Eigen::VectorXd agreed_Hz, saved_Hz;  // [n]
 };
 
+// Of the rows that are used, for Gaussian values with outliers.
+double RobustDeviation(const Eigen::VectorXd& values, const Eigen::VectorXi& used) {
+  constexpr double kOfMedian = 1.4826;
+  std::vector<double> sizes;
+  for (Eigen::Index k = 0; k < values.size(); ++k)
+    if (used[k]) sizes.push_back(std::abs(values[k]));
+  if (sizes.empty()) return INFINITY;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return kOfMedian * *middle;
+}
+
+// Of each joint: the standard deviation of what a fit leaves, without its outliers.
+Eigen::VectorXd LeftByAFit(const codegen::Model& model, const Dataset& d) {
+  const Fit fit = WeightedFit(model, {&d});
+  const Eigen::MatrixXd residual = d.tau - Predict(model, d, fit.x, fit.eta);
+  Eigen::VectorXd left(d.joints());
+  for (int j = 0; j < d.joints(); ++j) left[j] = RobustDeviation(residual.col(j), d.used.col(j));
+  return left;
+}
+
+void LeaveOutJolts(Dataset& d, const Eigen::MatrixXd& inertia, const Eigen::VectorXd& left) {
+  const Eigen::ArrayXXi apart = 1 - BesideJolts(d.s.t, d.s.qdd, d.cutoff_Hz, inertia, left).array();
+  d.moving.array() *= apart, d.used.array() *= apart;
+}
+
 // The median of the joints that show something; infinity if none does.
 double MedianSeen_Hz(const Eigen::VectorXd& each_Hz) {
   std::vector<double> seen;
@@ -223,7 +251,16 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
   if (bandwidth.cutoff_Hz > 0) return Derive(model, log, sensitivity, bandwidth);
   const Eigen::VectorXd chosen_Hz = logs::ChooseCutoffs_Hz(log, sensitivity);
   Dataset out = Derive(model, log, sensitivity, {0, 1, chosen_Hz});
-  const SeenBands seen = SeeBands(model, out);
+  SeenBands seen = SeeBands(model, out);
+  // Jolts can look like a limit of the band. Where the rows apart from them show one, too, the averages of that band
+  // take care of jolts.
+  const Eigen::VectorXd left = LeftByAFit(model, out);
+  Dataset apart = out;
+  LeaveOutJolts(apart, inertia, left);
+  const SeenBands seen_apart = SeeBands(model, apart);
+  const bool whole = !seen_apart.agreed_Hz.array().isFinite().any() && !seen_apart.saved_Hz.array().isFinite().any() &&
+                     !seen.saved_Hz.array().isFinite().any();
+  if (whole) out = apart, seen = seen_apart;
   const Eigen::VectorXd each_Hz = chosen_Hz.cwiseMin(kAboveBand * seen.agreed_Hz);
   if (seen.saved_Hz.array().isFinite().all() && log.gaps.empty()) {
     const double rate_Hz = out.rate_Hz();
@@ -237,6 +274,7 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
   } else if (bandwidth.scale != 1 || each_Hz != chosen_Hz) {
     out = Derive(model, log, sensitivity, {0, bandwidth.scale, each_Hz});
   }
+  if (whole) LeaveOutJolts(out, inertia, left);
   out.saved_Hz = seen.saved_Hz;
   for (int j = 0; j < n; ++j)
     if (std::isfinite(out.saved_Hz[j])) LeaveOutTurns(out, j);

@@ -25,7 +25,7 @@ using TorqueChannel = std::vector<JointChannel>;  // [n]; empty: as it is
 struct Dataset {
   codegen::Signals s;         // q, qd, qdd (derived from q where the log has no better), temp
   Eigen::MatrixXd tau;        // [N x n] measured torque minus known external torque
-  Eigen::MatrixXi moving;     // [N x n] 1: |qd| > v_min of that joint
+  Eigen::MatrixXi moving;     // [N x n] 1: |qd| > v_min of that joint, and not beside a jolt
   Eigen::MatrixXi used;       // [N x n] 1: row may be fitted (moving, signals settled, drive did not flag it)
   Eigen::MatrixXi slides;     // [N x n] 1: used before UseTurns
   Eigen::MatrixXi sound;      // [N x n] 1: signals settled and not flagged, also near turns and at rest

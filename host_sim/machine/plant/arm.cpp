@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -29,6 +30,39 @@ Eigen::VectorXd PerJoint(const std::vector<double>& values, const Scenario& scen
   if (values.size() != static_cast<std::size_t>(n))
     throw io::InputError(scenario.path + ": " + key + ": expected " + std::to_string(n) + " numbers, one a joint");
   return Eigen::Map<const Eigen::VectorXd>(values.data(), n);
+}
+
+// Zero, or the limit next to it. An arm that its motors cannot hold there starts at the pose nearest to that, of many
+// poses drawn, at which they can. If there is none, the brakes must hold it.
+Eigen::VectorXd RestingPose(const RobotFile& robot, Dynamics& dynamics) {
+  constexpr int kPoses = 2000;
+  constexpr double kShare = 0.6;              // of the torque limit: the controller needs the rest
+  constexpr double kWide = std::numbers::pi;  // rad, m; for joints without limits
+  const int n = robot.joints();
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(n);
+  const auto held = [&](const Eigen::VectorXd& q) {
+    const Eigen::VectorXd torque = dynamics.Torque(q, rest, rest);
+    for (int j = 0; j < n; ++j)
+      if (std::abs(torque[j]) > kShare * robot.joint[static_cast<std::size_t>(j)].torque_limit_Nm) return false;
+    return true;
+  };
+  Eigen::VectorXd zero(n), q(n);
+  const auto each = [&](Eigen::VectorXd& to, auto value) {
+    for (int j = 0; j < n; ++j) {
+      const JointData& joint = robot.joint[static_cast<std::size_t>(j)];
+      to[j] = value(joint.lowest_rad, joint.highest_rad);
+    }
+  };
+  each(zero, [](double low, double high) { return std::clamp(0.0, low, high); });
+  if (held(zero)) return zero;
+  Random random(1);
+  Eigen::VectorXd best = zero;
+  double least = INFINITY;
+  for (int k = 0; k < kPoses; ++k) {
+    each(q, [&](double low, double high) { return random.Uniform(std::max(low, -kWide), std::min(high, kWide)); });
+    if (const double far = (q - zero).norm(); far < least && held(q)) best = q, least = far;
+  }
+  return best;
 }
 
 }  // namespace
@@ -62,11 +96,8 @@ Arm::Arm(const Scenario& scenario, const std::string& robot_path)
   rise_KpW_ = PerJoint(scenario.thermal.rise_KpW, scenario, "thermal.rise_KpW", n);
   warming_time_s_ = PerJoint(scenario.thermal.time_constant_s, scenario, "thermal.time_constant_s", n);
   friction_ = load_ = command_ = slope_ = passed_Nm_ = outside_Nm_ = motor_angle_ = Eigen::VectorXd::Zero(n);
-  Eigen::VectorXd start(n);
-  for (int j = 0; j < n; ++j)
-    start[j] = std::clamp(0.0, robot_.joint[static_cast<std::size_t>(j)].lowest_rad,
-                          robot_.joint[static_cast<std::size_t>(j)].highest_rad);
-  if (!scenario.start_rad.empty()) start = PerJoint(scenario.start_rad, scenario, "start_rad", n);
+  const Eigen::VectorXd start = scenario.start_rad.empty() ? RestingPose(robot_, declared_)
+                                                           : PerJoint(scenario.start_rad, scenario, "start_rad", n);
   ChoosePayload();
   Place({start.data(), static_cast<std::size_t>(n)});
 }

@@ -80,8 +80,8 @@ struct Scenario {
   int substeps = 4;                      // integration steps a tick
   double torque_noise_scale = 1;         // x the robot file's torque noise
   double temperature_noise_degC = 0.05;  // standard deviation of a reading
-  std::vector<double> start_rad;         // empty: zero, or the limit next to it
-  std::optional<KDL::Frame> flange;      // instead of the robot file's tool frame
+  std::vector<double> start_rad;  // empty: zero or the limit next to it, or near that where the motors can hold the arm
+  std::optional<KDL::Frame> flange;  // instead of the robot file's tool frame
   std::vector<PlacedJointEffect> joint_effects;
   std::vector<Transmission> transmissions;
   std::vector<Flywheel> flywheels;

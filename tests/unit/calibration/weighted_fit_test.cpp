@@ -389,5 +389,19 @@ TEST(ReadOutPhysical, APriorThatCannotExist_IsRefusedByName) {
   }
 }
 
+TEST(ReadOutPhysical, APriorThatIsALittleBeyond_IsTheNearestThatCanExist) {
+  codegen::Robot robot = Er20();
+  robot.joint[2].link.center_m = {};  // then the moments about the origin are those of the file
+  robot.joint[2].link.inertia_kgm2 = {0.1, 0, 0, 0.1, 0, 0.21};
+  const Eigen::VectorXd mean = BodyMean(codegen::Model(robot, tests::Records())).segment(22, 11);
+  EXPECT_TRUE(IsPhysical(mean)) << mean.transpose();
+  for (int k = 0; k < 10; ++k) {
+    const double published = k == 0  ? robot.joint[2].link.mass_kg
+                             : k < 4 ? 0.0
+                                     : robot.joint[2].link.inertia_kgm2[k - 4];
+    EXPECT_NEAR(mean[k], published, k == 0 ? 0 : 0.011) << k;  // the moment is beyond the others' sum by 0.01
+  }
+}
+
 }  // namespace
 }  // namespace armcal::calibration

@@ -49,7 +49,8 @@ std::string Urdf(const std::string& frame = "") {
 }
 
 // In its URDF the frame has an inertia and no mass, so it has no body.
-std::string RobotOf(const std::string& head) {
+// first_joint: further keys of it.
+std::string RobotOf(const std::string& head, const std::string& first_joint = "") {
   WriteText("arm.urdf",
             Urdf("<inertial><mass value=\"0\"/><inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.1\" iyz=\"0\" "
                  "izz=\"0.1\"/></inertial>"));
@@ -58,7 +59,8 @@ std::string RobotOf(const std::string& head) {
   // Another order than the URDF's: tables are found by name.
   text +=
       "[[joint]]\nname = \"j2\"\ntorque_noise_N = 0.5\nposition_limit_m = [0.2, 0.5]\n"
-      "[[joint]]\nname = \"j1\"\ntorque_noise_Nm = 0.1\ncoulomb_Nm = 0.7\n"
+      "[[joint]]\nname = \"j1\"\ntorque_noise_Nm = 0.1\ncoulomb_Nm = 0.7\n" +
+      first_joint +
       "[[joint]]\nname = \"j3\"\ntorque_noise_Nm = 0.1\ntorque_limit_Nm = 20.0\nspeed_limit_degps = 90.0\n";
   return WriteText("urdf_robot.toml", text);
 }
@@ -116,6 +118,24 @@ TEST(UrdfPlant, TakesLimitsAndFrictionOfTheFileBeforeThoseOfTheUrdf) {
   // Without a motor: 2^23 counts a turn, 1e7 counts a metre.
   EXPECT_NEAR(2 * std::numbers::pi / robot.joint[1].counts_per_turn, 1e-7, 1e-20);
   EXPECT_EQ(robot.joint[0].counts_per_turn, 8388608);
+}
+
+// The first joint is so weak that it cannot hold the arm at zero.
+TEST(UrdfPlant, StartsWhereTheMotorsCanHoldTheArm) {
+  const Eigen::Vector3d rest = Eigen::Vector3d::Zero(), zero(0, 0.2, 0);
+  const auto gravity = [&](const RobotFile& robot, const Eigen::VectorXd& q) -> Eigen::VectorXd {
+    std::vector<Body> bodies;
+    for (const JointData& joint : robot.joint) bodies.push_back(joint.body);
+    return Dynamics(robot, bodies, robot.gravity_mps2).Torque(q, rest, rest);
+  };
+  const double limit = 0.8 * std::abs(gravity(ReadRobotFile(RobotOf("")), zero)[0]);
+  ASSERT_GT(limit, 1);
+  const std::string path = RobotOf("", "torque_limit_Nm = " + std::to_string(limit) + "\n");
+  const Arm arm(MakeScenario("[truth]\ninertial_spread = 0\n"), path);
+  const RobotFile robot = ReadRobotFile(path);
+  EXPECT_GT((arm.q() - zero).norm(), 0.1);
+  const Eigen::VectorXd torque = gravity(robot, arm.q());
+  for (int j = 0; j < 3; ++j) EXPECT_LT(std::abs(torque[j]), robot.joint[static_cast<std::size_t>(j)].torque_limit_Nm);
 }
 
 }  // namespace

@@ -168,7 +168,7 @@ def main():
 
     def one(name):
         try:
-            return (through if name in THROUGH else imported)(armcal, folder, collections, name, 101 + 20 * names.index(name))
+            return (through if name in THROUGH else imported)(armcal, folder, collections, name, 101 + 20 * [*THROUGH, *IMPORTED].index(name))
         except Failed as failed:
             return [str(failed)]
 

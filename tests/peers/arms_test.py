@@ -14,10 +14,8 @@ import os
 import pathlib
 import re
 import shutil
-import socket
 import subprocess
 import sys
-import time
 
 FLOOR = 1.05
 SAMPLE_TICKS = 8  # a sample is their mean; import writes this number
@@ -84,24 +82,19 @@ class Bench:
 
     @contextlib.contextmanager
     def drive(self, scenario):
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        with open(self.folder / "drive.txt", "a") as output:
-            process = subprocess.Popen([self.armcal, "simulate", "--robot", self.robot, "--scenario", scenario, "--port", str(port),
-                                        "--storage", scenario.with_suffix(".nor")], stdout=output, stderr=output, env=self.environment)
+        said = self.folder / "drive.txt"
+        with open(said, "a") as errors:
+            process = subprocess.Popen([self.armcal, "simulate", "--robot", self.robot, "--scenario", scenario, "--port", "0",
+                                        "--storage", scenario.with_suffix(".nor")],
+                                       stdout=subprocess.PIPE, stderr=errors, text=True, env=self.environment)
         try:
-            for _ in range(3000):  # the first start compiles the drive
-                if process.poll() is not None:
-                    raise Failed(f"{self.name}: the drive ended: {(self.folder / 'drive.txt').read_text()[-500:]}")
-                with contextlib.suppress(OSError):
-                    socket.create_connection(("127.0.0.1", port), 0.2).close()
-                    break
-                time.sleep(0.1)
-            yield f"127.0.0.1:{port}"
+            line = process.stdout.readline()  # the drive says its address as soon as it listens
+            if "listening on " not in line:
+                raise Failed(f"{self.name}: the drive ended: {said.read_text()[-500:]}")
+            yield line.split("listening on ")[1].strip()
         finally:
             process.terminate()
-            process.wait()
+            process.communicate()
 
     def logs(self, name, seed, effect):
         scenario = self.folder / f"{name}.toml"

@@ -66,9 +66,8 @@ double StatedRotor(const Joint& joint) {
 
 // A prior needs bodies that can exist. Published figures are rounded, and some miss that by a little.
 Link Possible(const Link& l) {
-  const Body body{l.mass_kg, Eigen::Vector3d(l.center_m.data()), Symmetric(l.inertia_kgm2)};
-  const bool rounded = !Impossible(body).empty() && Impossible(body, kPublished).empty();
-  return rounded ? ToLink(NearestPossible(body)) : l;
+  const Body body = ToBody(l);
+  return IsRounded(body) ? ToLink(NearestPossible(body)) : l;
 }
 
 // (m, c, I about the centre). Without a prior every link starts as a small ball: physical, and so wide that it says

@@ -34,6 +34,7 @@ inline Body Moved(const Eigen::Isometry3d& pose, const Body& body) {
 }
 
 inline void Merge(Body& into, const Body& other) {
+  if (other.mass == 0) return;  // a frame, whatever inertia somebody wrote for it
   const double mass = into.mass + other.mass;
   if (mass <= 0) return;
   const Eigen::Vector3d center = (into.mass * into.center + other.mass * other.center) / mass;
@@ -68,6 +69,12 @@ inline std::string Impossible(const Body& body, double slack = 0) {
   return "";
 }
 
+// So little is missing that rounding explains it.
+inline bool IsRounded(const Body& body) { return !Impossible(body).empty() && Impossible(body, kPublished).empty(); }
+
+// An inertia that no frame can have, of a link without mass.
+inline bool HasInertiaOnly(const Body& body) { return body.mass == 0 && !body.inertia.isZero(); }
+
 // Near a body that cannot exist: the second moments of its mass are raised to a thousandth of their sum at least. For
 // moments of inertia above zero.
 inline Body NearestPossible(const Body& body) {
@@ -82,6 +89,10 @@ inline Body NearestPossible(const Body& body) {
 inline Link ToLink(const Body& body) {
   const Eigen::Matrix3d& I = body.inertia;
   return {body.mass, Components(body.center), {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)}};
+}
+
+inline Body ToBody(const Link& link) {
+  return {link.mass_kg, Eigen::Vector3d(link.center_m.data()), Symmetric(link.inertia_kgm2)};
 }
 
 }  // namespace armcal::codegen

@@ -133,21 +133,19 @@ UrdfChain ReadWhatCanBeUsed(const UrdfChoice& choice, bool& bodies, std::vector<
   bodies = faults.Try([&] { chain = ReadUrdf(choice); });
   if (!bodies) chain = ReadUrdf(choice, UrdfBodies::kIgnored);  // throws what has nothing to do with bodies
   for (const std::string& line : faults.lines()) said.push_back(line);
-  for (const std::string& link : chain.massless)
-    said.push_back("link \"" + link + "\" has an inertia but no mass: it counts as a frame");
+  for (const auto& parts : chain.part)
+    for (const UrdfPart& part : parts)
+      if (HasInertiaOnly(part.body))
+        said.push_back("link \"" + part.link + "\" has an inertia but no mass: it counts as a frame");
   if (!bodies) return chain;
   for (const Joint& joint : chain.joint) {
-    const Link& link = joint.link;
-    const Body body{link.mass_kg, Eigen::Vector3d::Zero(), Symmetric(link.inertia_kgm2)};
+    const Body body = ToBody(joint.link);
     const std::string missing = Impossible(body);
     if (missing.empty()) continue;
-    const std::string who = "joint \"" + joint.name + "\": the body that it moves lacks ";
-    if (Impossible(body, kPublished).empty()) {
-      said.push_back(who + missing + "; the nearest body that can exist is taken");
-      continue;
-    }
-    bodies = false;
-    said.push_back(who + missing);
+    const bool rounded = IsRounded(body);
+    bodies = bodies && rounded;
+    said.push_back("joint \"" + joint.name + "\": the body that it moves lacks " + missing +
+                   (rounded ? "; the nearest body that can exist is taken" : ""));
   }
   if (chain.same_inertia.empty()) return chain;
   bodies = false;

@@ -29,7 +29,7 @@ Payload ReadPayload(const std::filesystem::path& path) {
 }
 
 Link Carrying(const Link& link, const Eigen::Isometry3d& flange, const Payload& payload) {
-  Body both{link.mass_kg, Eigen::Vector3d(link.center_m.data()), Symmetric(link.inertia_kgm2)};
+  Body both = ToBody(link);
   Merge(both,
         Moved(flange, {payload.mass_kg, Eigen::Vector3d(payload.center_m->data()), Symmetric(*payload.inertia_kgm2)}));
   return ToLink(both);

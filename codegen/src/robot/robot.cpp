@@ -258,7 +258,7 @@ void CheckUrdfBodies(const io::TomlReader& in, const UrdfChain& chain, io::Fault
   const std::string file = (std::filesystem::path(in.file()).parent_path() / in.Text("urdf")).string();
   for (std::size_t j = 0; j < chain.joint.size(); ++j) {
     const Link& link = chain.joint[j].link;
-    const Body body{link.mass_kg, Eigen::Vector3d::Zero(), Symmetric(link.inertia_kgm2)};
+    const Body body = ToBody(link);
     const std::string who = file + ": joint \"" + chain.joint[j].name + "\": expected ";
     if (!(link.mass_kg > 0)) faults.Add(who + "a link with mass after it; or write prior = \"none\" in " + in.file());
     else if (const std::string missing = Impossible(body, kPublished); !missing.empty())

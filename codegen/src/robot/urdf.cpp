@@ -204,8 +204,7 @@ class Walk {
       axes.push_back(Axis{joint, at_.translation(), (at_.linear() * direction).normalized(), Body(), at_});
       parts.emplace_back();
       Collect(*model.getLink(joint->child_link_name), axes.back().link, parts.back());
-      for (const UrdfPart& part : parts.back())
-        if (part.body.mass != 0) Merge(axes.back().body, Moved(part.pose, part.body));
+      for (const UrdfPart& part : parts.back()) Merge(axes.back().body, Moved(part.pose, part.body));
     }
     if (axes.empty()) Say("link", model.getRoot()->name, "at least one movable joint after it");
   }
@@ -288,15 +287,6 @@ void CheckBodies(const std::string& file, const std::vector<std::vector<UrdfPart
       if (body.inertia.isZero() && body.mass > 0) continue;  // a mass point; what it is fixed to may have the inertia
       if (const std::string missing = Impossible(body, kPublished); !missing.empty()) faults.Add(who + missing);
     }
-}
-
-// Links without mass, but with an inertia that no such link can have.
-std::vector<std::string> Massless(const std::vector<std::vector<UrdfPart>>& parts) {
-  std::vector<std::string> links;
-  for (const auto& of_joint : parts)
-    for (const UrdfPart& part : of_joint)
-      if (part.body.mass == 0 && !part.body.inertia.isZero()) links.push_back(part.link);
-  return links;
 }
 
 // The axes of one frame at joint positions zero.
@@ -505,7 +495,6 @@ UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
   chain.base_part = walk.base_parts;
   chain.held = choice.held();
   chain.same_inertia = SameInertia(walk.parts);
-  chain.massless = Massless(walk.parts);
   for (std::size_t i = 0; i < walk.axes.size(); ++i) {
     const Axis& axis = walk.axes[i];
     Joint joint;

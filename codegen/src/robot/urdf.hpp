@@ -33,7 +33,6 @@ struct UrdfChain {
   // Frame 0 seen from the URDF's root link, and the URDF's last link frame seen from the last DH frame.
   Eigen::Isometry3d base = Eigen::Isometry3d::Identity(), flange = base;
   std::vector<std::string> same_inertia;  // moving links that share mass, centre and inertia: nobody computed these
-  std::vector<std::string> massless;      // moving links with an inertia but no mass: they count as frames
   std::map<std::string, double> held;     // movable joints that are held, mimic joints among them; rad or m
 };
 

@@ -6,6 +6,7 @@
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/quintic_spline.hpp"
+#include "host_sim/data/logs/steps.hpp"
 #include "host_sim/identify/calibration/band.hpp"
 #include "host_sim/identify/calibration/jolts.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
@@ -126,9 +127,10 @@ logs::Log Finer(const logs::Log& log) {
   return out;
 }
 
-// The log itself shows up to which frequency torque follows the prediction.
+// The log itself shows up to which frequency torque follows the prediction, and how far it is from it.
 struct SeenBands {
   Eigen::VectorXd agreed_Hz, saved_Hz;  // [n]
+  Eigen::VectorXd left;                 // [n] standard deviation of what a fit leaves, without its outliers
 };
 
 // Of the rows that are used, for Gaussian values with outliers.
@@ -137,19 +139,7 @@ double RobustDeviation(const Eigen::VectorXd& values, const Eigen::VectorXi& use
   std::vector<double> sizes;
   for (Eigen::Index k = 0; k < values.size(); ++k)
     if (used[k]) sizes.push_back(std::abs(values[k]));
-  if (sizes.empty()) return INFINITY;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return kOfMedian * *middle;
-}
-
-// Of each joint: the standard deviation of what a fit leaves, without its outliers.
-Eigen::VectorXd LeftByAFit(const codegen::Model& model, const Dataset& d) {
-  const Fit fit = WeightedFit(model, {&d});
-  const Eigen::MatrixXd residual = d.tau - Predict(model, d, fit.x, fit.eta);
-  Eigen::VectorXd left(d.joints());
-  for (int j = 0; j < d.joints(); ++j) left[j] = RobustDeviation(residual.col(j), d.used.col(j));
-  return left;
+  return sizes.empty() ? std::numeric_limits<double>::infinity() : kOfMedian * logs::Median(std::move(sizes));
 }
 
 void LeaveOutJolts(Dataset& d, const Eigen::MatrixXd& inertia, const Eigen::VectorXd& left) {
@@ -190,8 +180,11 @@ void SpreadEdge(Eigen::VectorXd& saved_Hz) {
 SeenBands SeeBands(const codegen::Model& model, Dataset& d) {
   const Fit fit = WeightedFit(model, {&d});
   const Eigen::MatrixXd predicted = Predict(model, d, fit.x, fit.eta);
-  SeenBands out{{}, Eigen::VectorXd(d.joints())};
-  for (int j = 0; j < d.joints(); ++j) out.saved_Hz[j] = FilteredAbove_Hz(d, j, predicted.col(j));
+  SeenBands out{{}, Eigen::VectorXd(d.joints()), Eigen::VectorXd(d.joints())};
+  for (int j = 0; j < d.joints(); ++j) {
+    out.saved_Hz[j] = FilteredAbove_Hz(d, j, predicted.col(j));
+    out.left[j] = RobustDeviation(d.tau.col(j) - predicted.col(j), d.used.col(j));
+  }
   SpreadEdge(out.saved_Hz);
   d.saved_Hz = out.saved_Hz;
   out.agreed_Hz = Agreed_Hz(d, AsSaved(d, predicted));
@@ -251,16 +244,18 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
   if (bandwidth.cutoff_Hz > 0) return Derive(model, log, sensitivity, bandwidth);
   const Eigen::VectorXd chosen_Hz = logs::ChooseCutoffs_Hz(log, sensitivity);
   Dataset out = Derive(model, log, sensitivity, {0, 1, chosen_Hz});
-  SeenBands seen = SeeBands(model, out);
+  const SeenBands of_all = SeeBands(model, out);
+  SeenBands seen = of_all;
   // Jolts can look like a limit of the band. Where the rows apart from them show one, too, the averages of that band
   // take care of jolts.
-  const Eigen::VectorXd left = LeftByAFit(model, out);
-  Dataset apart = out;
-  LeaveOutJolts(apart, inertia, left);
-  const SeenBands seen_apart = SeeBands(model, apart);
-  const bool whole = !seen_apart.agreed_Hz.array().isFinite().any() && !seen_apart.saved_Hz.array().isFinite().any() &&
-                     !seen.saved_Hz.array().isFinite().any();
-  if (whole) out = apart, seen = seen_apart;
+  bool whole = false;
+  if (!of_all.saved_Hz.array().isFinite().any()) {
+    Dataset apart = out;
+    LeaveOutJolts(apart, inertia, of_all.left);
+    const SeenBands of_apart = SeeBands(model, apart);
+    whole = !of_apart.agreed_Hz.array().isFinite().any() && !of_apart.saved_Hz.array().isFinite().any();
+    if (whole) seen = of_apart;
+  }
   const Eigen::VectorXd each_Hz = chosen_Hz.cwiseMin(kAboveBand * seen.agreed_Hz);
   if (seen.saved_Hz.array().isFinite().all() && log.gaps.empty()) {
     const double rate_Hz = out.rate_Hz();
@@ -274,7 +269,7 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
   } else if (bandwidth.scale != 1 || each_Hz != chosen_Hz) {
     out = Derive(model, log, sensitivity, {0, bandwidth.scale, each_Hz});
   }
-  if (whole) LeaveOutJolts(out, inertia, left);
+  if (whole) LeaveOutJolts(out, inertia, of_all.left);
   out.saved_Hz = seen.saved_Hz;
   for (int j = 0; j < n; ++j)
     if (std::isfinite(out.saved_Hz[j])) LeaveOutTurns(out, j);

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
+
+#include "host_sim/data/logs/steps.hpp"
 
 namespace armcal::calibration {
 
@@ -27,10 +28,7 @@ Eigen::MatrixXi BesideJolts(const Eigen::VectorXd& t, const MatrixXd& qdd, const
   const double rate_Hz = static_cast<double>(samples - 1) / (t[samples - 1] - t[0]);
   const auto reach = static_cast<Index>(std::ceil(kJoltReach * rate_Hz / cutoff_Hz.minCoeff()));
   for (Index j = 0; j < qdd.cols(); ++j) {
-    std::vector<double> sorted(torque.col(j).begin(), torque.col(j).end());
-    const auto middle = sorted.begin() + samples / 2;
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    const double limit = std::max(left[j], kFarMore * *middle);
+    const double limit = std::max(left[j], kFarMore * logs::Median({torque.col(j).begin(), torque.col(j).end()}));
     for (Index k = 1; k <= inner; ++k) {
       if (torque(k, j) <= limit) continue;
       const Index first = std::max<Index>(0, k - reach), last = std::min(samples - 1, k + reach);

@@ -120,12 +120,11 @@ Description ToUrdf(const DescribedArm& arm, const std::string& urdf, bool merge)
     std::vector<Body> fixed;
     std::string names;
     for (std::size_t k = 1; k < parts.size(); ++k) {
-      if (parts[k].body.mass == 0) {
-        if (parts[k].body.inertia.isZero()) continue;
+      if (codegen::HasInertiaOnly(parts[k].body)) {
         edits.SetChild(edits.Named("link", parts[k].link), "inertial", "");
         d.left_out.push_back("inertial of " + parts[k].link + ": it has no mass");
-        continue;
       }
+      if (!(parts[k].body.mass > 0)) continue;
       names += (names.empty() ? "" : ", ") + parts[k].link;
       if (!merge) fixed.push_back(codegen::Moved(parts[k].pose, parts[k].body));
       else edits.SetChild(edits.Named("link", parts[k].link), "inertial", "");

@@ -157,10 +157,17 @@ double MedianSeen_Hz(const Eigen::VectorXd& each_Hz) {
   return seen[(seen.size() - 1) / 2];
 }
 
-// Noise of one joint's acceleration is in every row: no joint's band goes beyond the median of those that end.
+// Noise of one joint's acceleration is in every row: no joint's band goes beyond the median of those that end. What is
+// missing on a joint can look like an end of its band, too. So fewer than half of the joints that move tell nothing.
 Eigen::VectorXd Agreed_Hz(const Dataset& d, const Eigen::MatrixXd& predicted) {
   Eigen::VectorXd out(d.joints());
-  for (int j = 0; j < d.joints(); ++j) out[j] = AgreedBand_Hz(Transfer(d, j, predicted.col(j)));
+  int moving = 0;
+  for (int j = 0; j < d.joints(); ++j) {
+    const std::vector<TransferBand> transfer = Transfer(d, j, predicted.col(j));
+    out[j] = AgreedBand_Hz(transfer);
+    moving += !transfer.empty();
+  }
+  if (2 * out.array().isFinite().count() < moving) out.setConstant(INFINITY);
   const double common_Hz = MedianSeen_Hz(out);
   for (double& band_Hz : out) {
     band_Hz = std::min(band_Hz, common_Hz);

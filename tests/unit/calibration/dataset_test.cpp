@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "tests/unit/calibration/synthetic_arm.hpp"
+#include "tests/unit/calibration/windowed_sinc.hpp"
 
 namespace armcal::calibration {
 namespace {
@@ -57,6 +59,28 @@ TEST(TypicalMass, OfAnArmWithoutGravity_IsTheSame) {
   const Eigen::MatrixXd mass = TypicalMass(arm, arm.base_map() * bodies);
   EXPECT_LT((mass - TypicalMass(weightless, weightless.base_map() * bodies)).norm(), 1e-9 * mass.norm());
   EXPECT_GT(mass.minCoeff(), 0);
+}
+
+// Noise of the positions below 15 Hz ends the band of all joints. A torque over the position of joint 2 bends the fit of
+// that joint so far that its prediction is too large above the motion, which looks the same.
+TEST(Band, IsLimitedByNoiseThatMostJointsShow_AndNotByWhatOneJointLacks) {
+  constexpr double kSamples_Hz = 125, kNoiseBelow_Hz = 15;
+  tests::SyntheticArm arm(tests::Er20(), 3);
+  const auto bands_Hz = [&](double noise_rad, const tests::Effect& effect) {
+    const Dataset run = arm.Run(40, 4, effect);
+    std::mt19937_64 random(9);
+    std::normal_distribution<double> normal;
+    Eigen::MatrixXd noise(run.samples(), run.joints());
+    for (double& each : noise.reshaped()) each = normal(random);
+    logs::Log log;
+    log.source = run.source, log.joints = run.joints();
+    log.t = run.s.t, log.tau = run.tau;
+    log.q = run.s.q + noise_rad * tests::WindowedSinc(noise, kNoiseBelow_Hz, kSamples_Hz);
+    return Prepare(arm.model(), log).band_Hz;
+  };
+  const auto bellows = [](const tests::State& s) { return s.joint == 1 ? 400 * std::sin(3 * s.q) : 0; };
+  EXPECT_TRUE(bands_Hz(3e-4, {}).array().isFinite().all());
+  EXPECT_FALSE(bands_Hz(0, bellows).array().isFinite().any());
 }
 
 }  // namespace

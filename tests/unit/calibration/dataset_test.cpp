@@ -61,8 +61,8 @@ TEST(TypicalMass, OfAnArmWithoutGravity_IsTheSame) {
   EXPECT_GT(mass.minCoeff(), 0);
 }
 
-// Noise of the positions below 15 Hz ends the band of all joints. A torque over the position of joint 2 bends the fit of
-// that joint so far that its prediction is too large above the motion, which looks the same.
+// Noise of the positions below 15 Hz ends the band of all joints. A torque over the position of joint 2 bends the fit
+// of that joint so far that its prediction is too large above the motion, which looks the same.
 TEST(Band, IsLimitedByNoiseThatMostJointsShow_AndNotByWhatOneJointLacks) {
   constexpr double kSamples_Hz = 125, kNoiseBelow_Hz = 15;
   tests::SyntheticArm arm(tests::Er20(), 3);

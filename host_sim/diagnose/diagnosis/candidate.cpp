@@ -123,12 +123,29 @@ const double* ColumnOf(const Quantities& quantities, const Eigen::MatrixXd& dela
 void Candidate::Evaluate(const Quantities& quantities, const std::vector<double>& eta,
                          std::vector<std::vector<VectorXd>>& value, std::optional<double> time_s) const {
   value.assign(columns(eta), std::vector<VectorXd>(rows_.size()));
-  for (std::size_t first = 0, at = 0; first < value.size(); first += instance_.columns.size(), at += unknowns().size())
-    EvaluateUse(quantities, eta.data() + at, time_s, &value[first]);
+  for (std::size_t first = 0, at = 0; first < value.size();
+       first += instance_.columns.size(), at += unknowns().size()) {
+    std::vector<double*> out;
+    for (const auto& [c, r] : root_) {
+      value[first + static_cast<std::size_t>(c)][r].resize(quantities.data->samples());
+      out.push_back(value[first + static_cast<std::size_t>(c)][r].data());
+    }
+    Run(*tape_, states_, quantities, eta.data() + at, time_s, out);
+  }
 }
 
-void Candidate::EvaluateUse(const Quantities& quantities, const double* eta, std::optional<double> time_s,
-                            std::vector<VectorXd>* value) const {
+VectorXd Candidate::Settled(const Quantities& quantities, const std::vector<double>& eta) const {
+  if (instance_.settled.empty()) return {};
+  const codegen::Tape tape(*graph_, instance_.settled);
+  Eigen::MatrixXd each(quantities.data->samples(), static_cast<Eigen::Index>(instance_.settled.size()));
+  std::vector<double*> out;
+  for (auto column : each.colwise()) out.push_back(column.data());
+  Run(tape, codegen::StatesOf(*graph_, instance_.settled), quantities, eta.data(), {}, out);
+  return each.rowwise().minCoeff();
+}
+
+void Candidate::Run(const codegen::Tape& tape, const std::vector<char>& wanted, const Quantities& quantities,
+                    const double* eta, std::optional<double> time_s, std::span<double* const> out) const {
   const int samples = quantities.data->samples();
   const auto& states = graph_->states();
   const Eigen::MatrixXd delayed = reads(codegen::Quantity::kDelayedTorque)
@@ -151,16 +168,11 @@ void Candidate::EvaluateUse(const Quantities& quantities, const double* eta, std
   }
   Eigen::MatrixXd path;
   if (!states.empty()) {
-    path = codegen::StatePath(*graph_, states.size(), bindings, samples, quantities.restart, states_);
+    path = codegen::StatePath(*graph_, states.size(), bindings, samples, quantities.restart, wanted);
     for (std::size_t k = 0; k < states.size(); ++k)
       bindings[graph_->nodes()[states[k].value.id()].a].column = path.col(static_cast<Eigen::Index>(k)).data();
   }
-  std::vector<double*> out;
-  for (const auto& [c, r] : root_) {
-    value[c][r].resize(samples);
-    out.push_back(value[c][r].data());
-  }
-  tape_->Evaluate(bindings, samples, out);
+  tape.Evaluate(bindings, samples, out);
 }
 
 std::vector<std::unique_ptr<Candidate>> MakeCandidates(const codegen::Catalogue& catalogue,

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -60,13 +61,18 @@ class Candidate {
   void Evaluate(const Quantities& quantities, const std::vector<double>& eta,
                 std::vector<std::vector<Eigen::VectorXd>>& value, std::optional<double> time_s = {}) const;
 
+  // 1 at each sample where its states no longer remember how they started, 0 elsewhere, N values; empty: it has none
+  // that forget.
+  Eigen::VectorXd Settled(const Quantities& quantities, const std::vector<double>& eta) const;
+
   std::vector<double> Initial() const;
   // The unknown that says by how much the measurement is delayed; -1 if the record is of another kind.
   int delay() const;
 
  private:
-  void EvaluateUse(const Quantities& quantities, const double* eta, std::optional<double> time_s,
-                   std::vector<Eigen::VectorXd>* value) const;
+  // The values of some roots of the graph over a log; out: one for each root, N values.
+  void Run(const codegen::Tape& tape, const std::vector<char>& states, const Quantities& quantities, const double* eta,
+           std::optional<double> time_s, std::span<double* const> out) const;
 
   std::unique_ptr<codegen::Graph> graph_ = std::make_unique<codegen::Graph>();
   codegen::EffectInstance instance_;

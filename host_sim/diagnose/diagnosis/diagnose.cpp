@@ -112,6 +112,7 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
     w.chosen.push_back(next);
     ApplyDelay(w);
+    w.LeaveOutUnsettled(w.chosen.back());
     // A term that was found while another one was still unknown is a little wrong, and its error looks like further
     // terms. What shows near turns and at rest is slow to search, and other joints hardly move it.
     for (std::size_t k = 0; k + 1 < w.chosen.size(); ++k) {

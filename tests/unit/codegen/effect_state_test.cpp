@@ -87,6 +87,26 @@ TEST(StatefulEffects, Backlash_EqualsAPinInARing) {
   }
 }
 
+// A cell is a spring between the joint and a block that slips where the spring is at its length: four of them.
+TEST(StatefulEffects, HysteresisLoops_EqualSpringsAndBlocksThatSlip) {
+  const double shortest = 5e-4;
+  const Log log = Reversals();
+  const auto& q = log.at("q2");
+  EffectRun run("hysteresis_loops");
+  for (int cell = 0; cell < 4; ++cell) {
+    const double length = shortest * std::pow(4, cell);
+    const auto column = run.Column(cell, 1, log, {{"L", shortest}});
+    double block = q[0];
+    for (std::size_t k = 0; k < q.size(); ++k) {
+      for (int i = 1; k > 0 && i <= 1000; ++i) {
+        const double joint = q[k - 1] + (q[k] - q[k - 1]) * i / 1000;
+        if (std::abs(joint - block) > length) block = joint - std::copysign(length, joint - block);
+      }
+      ASSERT_NEAR(column[k], (q[k] - block) / length - Sign(log.at("qd2")[k]), 1e-9) << cell << " " << k;
+    }
+  }
+}
+
 // The flank's place follows the load's sign through T y' = x - y twice; every row has -gap/2 M times its acceleration.
 // The load is straight between samples.
 TEST(StatefulEffects, BacklashUnderLoad_EqualsFineIntegration) {
@@ -173,7 +193,8 @@ TEST(StatefulEffects, TwoHalfSteps_EqualOneWhole) {
   Log once = log;
   once["qdd2"] = log.at("qd2");
   once["M1_1"].assign(log.at("q2").size(), 1);
-  for (const std::string record : {"presliding_dahl", "presliding_lugre", "backlash", "belt_elasticity"}) {
+  for (const std::string record :
+       {"presliding_dahl", "presliding_lugre", "backlash", "belt_elasticity", "hysteresis_loops"}) {
     EffectRun run(record);
     const auto whole = run.Column(0, 1, once), half = run.Column(0, 1, twice);
     for (std::size_t k = 0; k < whole.size(); ++k) ASSERT_NEAR(half[2 * k + 1], whole[k], 1e-12) << record << " " << k;

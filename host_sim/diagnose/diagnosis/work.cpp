@@ -249,7 +249,7 @@ void Diagnosis::Work::LeaveOutUnsettled(const Chosen& term) {
   for (std::size_t log = 0; log < train.size(); ++log) {
     if (known_start.empty()) keeps.push_back(Eigen::MatrixXi::Ones(train[log]->samples(), model.joints()));
     const Eigen::ArrayXi knows = (term.candidate->Settled(evidence.logs[log], term.eta).array() > 0.5).cast<int>();
-    if (knows.maxCoeff() == 0) continue;  // it never does: nothing of the log would be left
+    if (2 * knows.count() < knows.size()) continue;  // too little of the log would be left
     for (const int j : term.candidate->rows())
       if (!train[log]->averaged(j)) keeps[log].col(j).array() *= knows;
     all &= keeps[log].all();

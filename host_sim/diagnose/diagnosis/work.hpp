@@ -79,8 +79,8 @@ struct Diagnosis::Work {
   // From now on, shifts the motion of the logs against their torque by the delay that the confirmed terms found.
   void AlignLogs();
   void SetDelay(double by_s);
-  // From now on, leaves out the samples at which this term does not know its states yet: what a joint did before a log
-  // began says how friction begins in it. Not where rows are averages: those are few.
+  // From now on, leaves out the rows in which this term does not know its states yet, because a log does not say how
+  // the joint moved before it began. Not where rows are averages, and not if half of the log would go.
   void LeaveOutUnsettled(const Chosen& term);
   // From now on, fits these joints also near turns and at rest. (1: yes)
   void ShowTurns(const std::vector<char>& joints);
@@ -105,7 +105,7 @@ struct Diagnosis::Work {
   std::vector<const calibration::Dataset*> logged;  // as given
   std::vector<calibration::Dataset> changed;        // train points here once a delay or turns have been applied
   double delay_s = 0;                               // applied
-  std::vector<Eigen::MatrixXi> known_start;         // [log] N x n, 0: a row that LeaveOutUnsettled leaves out; or empty
+  std::vector<Eigen::MatrixXi> known_start;         // [log] N x n, 0: left out by LeaveOutUnsettled; or empty
   std::vector<char> turns;                          // [joint] 1: rows near turns and at rest are fitted, too
   bool knocks = false;                              // rows are weighed by their knocks
   Eigen::VectorXd turn_weight;                      // [joint] of these rows

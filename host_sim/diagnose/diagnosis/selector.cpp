@@ -517,6 +517,14 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
   (void)grounds.metric().RefittedDeviance(c, &noise);
   const Metric metric(w_.rows, noise);
   const Gain gain = metric.Try(c);
+  // A curve beside a cause is held to what the cause leaves. The same curve once more would only undo that.
+  for (const Chosen* t : terms) {
+    if (t->candidate != f.candidate) continue;
+    const auto [taken, own] = metric.Imitates(GatherColumns(*t->candidate, w_.evidence, t->eta), c, gain.amplitude);
+    if (own - taken > kImitated * own) continue;
+    refused_[f.candidate] = "it is in the model already";
+    return false;
+  }
   const VectorXd folds = metric.FoldGains(c, kBlocks, kFolds, f.precision);
   // What a curve's freedom gains by chance is not kept. A surface has so much freedom that it must keep all the same.
   const double gained = f.curve && !f.candidate->is_surface() ? f.curve->Evidence(gain.gain) : gain.gain;

@@ -5,7 +5,7 @@
 # simulate, record, identify and diagnose, twice. The simulated arm has bodies, friction and rotors of its own. The first
 # time nothing else is undeclared: the verdict must be `none`, and the error on the held-out log at most 1.05 times the
 # noise of the torque. The second time one effect is undeclared: the verdict must name it on its joint, and nothing on
-# another joint. Further arms are imported only, and their models made.
+# another joint, and no contact. Further arms are imported only, and their models made.
 import concurrent.futures
 import contextlib
 import json
@@ -40,10 +40,11 @@ THROUGH = {
                   'kind = "cable_pack"\nstiffness_Nmprad = 0.6\nstiffening_rad = 0.6', ("--tip", "left_wrist")),
     "iiwa": Arm(f"{BULLET}/kuka_iiwa/model.urdf", "cable_pack position_torque", 6,
                 'kind = "cable_pack"\nstiffness_Nmprad = 3\nstiffening_rad = 0.6'),
+    "ur3": Arm(f"{PUBLIC}/ur_description/urdf/ur3_gripper.urdf", "presliding_dahl presliding_lugre hysteresis", 2,
+               'kind = "presliding_dahl"\nlength_rad = 0.01'),
     "xarm6": Arm(f"{BULLET}/xarm/xarm6_with_gripper.urdf", "torque_offset", 5, 'kind = "torque_offset"\ntorque_Nm = 1'),
 }
 IMPORTED = {
-    "ur3": Arm(f"{PUBLIC}/ur_description/urdf/ur3_gripper.urdf"),
     "ur10": Arm(f"{PUBLIC}/ur_description/urdf/ur10_joint_limited_robot.urdf"),
     "xarm7": Arm(f"{PUBLIC}/xarm_description/urdf/xarm7.urdf"),
     "z1": Arm(f"{PUBLIC}/z1_description/urdf/z1.urdf"),
@@ -139,7 +140,7 @@ def through(armcal, folder, collections, name, seed):
     terms = confirmed(bench.result("diagnose", bench.logs("effect", seed + 10, f"[[effect]]\njoint = {arm.joint}\n{arm.effect}")))
     if not any(term["kind"] in arm.kinds and term["joint"] == arm.joint for term in terms):
         faults.append(f"{name}: {arm.kinds[0]} on joint {arm.joint} is undeclared, and the verdict names {said(terms)}")
-    if any(term["joint"] != arm.joint for term in terms):
+    if any(term["joint"] != arm.joint or term["training_only"] for term in terms):
         faults.append(f"{name}: only joint {arm.joint} has an undeclared effect, and the verdict names {said(terms)}")
     print(f"{name}: error / noise {', '.join(f'{r:.3f}' for r in ratio)}; then {said(terms)}", flush=True)
     return faults

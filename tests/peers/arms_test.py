@@ -141,7 +141,7 @@ def through(armcal, folder, collections, name, seed):
     if not any(term["kind"] in arm.kinds and term["joint"] == arm.joint for term in terms):
         faults.append(f"{name}: {arm.kinds[0]} on joint {arm.joint} is undeclared, and the verdict names {said(terms)}")
     if any(term["joint"] != arm.joint or term["training_only"] for term in terms):
-        faults.append(f"{name}: only joint {arm.joint} has an undeclared effect, and the verdict names {said(terms)}")
+        faults.append(f"{name}: only joint {arm.joint} has an undeclared effect, nothing touches the arm, and the verdict names {said(terms)}")
     print(f"{name}: error / noise {', '.join(f'{r:.3f}' for r in ratio)}; then {said(terms)}", flush=True)
     return faults
 

@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kTried = 10;     // members of a usual grid
-constexpr double kUnseen = 1e-4;  // of a column's own square: so little beside the declared model is rounding
+constexpr double kRounding = 1e-4;  // of a column's own square: so little beside the declared model is rounding
 
 // What a term must gain to be accepted.
 double Needed(Candidate& c, const std::vector<double>& eta, const Evidence& evidence) {
@@ -66,7 +66,7 @@ std::vector<Limit> DetectionLimits(Diagnosis::Work& w) {
       const double seen = metric.Imitates(columns, columns, a).second;
       const auto at = static_cast<std::size_t>(largest);
       const double own = w.rows.index[at].size() * std::pow(size / noise[at].innovation, 2);
-      if (!(seen > kUnseen * own)) continue;
+      if (!(seen > kRounding * own)) continue;
       const double rms = size * std::sqrt(Needed(*c, eta, w.evidence) / seen);
       if (rms < limit.rms_Nm) limit.rms_Nm = rms, limit.joint = largest;
     }

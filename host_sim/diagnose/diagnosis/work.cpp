@@ -120,6 +120,7 @@ Diagnosis::Work::Work(const codegen::Model& m, const codegen::Catalogue& catalog
   evidence.model = &model;
   turns.assign(static_cast<std::size_t>(model.joints()), 0);
   turn_weight.setOnes(model.joints());
+  for (const auto* log : logged) known_start.push_back(Eigen::MatrixXi::Ones(log->samples(), model.joints()));
   IndexRows();
 }
 
@@ -245,16 +246,13 @@ void Diagnosis::Work::LeaveOutUnsettled(const Chosen& term) {
   if (term.candidate->instance().settled.empty()) return;
   FollowEstimate(Reads({}, term.candidate));
   std::vector<Eigen::MatrixXi> keeps = known_start;
-  bool all = true;
   for (std::size_t log = 0; log < train.size(); ++log) {
-    if (known_start.empty()) keeps.push_back(Eigen::MatrixXi::Ones(train[log]->samples(), model.joints()));
     const Eigen::ArrayXi knows = (term.candidate->Settled(evidence.logs[log], term.eta).array() > 0.5).cast<int>();
     if (2 * knows.count() < knows.size()) continue;  // too little of the log would be left
     for (const int j : term.candidate->rows())
       if (!train[log]->averaged(j)) keeps[log].col(j).array() *= knows;
-    all &= keeps[log].all();
   }
-  if (all || keeps == known_start) return;
+  if (keeps == known_start) return;
   known_start = std::move(keeps);
   MakeTrain();
   if (narrow) narrow->known_start = known_start, narrow->MakeTrain();
@@ -271,13 +269,10 @@ void Diagnosis::Work::ShowTurns(const std::vector<char>& joints) {
 // The logs as delay, turns and terms with memory ask for them.
 void Diagnosis::Work::MakeTrain() {
   changed.clear();
-  for (const auto* log : logged) {
-    const std::size_t number = changed.size();
-    changed.push_back(delay_s != 0 ? calibration::Delayed(*log, delay_s) : *log);
-    if (!known_start.empty()) {
-      changed.back().used.array() *= known_start[number].array();
-      if (changed.back().sound.size() > 0) changed.back().sound.array() *= known_start[number].array();
-    }
+  for (std::size_t log = 0; log < logged.size(); ++log) {
+    changed.push_back(delay_s != 0 ? calibration::Delayed(*logged[log], delay_s) : *logged[log]);
+    for (Eigen::MatrixXi* rows_in : {&changed.back().used, &changed.back().sound})
+      if (rows_in->size() > 0) rows_in->array() *= known_start[log].array();
     for (int j = 0; j < model.joints(); ++j)
       if (turns[static_cast<std::size_t>(j)]) calibration::UseTurns(changed.back(), j);
   }

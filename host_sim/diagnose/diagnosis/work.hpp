@@ -105,7 +105,7 @@ struct Diagnosis::Work {
   std::vector<const calibration::Dataset*> logged;  // as given
   std::vector<calibration::Dataset> changed;        // train points here once a delay or turns have been applied
   double delay_s = 0;                               // applied
-  std::vector<Eigen::MatrixXi> known_start;         // [log] N x n, 0: left out by LeaveOutUnsettled; or empty
+  std::vector<Eigen::MatrixXi> known_start;         // [log] N x n, 0: LeaveOutUnsettled leaves it out
   std::vector<char> turns;                          // [joint] 1: rows near turns and at rest are fitted, too
   bool knocks = false;                              // rows are weighed by their knocks
   Eigen::VectorXd turn_weight;                      // [joint] of these rows

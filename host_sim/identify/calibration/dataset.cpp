@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/logs/quintic_spline.hpp"

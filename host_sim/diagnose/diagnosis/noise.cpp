@@ -1,4 +1,4 @@
-// diagnosis - fits the noise model by Yule-Walker, and whitens the stretches of a log that have no gap.
+// diagnosis - fits the noise model by Burg's method, and whitens the stretches of a log that have no gap.
 #include "host_sim/diagnose/diagnosis/noise.hpp"
 
 #include <algorithm>
@@ -15,11 +15,15 @@ namespace {
 constexpr int kPairsOfALag = 20;    // for each coefficient before it
 constexpr double kSurest = 0.9995;  // of a reflection: nothing is foreseen entirely
 
-// position of each row in its segment
-std::vector<int> PlaceInSegment(const RowIndex& rows) {
-  std::vector<int> place(rows.size());
-  for (int k = 0; k < rows.size(); ++k) place[k] = rows.segment_begin[k] ? 0 : place[k - 1] + 1;
-  return place;
+// First row of each stretch without gaps, and the row after its last one.
+std::vector<std::pair<int, int>> Stretches(const RowIndex& rows) {
+  std::vector<std::pair<int, int>> out;
+  for (int begin = 0, end = 0; begin < rows.size(); begin = end) {
+    end = begin + 1;
+    while (end < rows.size() && !rows.segment_begin[end]) ++end;
+    out.emplace_back(begin, end);
+  }
+  return out;
 }
 
 // A stretch without gaps.
@@ -85,33 +89,40 @@ double SlowNoise(const NoiseModel& noise) { return noise.innovation / (1 - noise
 
 NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
   NoiseModel noise;
-  const std::vector<int> place = PlaceInSegment(rows);
-  VectorXd r = VectorXd::Zero(kMostOrder + 1);
-  Eigen::VectorXi count = Eigen::VectorXi::Zero(kMostOrder + 1);
-  for (int k = 0; k < rows.size(); ++k)
-    for (int lag = 0; lag <= std::min(kMostOrder, place[k]); ++lag) r[lag] += e[k] * e[k - lag], ++count[lag];
-  if (count[0] == 0) return noise;
-  noise.innovation = std::sqrt(std::max(r[0] / count[0], 1e-24));
-  int most = 0;  // too few pairs tell nothing of a lag
-  while (most < kMostOrder && count[most + 1] >= kPairsOfALag * (most + 1)) ++most;
-  r.head(most + 1).array() /= count.head(most + 1).cast<double>().array();
-  // Levinson and Durbin: stays stable where a plain solve may not.
+  if (rows.size() == 0) return noise;
+  const double count = rows.size();
+  std::vector<double> power{std::max(e.squaredNorm() / count, 1e-48)};  // what each order leaves
+  noise.innovation = std::sqrt(std::max(power[0], 1e-24));
+  const std::vector<std::pair<int, int>> stretches = Stretches(rows);
+  VectorXd ahead = e, back = e;  // what is left of a row by the rows before it, and by those after it
   std::vector<VectorXd> predictor{VectorXd()};
-  std::vector<double> power{r[0]};
-  const double rows_of_all = rows.size();
-  double least = rows_of_all * std::log(std::max(r[0], 1e-48));
+  double least = count * std::log(power[0]);
   int order = 0;
-  for (int m = 0; m < most && power[m] > 1e-48; ++m) {
-    const VectorXd& before = predictor[static_cast<std::size_t>(m)];
-    double reflection = r[m + 1];
-    for (int i = 0; i < m; ++i) reflection -= before[i] * r[m - i];
-    reflection = std::clamp(reflection / power[m], -kSurest, kSurest);
+  for (int m = 0; m < kMostOrder && power.back() > 1e-48; ++m) {
+    double product = 0, squares = 0;
+    int pairs = 0;
+    for (const auto& [begin, end] : stretches) {
+      const int size = end - begin - m - 1;
+      if (size <= 0) continue;
+      const auto later = ahead.segment(begin + m + 1, size), earlier = back.segment(begin + m, size);
+      product += later.dot(earlier), squares += later.squaredNorm() + earlier.squaredNorm();
+      pairs += size;
+    }
+    if (pairs < kPairsOfALag * (m + 1) || squares <= 0) break;  // too few pairs tell nothing of a lag
+    const double reflection = std::clamp(2 * product / squares, -kSurest, kSurest);
+    for (const auto& [begin, end] : stretches)
+      for (int k = end - 1; k > begin + m; --k) {
+        const double before = ahead[k];
+        ahead[k] -= reflection * back[k - 1];
+        back[k] = back[k - 1] - reflection * before;
+      }
+    const VectorXd& shorter = predictor.back();
     VectorXd next(m + 1);
-    for (int i = 0; i < m; ++i) next[i] = before[i] - reflection * before[m - 1 - i];
+    for (int i = 0; i < m; ++i) next[i] = shorter[i] - reflection * shorter[m - 1 - i];
     next[m] = reflection;
-    power.push_back(power[m] * (1 - reflection * reflection));
+    power.push_back(power.back() * (1 - reflection * reflection));
     predictor.push_back(std::move(next));
-    const double deviance = rows_of_all * std::log(power[m + 1]) + (m + 1) * std::log(rows_of_all);
+    const double deviance = count * std::log(power.back()) + (m + 1) * std::log(count);
     if (deviance < least) least = deviance, order = m + 1;
   }
   if (order == 0) return noise;
@@ -119,8 +130,8 @@ NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
   for (int p = 0; p < order; ++p) noise.start_sd.push_back(std::sqrt(power[p] / power[order]));
   predictor.resize(static_cast<std::size_t>(order));
   noise.start = std::move(predictor);
-  // What the coefficients really leave. The recursion's own figure is too small where a slow residual is broken into
-  // segments: an effect still inside would then look like less noise than there is.
+  // What the coefficients really leave. The recursion's own figure leaves out the first rows of each stretch: an effect
+  // still inside would then look like less noise than there is.
   noise.innovation = 1;
   noise.innovation = std::sqrt(std::max(Whiten(noise, rows, e).squaredNorm() / rows.size(), 1e-24));
   return noise;
@@ -129,19 +140,17 @@ NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
 double Deviance(const NoiseModel& noise, const RowIndex& rows) {
   double sum = 2 * rows.size() * std::log(noise.innovation) + noise.order() * std::log(std::max(2, rows.size()));
   if (IsWhite(noise)) return sum;
-  for (const int place : PlaceInSegment(rows))
-    if (place < noise.order()) sum += 2 * std::log(noise.start_sd[static_cast<std::size_t>(place)]);
+  for (const auto& [begin, end] : Stretches(rows))
+    for (int place = 0; place < std::min(noise.order(), end - begin); ++place)
+      sum += 2 * std::log(noise.start_sd[static_cast<std::size_t>(place)]);
   return sum;
 }
 
 VectorXd Whiten(const NoiseModel& noise, const RowIndex& rows, const Eigen::Ref<const VectorXd>& v) {
   if (IsWhite(noise)) return v / noise.innovation;
   VectorXd out(v.size());
-  for (int begin = 0, end = 0; begin < rows.size(); begin = end) {
-    end = begin + 1;
-    while (end < rows.size() && !rows.segment_begin[end]) ++end;
+  for (const auto& [begin, end] : Stretches(rows))
     WhitenStretch(noise, v.data() + begin, end - begin, out.data() + begin);
-  }
   return out;
 }
 

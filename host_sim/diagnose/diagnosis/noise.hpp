@@ -47,8 +47,9 @@ bool IsWhite(const NoiseModel& noise);
 // The deviation of white noise that would be as large as this one for what is slow.
 double SlowNoise(const NoiseModel& noise);
 
-// Yule-Walker over segments; the order is that of the least deviance with its penalty, zero where the rows are too few
-// or too broken up.
+// Burg's method over the segments (Burg 1975): reflections that leave least of the rows themselves. Autocovariances
+// over segments need not be those of any process where the noise is slow, and Yule-Walker then leaves more than there
+// was. The order is that of the least deviance with its penalty, zero where the rows are too few or too broken up.
 NoiseModel FitNoise(const RowIndex& rows, const Eigen::VectorXd& residual);
 
 // -2 log likelihood of the residual that the model was fitted to, up to a constant, and log(rows) for each coefficient.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
+#include <random>
 
 #include "host_sim/diagnose/diagnosis/gain_on_log.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
@@ -68,6 +69,26 @@ TEST(AddedBy, IsTheGainOfBothLogsTogether_LessThatOfTraining) {
     // AddedBy takes for noise what the term leaves, which is a few percent less than what the declared model leaves.
     EXPECT_NEAR(AddedBy(work, log, term, {}), expected, 0.05 * std::abs(expected));
   }
+}
+
+// With the term a log leaves white noise, without it 1.2 times that. A knock in every 97th row is 50 times the noise.
+TEST(GainOn, OfALogWithKnocks_IsAboutThatOfItsOtherRows) {
+  tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 6);
+  const Dataset log = arm.Run(16, 62);
+  const codegen::Catalogue records{{"viscous_cubic", tests::Records().at("viscous_cubic")}};
+  Diagnosis::Work work(arm.model(), records, {&log});
+  const auto& candidates = work.candidates;
+  const auto own = std::find_if(candidates.begin(), candidates.end(),
+                                [](const auto& c) { return c->joints() == std::vector<int>{kJoint}; });
+  ASSERT_NE(own, candidates.end());
+  std::mt19937_64 random(63);
+  std::normal_distribution<double> normal;
+  MatrixXd with = MatrixXd::Zero(log.samples(), log.joints());
+  for (int k = 0; k < log.samples(); ++k) with(k, kJoint) = normal(random);
+  MatrixXd without = 1.2 * with;
+  for (int k = 0; k < log.samples(); k += 97) with(k, kJoint) += 50, without(k, kJoint) += 50;
+  const double expected = log.used.col(kJoint).sum() * 2 * std::log(1.2);
+  EXPECT_NEAR(GainOn(log, **own, without, with), expected, 0.3 * expected);
 }
 
 }  // namespace

@@ -66,6 +66,31 @@ TEST(FitNoise, OfAKnownProcess_RecoversItsCoefficients) {
   }
 }
 
+// A torque drifts by up to 100 times the white noise, whose deviation is 1, in stretches of unequal lengths. Rows with
+// 30 rows before them can be foreseen up to that noise.
+TEST(FitNoise, OfATorqueThatDrifts_LeavesTheWhiteNoise) {
+  for (const double level : {10, 30, 100})
+    for (const std::uint64_t seed : {11U, 12U, 13U}) {
+      std::mt19937_64 random(seed);
+      std::normal_distribution<double> normal;
+      std::uniform_real_distribution<double> part;
+      RowIndex rows = Rows(8000, 8000);
+      for (char& begin : rows.segment_begin) begin = part(random) < 0.01;
+      rows.segment_begin[0] = 1;
+      VectorXd e(rows.size());
+      for (int k = 0; k < e.size(); ++k)
+        e[k] = level * (1 + 0.5 * std::sin(k * 2 * M_PI / 2000) - std::exp(-k / 1800.0)) + normal(random);
+      const NoiseModel noise = FitNoise(rows, e);
+      const VectorXd white = noise.innovation * Whiten(noise, rows, e);
+      std::vector<double> later;
+      for (int k = 100; k < e.size(); ++k)
+        if (std::none_of(rows.segment_begin.begin() + k - 30, rows.segment_begin.begin() + k + 1,
+                         [](char b) { return b; }))
+          later.push_back(std::abs(white[k]));
+      EXPECT_NEAR(1.4826 * Median(later), 1, 0.2) << level << " " << seed;
+    }
+}
+
 TEST(FitNoise, OfTooFewRows_IsWhite) {
   const RowIndex rows = Rows(10, 10);
   const VectorXd e = Coloured(rows, 1);

@@ -13,8 +13,10 @@
 #include "host_sim/data/bags/child.hpp"
 #include "host_sim/data/bags/cursor.hpp"
 #include "host_sim/data/bags/flat.hpp"
+#include "host_sim/data/bags/mapped_file.hpp"
 #include "host_sim/data/bags/one_line.hpp"
 #include "host_sim/data/bags/unpack.hpp"
+#include "host_sim/data/bags/whole_mat.hpp"
 
 namespace armcal::bags {
 
@@ -111,7 +113,10 @@ class MatReader {
       const std::unique_ptr<matvar_t, FreeVariable> variable(next);
       if (next->name == nullptr) throw io::InputError("is damaged or cut short");
       std::size_t bytes = 0;
-      if (!CountBytes(*next, bytes, 0)) continue;  // holds no numbers
+      if (!CountBytes(*next, bytes, 0)) {
+        if (const std::string what = WhatHoldsNone(*next); !what.empty()) ignored_.push_back(next->name + what);
+        continue;
+      }
       if (bytes > most_bytes_)
         throw io::InputError(fmt::format("{} claims more numbers than the file can hold", next->name));
       if (Mat_VarReadDataAll(file_.get(), next) != 0) throw io::InputError("is damaged or cut short");
@@ -136,6 +141,19 @@ class MatReader {
         any = CountBytes(field, bytes, depth + 1) || any;
       });
     return any;
+  }
+
+  // Of a variable that may well hold numbers, but not as an array.
+  static std::string WhatHoldsNone(const matvar_t& variable) {
+    switch (variable.class_type) {
+      case MAT_C_CELL:
+        return " (a cell array)";
+      case MAT_C_OBJECT:
+      case MAT_C_OPAQUE:
+        return " (an object)";
+      default:
+        return "";
+    }
   }
 
   // Calls each(field, what stands behind the struct's name).
@@ -207,7 +225,12 @@ class MatReader {
   }
 
   files::NumericTable Finish() {
-    if (columns_.empty() && ignored_.empty()) throw io::InputError("holds no vector and no matrix of numbers");
+    if (columns_.empty() && (wanted_.empty() || ignored_.empty()))
+      throw io::InputError(ignored_.empty()
+                               ? "holds no vector and no matrix of numbers"
+                               : fmt::format("holds no vector and no matrix of numbers, only {}; save the numbers "
+                                             "themselves, of a timeseries ts.Time and ts.Data",
+                                             fmt::join(ignored_, ", ")));
     files::NumericTable table;
     std::map<std::size_t, int> lengths;
     for (const auto& [name, values] : columns_) ++lengths[values.size()];
@@ -282,6 +305,7 @@ files::NumericTable ReadMat(const std::filesystem::path& path, const std::vector
   if (none) throw io::InputError(path.string() + ": cannot be opened");
   const auto most_s = static_cast<unsigned>(kFree_s + size / kSlowest_bytes_per_s);
   try {
+    CheckWhole(MappedFile(path).bytes());
     return TableOf(InChild([&] { return BytesOf(MatReader(path, columns).Read()); }, most_s));
   } catch (const io::InputError& error) {
     throw io::InputError(path.string() + ": " + OneLine(error.what()));

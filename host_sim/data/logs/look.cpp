@@ -1,6 +1,8 @@
 // logs - reads all columns of a log.
 #include "host_sim/data/logs/look.hpp"
 
+#include <fmt/format.h>
+
 #include "host_sim/data/bags/mat.hpp"
 #include "host_sim/data/bags/recording.hpp"
 #include "host_sim/data/logs/table.hpp"
@@ -20,6 +22,9 @@ Look LookAt(const std::filesystem::path& path, const std::vector<std::filesystem
   if (bags::IsMat(path)) {
     look.format = "MATLAB";
     all.series.numbers = bags::ReadMat(path, {});
+    if (const auto& ignored = all.series.numbers.ignored; !ignored.empty())
+      look.notes.push_back(fmt::format("left out, because not arrays of {} numbers a column: {}",
+                                       all.series.numbers.values.rows(), fmt::join(ignored, ", ")));
     return look;
   }
   look.format = "CSV";

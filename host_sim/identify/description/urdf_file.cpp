@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "codegen/src/io/input_error.hpp"
 #include "codegen/src/robot/urdf.hpp"
@@ -30,13 +31,35 @@ Body Without(const Body& body, const std::vector<Body>& parts) {
   return rest;
 }
 
-std::string InertialText(const Body& b, const std::string& indent) {
+// What stands in an element: a name and its attributes.
+struct Content {
+  std::string element;
+  std::vector<std::pair<std::string, std::string>> attribute;
+
+  std::string Text() const {
+    std::string text = "<" + element;
+    for (const auto& [name, value] : attribute) text += fmt::format(" {}=\"{}\"", name, value);
+    return text + "/>";
+  }
+};
+
+std::vector<Content> InertialOf(const Body& b) {
   const Eigen::Matrix3d& I = b.inertia;
-  return fmt::format(
-      "<inertial>\n{0}  <origin xyz=\"{1}\" rpy=\"0 0 0\"/>\n{0}  <mass value=\"{2}\"/>\n{0}  <inertia ixx=\"{3}\" "
-      "ixy=\"{4}\" ixz=\"{5}\" iyy=\"{6}\" iyz=\"{7}\" izz=\"{8}\"/>\n{0}</inertial>",
-      indent, Exact(b.center), Exact(b.mass), Exact(I(0, 0)), Exact(I(0, 1)), Exact(I(0, 2)), Exact(I(1, 1)),
-      Exact(I(1, 2)), Exact(I(2, 2)));
+  return {{"origin", {{"xyz", Exact(b.center)}, {"rpy", "0 0 0"}}},
+          {"mass", {{"value", Exact(b.mass)}}},
+          {"inertia",
+           {{"ixx", Exact(I(0, 0))},
+            {"ixy", Exact(I(0, 1))},
+            {"ixz", Exact(I(0, 2))},
+            {"iyy", Exact(I(1, 1))},
+            {"iyz", Exact(I(1, 2))},
+            {"izz", Exact(I(2, 2))}}}};
+}
+
+std::string InertialText(const Body& b) {
+  std::string text = "<inertial>\n";
+  for (const Content& c : InertialOf(b)) text += "      " + c.Text() + "\n";
+  return text + "    </inertial>";
 }
 
 // Changes of a text at places of the original; applied from the end.
@@ -48,6 +71,31 @@ class Edits {
     for (const XmlElement& e : root_.child)
       if (e.name == element && e.name_attribute == name) return e;
     throw io::InputError(file_ + ": " + element + " \"" + name + "\": not found as an element of its own");
+  }
+  // These attributes get these values. All else of the element stays.
+  void SetAttributes(const XmlElement& e, const Content& content) {
+    std::string added;
+    for (const auto& [name, value] : content.attribute) {
+      const auto same = [&name = name](const XmlAttribute& a) { return a.name == name; };
+      const auto known = std::find_if(e.attribute.begin(), e.attribute.end(), same);
+      if (known != e.attribute.end()) edit_.push_back({known->begin, known->end, value});
+      else added += fmt::format(" {}=\"{}\"", name, value);
+    }
+    const std::size_t behind_name = e.begin + 1 + e.name.size();
+    if (!added.empty()) edit_.push_back({behind_name, behind_name, added});
+  }
+  void SetInertial(const XmlElement& link, const Body& body) {
+    const XmlElement* inertial = link.Find("inertial");
+    if (!inertial || inertial->empty_tag) return SetChild(link, "inertial", InertialText(body));
+    std::string added;
+    for (const Content& c : InertialOf(body))
+      if (const XmlElement* child = inertial->Find(c.element)) SetAttributes(*child, c);
+      else added += "\n      " + c.Text();
+    if (!added.empty()) edit_.push_back({inertial->inside, inertial->inside, added});
+  }
+  void SetDynamics(const XmlElement& joint, const Content& content) {
+    if (const XmlElement* dynamics = joint.Find("dynamics")) SetAttributes(*dynamics, content);
+    else SetChild(joint, "dynamics", content.Text());
   }
   // The child becomes `with`, or is added; empty: it is taken out.
   void SetChild(const XmlElement& parent, const std::string& child, const std::string& with) {
@@ -115,6 +163,7 @@ Description ToUrdf(const DescribedArm& arm, const std::string& urdf, bool merge)
   Edits edits(file, text);
   io::Faults faults;
   Description d;
+  std::map<std::string, std::vector<std::string>> kept;  // other attributes of <dynamics>, and whose
   for (std::size_t j = 0; j < arm.joint.size(); ++j) {
     const auto& parts = chain.part[j];
     std::vector<Body> fixed;
@@ -133,15 +182,22 @@ Description ToUrdf(const DescribedArm& arm, const std::string& urdf, bool merge)
     if (const std::string missing = codegen::Impossible(rest); !missing.empty())
       faults.Add(file + ": link \"" + parts[0].link + "\" without " + names + ": expected " + missing +
                  "; --merge writes the whole body into it");
-    edits.SetChild(edits.Named("link", parts[0].link), "inertial", InertialText(rest, "    "));
-    edits.SetChild(edits.Named("joint", arm.robot.joint[j].name), "dynamics",
-                   fmt::format("<dynamics damping=\"{}\" friction=\"{}\"/>", Exact(arm.joint[j].viscous_Nmsprad),
-                               Exact(arm.joint[j].coulomb_Nm)));
+    edits.SetInertial(edits.Named("link", parts[0].link), rest);
+    const XmlElement& joint = edits.Named("joint", arm.robot.joint[j].name);
+    edits.SetDynamics(
+        joint,
+        {"dynamics", {{"damping", Exact(arm.joint[j].viscous_Nmsprad)}, {"friction", Exact(arm.joint[j].coulomb_Nm)}}});
+    for (const XmlAttribute& a :
+         joint.Find("dynamics") ? joint.Find("dynamics")->attribute : std::vector<XmlAttribute>())
+      if (a.name != "damping" && a.name != "friction") kept[a.name].push_back(arm.robot.joint[j].name);
     if (merge && !names.empty())
       d.left_out.push_back(fmt::format("inertials of {}: they are in {}", names, parts[0].link));
   }
   faults.ThrowIfAny();
   d.text = edits.Apply();
+  for (const auto& [attribute, joints] : kept)
+    d.left_out.push_back(
+        fmt::format("{} of <dynamics>: the file's own value stays in {}", attribute, fmt::join(joints, ", ")));
   for (const std::string& line : NotInUrdf(arm)) d.left_out.push_back(line);
   return d;
 }

@@ -30,7 +30,9 @@ class Scan {
       e.empty_tag = text_[end - 2] == '/';
       const std::size_t name = text_.find_first_of(" \t\r\n/>", begin + 1);
       e.name = text_.substr(begin + 1, name - begin - 1);
-      e.name_attribute = Attribute("name", name, end);
+      e.attribute = Attributes(name, end);
+      for (const XmlAttribute& a : e.attribute)
+        if (a.name == "name") e.name_attribute = text_.substr(a.begin, a.end - a.begin);
       if (e.empty_tag) open.back().child.push_back(std::move(e));
       else open.push_back(std::move(e));
     }
@@ -60,17 +62,16 @@ class Scan {
     }
     throw io::InputError(file_ + ": XML: a tag without its end");
   }
-  std::string Attribute(const std::string& wanted, std::size_t from, std::size_t to) const {
-    std::size_t at = from;
-    while (true) {
+  std::vector<XmlAttribute> Attributes(std::size_t from, std::size_t to) const {
+    std::vector<XmlAttribute> out;
+    for (std::size_t at = from;;) {
       const std::size_t start = text_.find_first_not_of(" \t\r\n", at);
       const std::size_t equals = text_.find('=', at);
-      if (start >= to || equals >= to) return "";
+      if (start >= to || equals >= to) return out;
       const std::size_t open = text_.find_first_of("\"'", equals);
-      if (open >= to) return "";
+      if (open >= to) return out;
       const std::size_t close = text_.find(text_[open], open + 1);
-      const std::string name = text_.substr(start, text_.find_first_of(" \t\r\n=", start) - start);
-      if (name == wanted) return text_.substr(open + 1, close - open - 1);
+      out.push_back({text_.substr(start, text_.find_first_of(" \t\r\n=", start) - start), open + 1, close});
       at = close + 1;
     }
   }

@@ -7,6 +7,11 @@
 
 namespace armcal::description {
 
+struct XmlAttribute {
+  std::string name;
+  std::size_t begin = 0, end = 0;  // of its value, between the quotes
+};
+
 // An element of the file; positions are bytes of the text.
 struct XmlElement {
   std::string name;
@@ -15,6 +20,7 @@ struct XmlElement {
   std::size_t inside = 0;          // behind its start tag
   std::size_t close = 0;           // where its end tag begins; equals `inside` for <a/>
   bool empty_tag = false;          // <a/>
+  std::vector<XmlAttribute> attribute;
   std::vector<XmlElement> child;
 
   const XmlElement* Find(const std::string& element) const;  // the first child of this name

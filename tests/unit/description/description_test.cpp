@@ -208,6 +208,30 @@ TEST_F(Export, ToUrdf_ChangesNothingElse) {
   EXPECT_EQ(parsed(now), parsed(kUrdf));
 }
 
+// Within the elements that change, too: comments, other elements and other attributes stay.
+TEST_F(Export, ToUrdf_ChangesOnlyTheValuesOfTheElementsItKnows) {
+  std::string text = kUrdf;
+  const auto put = [&text](const std::string& old, const std::string& with) {
+    ASSERT_NE(text.find(old), text.npos) << old;
+    text.replace(text.find(old), old.size(), with);
+  };
+  put("<dynamics damping=\"0.003\" friction=\"0\"/>",
+      "<dynamics mu='16' damping = '0.003' stiffness=\"7\" ><!-- of a bench --><own/></dynamics>");
+  put("<mass value=\"4.2\"/>",
+      "<!-- <mass value=\"9\"/> weighed -->  <mass unit=\"kg\" value='4.2'/><vendor x=\"1\"/>");
+  Write("arm.urdf", text);
+  const Description d = ToUrdf(arm_, "", false);
+  for (const char* kept : {"mu='16' damping = '", "stiffness=\"7\" ><!-- of a bench --><own/></dynamics>",
+                           "<!-- <mass value=\"9\"/> weighed -->  <mass unit=\"kg\" value='", "'/><vendor x=\"1\"/>"})
+    EXPECT_NE(d.text.find(kept), d.text.npos) << kept;
+  EXPECT_EQ(d.text.find("'0.003'"), d.text.npos);
+  for (const char* attribute : {"mu", "stiffness"})
+    EXPECT_EQ(std::count(d.left_out.begin(), d.left_out.end(),
+                         std::string(attribute) + " of <dynamics>: the file's own value stays in turn"),
+              1);
+  EXPECT_LT(Relative(Torques(Tree(d.text), {{"grip", 0.03}}, true), Expected(true)), 1e-9);
+}
+
 TEST_F(Export, ToUrdf_WhereTheRestCannotExist_AsksForMerge) {
   given_.bodies[22] = 0.5;  // lighter than hand and finger
   Eigen::VectorXd c = calibration::ToCentre(given_.bodies.segment(22, 10));

@@ -3,6 +3,7 @@
 
 #include "codegen/src/robot/import_urdf.hpp"
 #include "host_sim/data/report/table.hpp"
+#include "host_sim/identify/collision/clearance.hpp"
 #include "host_sim/tool/verb.hpp"
 
 namespace armcal::tool {
@@ -67,11 +68,14 @@ int Run(const ImportOptions& o) {
   const std::filesystem::path out = o.out.empty() ? StemOf(o.urdf) + ".toml" : o.out;
   if (std::filesystem::exists(out) && !o.overwrite)
     throw io::InputError(out.string() + ": is there already; --overwrite replaces it");
-  const codegen::ImportedRobot robot =
-      codegen::ImportUrdf({o.urdf, o.tip, Held(o.fixed), Packages(o.packages)}, name, out);
+  codegen::ImportedRobot robot = codegen::ImportUrdf({o.urdf, o.tip, Held(o.fixed), Packages(o.packages)}, name, out);
   files::WriteWholeFile(out, robot.text);
   const codegen::Robot read = codegen::ReadRobot(out);
+  for (const std::string& fault : collision::MeshFaults(read))
+    robot.said.push_back(fault + ": collisions cannot be checked");
   PrintGuesses(robot);
+  fmt::print("the arm's joints: {}; it ends at {}\n", fmt::join(robot.joints, ", "),
+             robot.choice.tip.empty() ? "the URDF's only end" : robot.choice.tip);
   fmt::print("{}: {} joints, {}\nnext: armcal excite --robot {} --out train.csv\n", out.string(), read.joints(),
              read.has_prior ? "bodies from the URDF" : "no bodies: prior = \"none\"", out.string());
   nlohmann::ordered_json json{{"file", out.string()},    {"robot", read.name},          {"joints", robot.joints},

@@ -114,6 +114,21 @@ TEST_F(Import, OfBadBodiesAndMissingLimits_SaysSoAndGoesOn) {
   ExpectOneLine(Tool({"import", Path("arm.urdf"), "-o", Path("arm.toml")}), 2, "--overwrite");
 }
 
+// The parser of URDFs refuses joints without <limit>.
+TEST_F(Import, OfJointsWithoutALimit_GuessesOfEach) {
+  std::string urdf = Replaced(Scara().urdf, "<limit lower=\"-2.2\" upper=\"2.2\" effort=\"60\" velocity=\"6\"/>",
+                              "<!-- <limit lower=\"-9\" upper=\"9\" effort=\"1\" velocity=\"1\"/> -->");
+  const Outcome o = Try(urdf);
+  ASSERT_EQ(o.code, 0) << o.err;
+  int guessed = 0;
+  const nlohmann::json json = ReadJson(Path("out.json"));
+  for (const auto& g : json.at("guessed"))
+    for (const char* key : {"position_limit_deg", "speed_limit_degps", "torque_limit_Nm"})
+      guessed += g.at("key") == key && g.at("joint") == "turn_1" &&
+                 g.at("why").dump().find("the URDF has none") != std::string::npos;
+  EXPECT_EQ(guessed, 3);
+}
+
 // Published inertias are rounded. One that is a little beyond what a body can have is no reason to drop them all.
 TEST_F(Import, OfARoundedInertiaAndAFrameWithInertia_KeepsTheBodies) {
   const std::string frame =

@@ -372,12 +372,31 @@ class Complaints : public console_bridge::OutputHandler {
   std::string first_;
 };
 
+// The parser refuses a joint without <limit>. Zeros stand for what is not known, as in many URDFs.
+std::string WithLimits(std::string text) {
+  constexpr std::string_view kBegin = "<joint", kEnd = "</joint>", kComment = "-->";
+  for (std::size_t at = 0; (at = text.find("<!--", at)) != text.npos;) {
+    const std::size_t end = text.find(kComment, at);
+    text.erase(at, end == text.npos ? end : end + kComment.size() - at);
+  }
+  for (std::size_t at = 0; (at = text.find(kBegin, at)) != text.npos;) {
+    const std::size_t inside = text.find('>', at), end = text.find(kEnd, at);
+    if (inside == text.npos || end == text.npos) break;
+    const std::string tag = text.substr(at, inside - at), body = text.substr(inside, end - inside);
+    at = inside;
+    const bool moves = tag.find("revolute") != tag.npos || tag.find("prismatic") != tag.npos;
+    if (tag.back() == '/' || !moves || body.find("<limit") != body.npos) continue;
+    text.insert(end, "<limit lower=\"0\" upper=\"0\" effort=\"0\" velocity=\"0\"/>");
+  }
+  return text;
+}
+
 urdf::ModelInterfaceSharedPtr Parse(const std::filesystem::path& path) {
   const std::string text = UrdfText(path);
   if (const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n"); first == text.npos || text[first] != '<')
     throw io::InputError(path.string() + ": expected a URDF, which is XML and begins with \"<\"");
   Complaints complaints;
-  urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text);
+  urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(WithLimits(text));
   if (!model || !model->getRoot())
     throw io::InputError(path.string() + ": expected a URDF robot" +
                          (complaints.first().empty() ? "" : " (" + complaints.first() + ")"));

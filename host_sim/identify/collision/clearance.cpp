@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 #include <random>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/robot/body.hpp"
 #include "codegen/src/robot/frames.hpp"
 #include "host_sim/identify/collision/mesh.hpp"
 
@@ -43,6 +45,17 @@ Hull MeshHull(const Shape& shape) {
   return hull;
 }
 
+// A mesh of a link that is in millimetres, or another shape that was meant so.
+void RequireMetres(const Shape& shape, double radius_m) {
+  if (2 * radius_m <= codegen::kLongest) return;
+  char length[32];
+  std::snprintf(length, sizeof length, "%.3g", 2 * radius_m);
+  const bool mesh = shape.kind == Shape::Kind::kMesh;
+  throw io::InputError((mesh ? shape.file.string() + ": " : "") + "link \"" + shape.link +
+                       "\": expected a collision shape in metres, this one is " + length + " m long (millimetres?" +
+                       (mesh ? " then <mesh scale=\"0.001 0.001 0.001\"> in the URDF)" : ")"));
+}
+
 // The middle of the points' box, and the ball around it that holds them.
 std::pair<Vector3d, double> Ball(const std::vector<Vector3d>& points) {
   Vector3d low = points.front(), high = low;
@@ -54,6 +67,19 @@ std::pair<Vector3d, double> Ball(const std::vector<Vector3d>& points) {
 }
 
 }  // namespace
+
+std::vector<std::string> MeshFaults(const codegen::Robot& robot) {
+  std::vector<std::string> faults;
+  for (const Shape& shape : robot.shape) {
+    if (shape.kind != Shape::Kind::kMesh || shape.file.empty()) continue;
+    try {
+      RequireMetres(shape, Ball(MeshHull(shape).corner).second);
+    } catch (const io::InputError& e) {
+      if (std::find(faults.begin(), faults.end(), e.what()) == faults.end()) faults.emplace_back(e.what());
+    }
+  }
+  return faults;
+}
 
 std::string WhyUncheckable(const codegen::Robot& robot) {
   if (!CanMeasure()) return "this program was built without FCL; install libfcl-dev, then build it again";
@@ -108,6 +134,7 @@ void Clearance::AddArm() {
     }
     const auto [middle, radius] = Ball(part.extreme);
     part.middle = middle, part.radius = std::hypot(radius, part.rim) + part.round;
+    RequireMetres(shape, part.radius);
     part_.push_back(part);
   }
   for (int body = 1; body <= robot_.joints(); ++body)

@@ -23,13 +23,17 @@ struct Nearest {
   std::string a, b;
 };
 
+// A line for each collision mesh that is there and cannot be used: its kind, its content, or its size.
+std::vector<std::string> MeshFaults(const codegen::Robot& robot);
+
 // Why this arm cannot be checked; empty: it can.
 std::string WhyUncheckable(const codegen::Robot& robot);
 
 // May be used by several threads at once.
 class Clearance {
  public:
-  // margin_m: the distance that is asked for. Throws io::InputError: a mesh that cannot be read. WhyUncheckable must be
+  // margin_m: the distance that is asked for. Throws io::InputError: a mesh that cannot be read, or a
+  // shape that is not in metres. WhyUncheckable must be
   // empty.
   Clearance(const codegen::Robot& robot, const Cell& cell, double margin_m);
 

@@ -63,7 +63,10 @@ std::string LowerExtension(const std::filesystem::path& path) {
 std::vector<Eigen::Vector3d> ReadMesh(const std::filesystem::path& path) {
   io::RequireFile(path);
   const std::string kind = LowerExtension(path);
-  if (kind != ".stl" && kind != ".obj") throw io::InputError(path.string() + ": expected a mesh as STL or OBJ");
+  if (kind != ".stl" && kind != ".obj")
+    throw io::InputError(
+        path.string() +
+        ": expected a mesh as STL or OBJ; convert it, or give the link a [[capsule]] in the robot file");
   std::ifstream file(path, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   std::vector<Eigen::Vector3d> corners = kind == ".obj"       ? TextCorners(bytes, "v")

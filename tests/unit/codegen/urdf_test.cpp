@@ -211,6 +211,7 @@ TEST_F(Urdf, MacrosInComments_AreNone) {
   const std::string comment = "<!-- made by xacro <xacro:property name=\"m\" value=\"1\"/>\n -->";
   EXPECT_EQ(Read(comment + OddArm() + comment, {"r1", "p2", "c3", "r4", "r5"}).joints(), 5);
   EXPECT_NE(Refusal(comment + RobotText(comment + "<xacro:arm/>"), {}).find("a xacro file"), std::string::npos);
+  EXPECT_NE(Refusal(RobotText("<link name=\"${prefix}base\"/>"), {}).find("a xacro file"), std::string::npos);
 }
 
 // "1.5708" in a URDF means a right angle: the frames must come out exact, or every zero would cost operations.

@@ -159,6 +159,26 @@ TEST(WhyUncheckable, SaysWhatIsMissing) {
   EXPECT_NE(WhyUncheckable(robot).find("[[capsule]]"), std::string::npos);
 }
 
+TEST(MeshFaults, NameMeshesInMillimetres_AndThoseThatCannotBeRead) {
+  const TemporaryFolder folder;
+  codegen::Robot robot = FlatArm();
+  EXPECT_EQ(MeshFaults(robot), std::vector<std::string>());
+  codegen::Shape& mesh = robot.shape[0];
+  mesh.kind = codegen::Shape::Kind::kMesh, mesh.size_m = {1, 1, 1};
+  mesh.file = folder.Write("mm.obj", "v 0 0 0\nv 120 0 0\nv 0 80 0\nv 0 0 300\n");
+  const std::vector<std::string> faults = MeshFaults(robot);
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_NE(faults[0].find("millimetres"), std::string::npos) << faults[0];
+  const auto refused = [&robot] { return ErrorOf([&robot] { Clearance(robot, {}, 0.02); }); };
+  EXPECT_TRUE(!CanMeasure() || refused() == faults[0]) << refused();
+  mesh.size_m = {1e-3, 1e-3, 1e-3};
+  EXPECT_EQ(MeshFaults(robot), std::vector<std::string>());
+  mesh.file = folder.Write("m.dae", "<COLLADA/>");
+  EXPECT_NE(MeshFaults(robot).at(0).find("[[capsule]]"), std::string::npos);
+  robot.shape[0].kind = codegen::Shape::Kind::kBox, robot.shape[0].size_m = {100, 200, 50};
+  EXPECT_TRUE(!CanMeasure() || refused().find("millimetres") != std::string::npos) << refused();
+}
+
 TEST(ReadCell, SaysAllFaultsAtOnce) {
   const TemporaryFolder folder;
   const std::string error = ErrorOf([&] {

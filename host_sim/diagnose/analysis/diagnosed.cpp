@@ -17,10 +17,12 @@ Diagnosed::Diagnosed(std::unique_ptr<codegen::Model> declared, codegen::Catalogu
     : options(given), catalogue(std::move(records)), model(std::move(declared)) {
   whole_ = CheckedLogs(*model, train_logs, options.cutoff_Hz, say);
   const auto start = std::chrono::steady_clock::now();
-  channel_ = calibration::SeeChannel(*model, calibration::Pointers(whole_));
+  std::vector<calibration::Dataset> narrow = NarrowLogs(*model, train_logs, options.cutoff_Hz);
+  // A filter smooths what a derivation up to a cut-off that was asked for leaves of noise, whether there is one or not.
+  channel_ = calibration::SeeChannel(*model, calibration::Pointers(options.cutoff_Hz > 0 ? narrow : whole_));
   for (calibration::Dataset& log : whole_) PutBehindChannel(log);
   for (const calibration::Dataset& log : whole_) train.push_back(calibration::ThinToBand(log));
-  for (calibration::Dataset& log : NarrowLogs(*model, train_logs, options.cutoff_Hz)) {
+  for (calibration::Dataset& log : narrow) {
     PutBehindChannel(log);
     narrow_.push_back(calibration::ThinToBand(log));
   }

@@ -249,8 +249,11 @@ Dataset Prepare(const codegen::Model& model, const logs::Log& log, const logs::B
     for (int j = 0; j < n; ++j) inertia(j, j) = std::min(inertia(j, j), guess[j]);
   }
   const logs::Sensitivity sensitivity = SensitivityOf(model, inertia);
-  if (bandwidth.cutoff_Hz > 0) return Derive(model, log, sensitivity, bandwidth);
+  const double asked_Hz = bandwidth.cutoff_Hz;
+  if (asked_Hz > 0 && bandwidth.scale >= 1) return Derive(model, log, sensitivity, bandwidth);
   const Eigen::VectorXd chosen_Hz = logs::ChooseCutoffs_Hz(log, sensitivity);
+  // Below a cut-off that was asked for there may be as much noise of the derivation. Below the chosen one there is not.
+  if (asked_Hz > 0) return Derive(model, log, sensitivity, {0, bandwidth.scale, chosen_Hz.cwiseMin(asked_Hz)});
   Dataset out = Derive(model, log, sensitivity, {0, 1, chosen_Hz});
   const SeenBands of_all = SeeBands(model, out);
   SeenBands seen = of_all;

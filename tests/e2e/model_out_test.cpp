@@ -131,6 +131,7 @@ TEST_F(ModelOut, OfANoisyPosition_SaysThatLeastSquaresIsBiased_UntilTheCutoffIsL
     Diagnose("noisy", noisy, noisy, {"--cutoff", std::to_string(cutoff_Hz)});
     if (HasFatalFailure()) return;
     EXPECT_EQ(verdict_.at("cutoff_Hz"), nlohmann::json({{cutoff_Hz, cutoff_Hz}}));
+    EXPECT_TRUE(verdict_.at("terms").empty() && verdict_.at("torque_channel").empty()) << said_.out;
     const nlohmann::json e = verdict_.at("exogeneity");
     const bool biased = cutoff_Hz > 20;
     EXPECT_EQ(e.at("instruments"), "smoothed positions");

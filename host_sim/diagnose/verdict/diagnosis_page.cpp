@@ -57,6 +57,9 @@ std::vector<int> JointsToShow(const ordered_json& json) {
   return {joints.begin(), joints.end()};
 }
 
+// A page made again from a file of an older armcal has no such key.
+bool Differs(const ordered_json& json) { return !json.value("held_out_differs_text", ordered_json::array()).empty(); }
+
 void AddVerdict(report::Page& page, const ordered_json& json) {
   const std::string& headline = json.at("headline").get_ref<const std::string&>();
   std::vector<std::string> causes;
@@ -66,7 +69,7 @@ void AddVerdict(report::Page& page, const ordered_json& json) {
     const auto sure = std::count_if(json["terms"].begin(), json["terms"].end(),
                                     [](const ordered_json& term) { return Holds(term, "confirmed", true); });
     page.Box(report::Tone::kWarning, fmt::format("The model lacks {} effect{}", sure, sure == 1 ? "" : "s"), causes);
-  } else if (causes.empty() && json.at("too_short").empty()) {
+  } else if (causes.empty() && json.at("too_short").empty() && !Differs(json)) {
     std::string words =
         "No effect of the catalogue improves the declared model by more than chance would. What these logs would "
         "have shown is in the table of errors: smallest detectable effect.";
@@ -82,6 +85,9 @@ void AddVerdict(report::Page& page, const ordered_json& json) {
   } else {
     page.Box(report::Tone::kNeutral, "Verdict: " + headline, causes);
   }
+  if (Differs(json))
+    page.Box(report::Tone::kWarning, "The held-out log differs from the training logs",
+             Lines(json["held_out_differs_text"]));
   if (json.at("payload").is_object())
     page.Box(report::Tone::kNeutral, "A payload of the held-out log", Lines(json["payload"].at("sentences")));
 }

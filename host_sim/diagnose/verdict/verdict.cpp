@@ -72,7 +72,9 @@ Dependence DependenceOf(const DiagnosisView& v, std::size_t term) {
 }
 
 std::string DiagnosisText(const DiagnosisView& v) {
-  std::string out = "verdict: " + Headline(*v.finding) + "\n";
+  const std::vector<std::string> strange = StrangeText(v);
+  std::string out = "verdict: " + Headline(*v.finding, !strange.empty()) + "\n";
+  for (const std::string& line : strange) out += "  " + line + "\n";
   for (const std::string& line : PayloadText(v)) out += "  " + line + "\n";
   for (const std::size_t k : OrderOfTerms(v)) {
     const Term& t = v.finding->terms[k];

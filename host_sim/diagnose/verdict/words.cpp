@@ -31,9 +31,34 @@ bool AnyConfirmed(const diagnosis::Finding& f) {
   return std::any_of(f.terms.begin(), f.terms.end(), [](const Term& t) { return t.confirmed; });
 }
 
-std::string Headline(const diagnosis::Finding& f) {
+std::vector<Strange> StrangeJoints(const DiagnosisView& v) {
+  constexpr double kMuch = 2;
+  std::vector<Strange> out;
+  const Eigen::VectorXd left = calibration::RmsInBand(*v.test, v.held_out->after);
+  for (int j = 0; j < left.size(); ++j)
+    if (const double trained = v.finding->sigma[j]; trained > 0 && left[j] > kMuch * trained)
+      out.push_back({j, left[j], trained});
+  return out;
+}
+
+std::vector<std::string> StrangeText(const DiagnosisView& v) {
+  std::vector<std::string> lines;
+  for (const Strange& s : StrangeJoints(v))
+    lines.push_back(fmt::format(
+        "joint {}: the held-out log leaves {:.3g} {}, {:.1f} times what the training logs leave", s.joint + 1,
+        s.held_out, calibration::TorqueUnit(v.model->robot().joint[s.joint]), s.held_out / s.training));
+  if (!lines.empty())
+    lines.emplace_back(
+        "so the held-out log differs from the training logs: another load, temperature, cable, contact or arm; "
+        "a log of the training logs' conditions as --test, or this log in --train, tells more");
+  return lines;
+}
+
+std::string Headline(const diagnosis::Finding& f, bool strange) {
   if (f.terms.empty() && static_cast<Eigen::Index>(f.too_short.size()) == f.sigma.size())
     return "none. Nothing was searched: too few rows of the training logs are left; longer logs show more";
+  if (f.terms.empty() && strange)
+    return "none. The training logs lack nothing that they could show, but the held-out log differs from them";
   if (f.terms.empty())
     return "none. Nothing is missing that these logs could show; what they would have shown is in the table: smallest "
            "detectable effect";

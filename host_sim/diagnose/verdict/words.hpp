@@ -14,8 +14,18 @@ inline bool IsUnknown(const diagnosis::Term& t) { return t.record->kind == "unkn
 // At least one term held on the held-out log.
 bool AnyConfirmed(const diagnosis::Finding& finding);
 
-// The verdict in one sentence; what it means in numbers is in the table of errors.
-std::string Headline(const diagnosis::Finding& finding);
+// The verdict in one sentence; what it means in numbers is in the table of errors. strange: the held-out log leaves
+// much more than the training logs do.
+std::string Headline(const diagnosis::Finding& finding, bool strange = false);
+
+// A joint on which the held-out log leaves more than twice what the training logs leave.
+struct Strange {
+  int joint;                  // from 0
+  double held_out, training;  // RMS, N m or N
+};
+std::vector<Strange> StrangeJoints(const DiagnosisView& v);
+// "joint 2: the held-out log leaves 2.21 N m, 40 times what the training logs leave. ..."
+std::vector<std::string> StrangeText(const DiagnosisView& v);
 
 // "3", "5-6", "all", "base", "flange": how a report names the joints of a term.
 std::string JointName(const diagnosis::Term& term);

@@ -93,6 +93,21 @@ TEST(Verdict, OnARepeatedTrajectory_ConfirmsNothing_AndWritesNothing) {
   EXPECT_LT(json["after"][1].get<double>(), 0.7 * json["before"][1].get<double>());  // it stays in the comparison
 }
 
+// The held-out run alone has a torque of 3 sin(2 q) on joint 1.
+TEST(Verdict, OfAHeldOutLogThatDiffers_NamesTheJoint) {
+  Diagnosed d(81);
+  EXPECT_TRUE(StrangeText(d.view).empty());
+  EXPECT_TRUE(DiagnosisJson(d.view)["held_out_differs"].empty());
+  const Eigen::VectorXd torque = 3 * (2 * d.test.s.q.col(0)).array().sin();
+  d.held_out.after.col(0) += torque;
+  const nlohmann::ordered_json json = DiagnosisJson(d.view);
+  ASSERT_EQ(json["held_out_differs"].size(), 1u);
+  EXPECT_EQ(json["held_out_differs"][0]["joint"], 1);
+  const double rms = std::sqrt(torque.squaredNorm() / static_cast<double>(torque.size()));
+  EXPECT_NEAR(json["held_out_differs"][0]["held_out"].get<double>(), rms, 0.1 * rms);
+  EXPECT_NE(DiagnosisText(d.view).find("joint 1: the held-out log leaves"), std::string::npos);
+}
+
 TEST(NotLookedAt, NamesJointsThatStoodAndRowsLeftOut) {
   Diagnosed d(81);
   d.train[0].moving.col(0).setZero(), d.train[0].used.col(0).setZero();

@@ -285,7 +285,8 @@ int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch) {
   fmt::print("{}", verdict::SummaryText(summary));
   WriteJson(one.json, summary);
   if (!one.report.empty()) {
-    verdict::WriteSummaryPage(one.report, summary);
+    const bool folder = !batch.summary.empty() && std::filesystem::is_directory(batch.summary[0]);
+    verdict::WriteSummaryPage(one.report, summary, folder ? batch.summary[0] : batch.out);
     fmt::print("report: {}\n", one.report);
   }
   return summary["failed"] == 0 ? kOk : kPartial;

@@ -18,7 +18,10 @@ using WritePage = void (*)(const std::filesystem::path&, const ordered_json&);
 WritePage PageOf(const ordered_json& json) {
   if (!json.is_object()) return nullptr;
   if (json.contains("closed")) return &WriteDemoPage;
-  if (json.contains("findings") && json.contains("verdicts")) return &verdict::WriteSummaryPage;
+  if (json.contains("findings") && json.contains("verdicts"))
+    return [](const std::filesystem::path& path, const ordered_json& summary) {
+      verdict::WriteSummaryPage(path, summary);
+    };
   if (json.contains("terms")) return &verdict::WriteDiagnosisPage;
   if (json.contains("columns") && json.contains("exogeneity")) return &verdict::WriteIdentificationPage;
   return nullptr;

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
+
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/assets.hpp"
 #include "host_sim/data/report/style.hpp"
@@ -12,6 +14,17 @@ namespace {
 
 std::string Cell(std::string_view tag, const std::string& text, bool number) {
   return fmt::format("<{0}{1}>{2}</{0}>", tag, number ? " class='n'" : "", Escape(text));
+}
+
+// A path as a link has it: all but letters, digits and "-._~/" as %XX.
+std::string InUrl(std::string_view path) {
+  std::string out;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    if ((byte < 128 && std::isalnum(byte)) || std::string_view("-._~/").find(c) != std::string_view::npos) out += c;
+    else out += fmt::format("%{:02X}", byte);
+  }
+  return out;
 }
 
 std::string HtmlTable(const Table& table) {
@@ -24,9 +37,13 @@ std::string HtmlTable(const Table& table) {
     html += "</tr></thead>";
   }
   html += "<tbody>";
-  for (const auto& row : table.rows) {
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    const auto& row = table.rows[r];
     html += "<tr>";
-    for (std::size_t c = 0; c < row.size(); ++c) html += Cell("td", row[c], IsNumeric(table, c));
+    for (std::size_t c = 0; c < row.size(); ++c)
+      html += c == 0 && r < table.link.size() && !table.link[r].empty()
+                  ? "<td><a href='" + InUrl(table.link[r]) + "'>" + Escape(row[c]) + "</a></td>"
+                  : Cell("td", row[c], IsNumeric(table, c));
     html += "</tr>\n";
   }
   return html + "</tbody></table></div>\n";

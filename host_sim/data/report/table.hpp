@@ -10,6 +10,7 @@ struct Table {
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;
   std::string caption{};
+  std::vector<std::string> link{};  // of each row's first cell, a path beside the page; empty: none
 };
 
 // Whether column c holds numbers only (blank and "-" count as such): those are set flush right.

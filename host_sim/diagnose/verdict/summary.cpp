@@ -7,6 +7,7 @@
 
 #include "host_sim/data/report/page.hpp"
 #include "host_sim/diagnose/verdict/json_values.hpp"
+#include "host_sim/diagnose/verdict/type_prior.hpp"
 
 namespace armcal::verdict {
 
@@ -54,6 +55,24 @@ report::Table VerdictTable(const ordered_json& summary) {
   return t;
 }
 
+// Of every log what is farthest from its type.
+report::Table FarTable(const ordered_json& summary) {
+  report::Table t{{"log", "parameter", "value", "its type", "deviations", "others"}, {}};
+  for (const auto& v : summary.at("verdicts")) {
+    const ordered_json far = v.value("far_from_type", ordered_json::array());
+    if (far.empty()) continue;
+    const ordered_json& most = far.at(0);
+    const auto number = [&most](const char* key) { return NumberOf(most.at(key)); };
+    t.rows.push_back({v.at("name"), most.at("parameter"),
+                      fmt::format("{:.4g} {}", number("value"), most.at("unit").get<std::string>()),
+                      fmt::format("{:.4g} +- {:.2g}", number("median"), number("spread")),
+                      fmt::format("{:.1f}", number("deviations")), std::to_string(far.size() - 1)});
+  }
+  std::stable_sort(t.rows.begin(), t.rows.end(),
+                   [](const auto& a, const auto& b) { return std::stod(a[4]) > std::stod(b[4]); });
+  return t;
+}
+
 std::string Headline(const ordered_json& s) {
   return fmt::format("{} logs: {} with an effect, {} without, {} failed", s.at("verdicts").size(),
                      s.at("effect").get<int>(), s.at("none").get<int>(), s.at("failed").get<int>());
@@ -63,6 +82,7 @@ std::string Headline(const ordered_json& s) {
 
 ordered_json SummaryJson(const Verdicts& verdicts) {
   ordered_json s{{"effect", 0}, {"none", 0}, {"failed", 0}, {"findings", ordered_json::array()}};
+  s["types"] = TypesJson(verdicts);
   s["verdicts"] = ordered_json::array();
   std::map<std::pair<std::string, std::string>, ordered_json> findings;  // by kind and joint
   for (const auto& [name, v] : verdicts) {
@@ -82,6 +102,7 @@ ordered_json SummaryJson(const Verdicts& verdicts) {
       if (f.is_null()) f = {{"kind", t.at("kind")}, {"joint", t.at("joint")}, {"logs", ordered_json::array()}};
       f["logs"].push_back(name);
     }
+    row["far_from_type"] = FarFromType(s["types"], v);
     row["before_moving"] = v.at("before_moving"), row["after_moving"] = v.at("after_moving");
     s["verdicts"].push_back(row);
   }
@@ -96,19 +117,34 @@ ordered_json SummaryJson(const Verdicts& verdicts) {
 std::string SummaryText(const ordered_json& s) {
   std::string text = report::Text(VerdictTable(s));
   if (!s.at("findings").empty()) text += "\n" + report::Text(FindingTable(s));
+  if (const report::Table far = FarTable(s); !far.rows.empty())
+    text += "\nfar from the other arms of their type:\n" + report::Text(far);
   return text + Headline(s) + "\n";
 }
 
-void WriteSummaryPage(const fs::path& path, const ordered_json& s) {
+void WriteSummaryPage(const fs::path& path, const ordered_json& s, const fs::path& pages) {
   report::Page page("What the models of many arms lack", "One verdict a log; terms that held on its held-out log.");
   page.Box(s.at("failed") > 0 ? report::Tone::kWarning : report::Tone::kNeutral, Headline(s));
   if (!s.at("findings").empty()) {
     page.Section("What was found");
     page.Add(FindingTable(s));
   }
+  if (report::Table far = FarTable(s); !far.rows.empty()) {
+    page.Section("Far from their type");
+    far.caption =
+        "Declared parameters more than five deviations from the median of all logs of the same robot. Its type: median "
+        "and "
+        "spread of these logs. Others: how many more parameters of this log are so far.";
+    page.Add(far);
+  }
   page.Section("Log by log");
   report::Table logs = VerdictTable(s);
   logs.caption = "Error removed: RMS on the held-out log where the joint moves, of the joint that gained most.";
+  const fs::path folder = pages.empty() ? path.parent_path() : pages;
+  for (const auto& row : logs.rows) {
+    const fs::path own = folder / (row[0] + ".html");
+    logs.link.push_back(fs::exists(own) ? fs::proximate(own, fs::absolute(path).parent_path()).generic_string() : "");
+  }
   page.Add(logs);
   page.Write(path);
 }

@@ -55,7 +55,7 @@ const Edges kEdges = {
     {"host_sim/data/report",   {kHost + "data/files"}},
 
     // Identify: parameters from logs, and the motions that show them.
-    {"host_sim/identify/search", {}},  // minimises functions of numbers; the only room that sees pagmo
+    {"host_sim/identify/search", {kCode + "io"}},  // minimises functions of numbers; the only room that sees pagmo
     {"host_sim/identify/collision", {kCode}},  // distances of solids; the only room that sees FCL
     {"host_sim/identify/excitation", {kCode, kHost + "data/trajectory", kHost + "identify/search", kHost + "identify/collision"}},
     {"host_sim/identify/calibration", {kCode, kHost + "data/files", kHost + "data/logs", kLib + "math", kLib + "model"}},

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "codegen/src/generator/vector_units.hpp"
+#include "codegen/src/io/watch.hpp"
 
 // The C library's vector functions are good to a few last bits.
 #if defined(__x86_64__) && defined(__GLIBC__) && !defined(__clang__)
@@ -19,6 +20,7 @@ namespace armcal::codegen {
 namespace {
 
 constexpr int kBlock = Tape::kBlock;
+constexpr int kUnwatched = 64 * kBlock;  // samples between two looks of a watch
 
 template <Op op>
 inline __attribute__((always_inline)) void ApplyTo(const double* __restrict a, const double* __restrict b,
@@ -135,6 +137,7 @@ void Tape::ForEachBlock(std::span<const Binding> bindings, int samples, const Vi
   std::vector<const double*> at(step_.size()), root(root_.size());  // each step's block
   for (std::size_t k = 0; k < step_.size(); ++k) at[k] = lane(static_cast<int>(k));
   for (int begin = 0; begin < samples; begin += kBlock) {
+    if (begin % kUnwatched == 0) io::CancellationPoint();
     const int count = std::min(kBlock, samples - begin);
     for (const int k : varying) {
       const Node& s = step_[k];

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/data/logs/butterworth.hpp"
 #include "host_sim/data/logs/quintic_spline.hpp"
 #include "host_sim/data/logs/steps.hpp"
@@ -291,6 +292,7 @@ double MotionBand_Hz(const VectorXd& q, double noise, double rate_Hz) {
   VectorXd power = VectorXd::Zero(segment / 2);
   int count = 0;
   for (Index first = 0; first + segment <= bend.size(); first += segment / 2, ++count) {
+    io::CancellationPoint();
     VectorXd::Map(part.data(), segment) = bend.segment(first, segment).cwiseProduct(window);
     fft.fwd(spectrum, part);
     for (Index k = 0; k < power.size(); ++k) power[k] += std::norm(spectrum[static_cast<std::size_t>(k)]);

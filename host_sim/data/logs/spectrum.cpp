@@ -6,6 +6,8 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
+#include "codegen/src/io/watch.hpp"
+
 namespace armcal::logs {
 
 Spectrum AmplitudeDensity(const Eigen::VectorXd& y, double rate_Hz, double segment_s) {
@@ -22,6 +24,7 @@ Spectrum AmplitudeDensity(const Eigen::VectorXd& y, double rate_Hz, double segme
   Eigen::ArrayXd power = Eigen::ArrayXd::Zero(size / 2);
   int segments = 0;
   for (Eigen::Index first = 0; first + size <= y.size(); first += size / 2, ++segments) {
+    io::CancellationPoint();
     const auto piece = y.segment(first, size).array();
     Eigen::ArrayXd::Map(part.data(), size) = (piece - piece.mean()) * window;
     fft.fwd(transform, part);

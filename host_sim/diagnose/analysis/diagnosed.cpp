@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/diagnose/verdict/common_rows.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/json.hpp"
@@ -12,9 +13,16 @@
 
 namespace armcal::analysis {
 
+namespace {
+
+constexpr double kPreparing = 0.1, kTraining = 0.9;  // for a watch: of the training, and of all, about
+
+}  // namespace
+
 Diagnosed::Diagnosed(std::unique_ptr<codegen::Model> declared, codegen::Catalogue records,
                      const std::vector<logs::Log>& train_logs, const DiagnoseOptions& given, const Say& say)
     : options(given), catalogue(std::move(records)), model(std::move(declared)) {
+  const io::Stage training(0, kTraining);
   whole_ = CheckedLogs(*model, train_logs, options.cutoff_Hz, say);
   const auto start = std::chrono::steady_clock::now();
   std::vector<calibration::Dataset> narrow = NarrowLogs(*model, train_logs, options.cutoff_Hz);
@@ -26,6 +34,7 @@ Diagnosed::Diagnosed(std::unique_ptr<codegen::Model> declared, codegen::Catalogu
     PutBehindChannel(log);
     narrow_.push_back(calibration::ThinToBand(log));
   }
+  const io::Stage deciding(kPreparing, 1);
   diagnosis = std::make_unique<diagnosis::Diagnosis>(*model, catalogue, calibration::Pointers(train),
                                                      calibration::Pointers(narrow_), options.at_turns);
   view.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -9,6 +9,7 @@
 #include <map>
 #include <numbers>
 
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/diagnosis/gain_on_log.hpp"
 #include "host_sim/diagnose/diagnosis/limits.hpp"
@@ -26,6 +27,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kMaxTerms = 24;  // far beyond what logs have shown: the search must end
+// For a watch: of the search's time, the part that looks for terms; and of what is left of this part, about, a term's.
+constexpr double kLooking = 0.8, kForATerm = 0.3;
 
 // Delays the logs by what the latest term says of them.
 void ApplyDelay(Diagnosis::Work& w) {
@@ -109,7 +112,13 @@ Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& cata
   // What friction does near turns and at rest is larger there than most of what else is missing, so it comes first.
   if (at_turns != AtTurns::kNever) w.chosen = select.FirstAtTurns(at_turns == AtTurns::kWhereAveraged);
   if (!w.chosen.empty()) w.Polish();
-  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && select.Next(Confirmed(w.chosen), next);) {
+  double left = 1;  // of the time
+  const auto find = [&](Chosen& next) {
+    const io::Stage stage(kLooking * (1 - left), kLooking * (1 - left * (1 - kForATerm)));
+    left *= 1 - kForATerm;
+    return select.Next(Confirmed(w.chosen), next);
+  };
+  for (Chosen next; static_cast<int>(w.chosen.size()) < kMaxTerms && find(next);) {
     w.chosen.push_back(next);
     ApplyDelay(w);
     w.LeaveOutUnsettled(w.chosen.back());

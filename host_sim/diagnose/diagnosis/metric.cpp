@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/identify/calibration/tall_product.hpp"
 
 namespace armcal::diagnosis {
@@ -107,7 +108,10 @@ Metric::Metric(const BaseRows& rows, std::vector<NoiseModel> noise)
   const std::size_t n = rows.index.size();
   map_.resize(n), q_map_.resize(n), coloured_.resize(n), y_.resize(n), gram_.resize(n), right_.resize(n),
       residual_.resize(n);
-  for (int j = 0; j < rows.joints(); ++j) WhitenJoint(j);
+  for (int j = 0; j < rows.joints(); ++j) {
+    io::CancellationPoint();
+    WhitenJoint(j);
+  }
   Solve();
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "codegen/src/generator/vector_units.hpp"
+#include "codegen/src/io/watch.hpp"
 
 namespace armcal::diagnosis {
 
@@ -99,6 +100,7 @@ NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
   double least = count * std::log(power[0]);
   int order = 0;
   for (int m = 0; m < kMostOrder && power.back() > 1e-48; ++m) {
+    io::CancellationPoint();
     double product = 0, squares = 0;
     int pairs = 0;
     for (const auto& [begin, end] : stretches) {

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/diagnosis/run_state.hpp"
 #include "host_sim/identify/calibration/channel.hpp"
@@ -295,7 +296,9 @@ std::vector<Found> Selector::Rank(const std::vector<Candidate*>& candidates, con
   const std::unique_ptr<Metric> whitened = IsFiltered(*w_.train[0]) ? nullptr : grounds.Whitened();
   std::vector<std::pair<double, Found>> screened;  // by that score
   std::map<std::pair<std::string, std::vector<int>>, Found> something;
+  double tried = 0;
   for (Candidate* c : candidates) {
+    io::SetDone(tried++ / static_cast<double>(candidates.size()));
     const std::string& simpler = c->record().search.after;
     const auto before = something.find({simpler, c->joints()});
     if (!simpler.empty() && before == something.end()) continue;

@@ -8,6 +8,7 @@
 #include <complex>
 #include <numbers>
 
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/data/logs/butterworth.hpp"
 
 namespace armcal::calibration {
@@ -59,6 +60,7 @@ VectorXd Power(const VectorXd& y) {
   std::vector<std::complex<double>> spectrum;
   int segments = 0;
   for (Index first = 0; first + size <= y.size(); first += size / 2, ++segments) {
+    io::CancellationPoint();
     const double mean = y.segment(first, size).mean();
     for (Index k = 0; k < size; ++k) {
       const double x = 2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(size);
@@ -122,6 +124,7 @@ std::vector<TransferBand> Transfer(const Dataset& data, int joint, const VectorX
     fft.fwd(to, in);
   };
   for (Index first = 0; first + size <= t.size(); first += size / 2) {
+    io::CancellationPoint();
     if (data.used.col(joint).segment(first, size).sum() < kSeen * static_cast<double>(size)) continue;
     transform(x, first, fx), transform(y, first, fy);
     for (Index k = 0; k < bins; ++k) {

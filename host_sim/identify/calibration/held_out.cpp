@@ -9,6 +9,7 @@
 #include <map>
 #include <set>
 
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/identify/calibration/prior.hpp"
 
 namespace armcal::calibration {
@@ -130,8 +131,10 @@ Repeated SameTrajectory(const std::vector<const Dataset*>& train, const Dataset&
   for (const Dataset* log : train) {
     const Path other = Resample(*log, joints, scale);
     double here = 0;
-    for (std::size_t w = 0; w < window.size(); ++w)
+    for (std::size_t w = 0; w < window.size(); ++w) {
+      io::CancellationPoint();
       if (IsIn(own, window[w], length, other)) found[w] = 1, ++here;
+    }
     if (here > most) most = here, out.source = log->source;
   }
   out.share = static_cast<double>(std::count(found.begin(), found.end(), 1)) / static_cast<double>(window.size());

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/identify/calibration/barrier_fit.hpp"
 
 namespace armcal::calibration {
@@ -84,6 +85,7 @@ double VarianceInflation(const VectorXd& residual, const Eigen::VectorXi& used) 
   if (variance <= 0) return 1;
   double factor = 1;
   for (int lag = 1; lag < std::min(200, samples / 4); ++lag) {
+    io::CancellationPoint();
     double product = 0;
     for (int k = lag; k < samples; ++k) product += used[k] && used[k - lag] ? residual[k] * residual[k - lag] : 0;
     if (product <= 0) break;

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/watch.hpp"
 #include "codegen/src/robot/body.hpp"
 #include "codegen/src/robot/frames.hpp"
 #include "host_sim/identify/collision/mesh.hpp"
@@ -25,6 +26,7 @@ constexpr int kPoses = 1000;          // tried for pairs that are always near
 constexpr double kGuard_m = 0.0005;   // beyond the margin: for what lies between the samples that are looked at
 constexpr double kKeepOff_m = 0.005;  // beyond the margin: where a search begins to keep off
 constexpr double kSoft_m = 0.1;
+constexpr Eigen::Index kUnwatched = 64;  // samples between two looks of a watch
 
 Vector3d Size(const Shape& shape) { return Vector3d(shape.size_m.data()); }
 
@@ -250,6 +252,7 @@ void Clearance::ForNearPairs(const Eigen::MatrixXd& q, const double& limit, Visi
   std::vector<double> known(pair_.size(), -std::numeric_limits<double>::infinity());
   std::vector<Eigen::Index> measured(pair_.size(), 0);
   for (Eigen::Index sample = 0; sample < q.rows(); ++sample) {
+    if (sample % kUnwatched == 0) io::CancellationPoint();
     Poses poses;
     for (std::size_t p = 0; p < pair_.size(); ++p) {
       const Pair& pair = pair_[p];

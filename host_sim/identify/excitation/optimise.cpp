@@ -7,6 +7,7 @@
 #include <random>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/identify/excitation/peaks.hpp"
 #include "host_sim/identify/search/minimise.hpp"
 #include "host_sim/identify/search/parallel.hpp"
@@ -273,9 +274,13 @@ bool RandomSeries(const Observation& observation, const OptimiseSettings& settin
 }
 
 Optimum Optimise(const Observation& observation, const OptimiseSettings& settings) {
-  const auto end =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(settings.seconds));
-  const auto stop = [&] { return Clock::now() >= end || (settings.stop && *settings.stop); };
+  const auto begin = Clock::now(),
+             end = begin + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(settings.seconds));
+  const auto stop = [&] {
+    const auto now = Clock::now();
+    if (now < end) io::SetDone((now - begin) / std::chrono::duration<double>(settings.seconds));
+    return now >= end || (settings.stop && *settings.stop);
+  };
   Best best;
   std::atomic<int> next{0};
 
@@ -284,6 +289,7 @@ Optimum Optimise(const Observation& observation, const OptimiseSettings& setting
     Objective objective(observation, settings.criterion, settings.shape, limits);
     // When time is up, starts are still scaled to the limits until one keeps them, so there is always an answer.
     for (int start; (start = next++) < settings.starts && (!stop() || (start < kTries && best.empty()));) {
+      io::SetDone(start / static_cast<double>(settings.starts));
       Series series = objective.Series(SearchFrom(objective, settings.search, StartSeed(settings.seed, start), stop));
       if (ScaleToLimits(observation, limits, series))
         best.Offer(series, Figure(settings.criterion, PeriodGram(observation, series)), start, settings);

@@ -69,8 +69,10 @@ const Edges kEdges = {
     {"host_sim/diagnose/verdict", {kCode, kHost + "data/files", kHost + "data/logs", kHost + "data/report",
                                    kHost + "identify/excitation", kHost + "identify/calibration", kHost + "identify/methods",
                                    kHost + "diagnose/diagnosis"}},
-    {"host_sim/diagnose/analysis", {kCode, kHost + "data/logs", kHost + "identify/calibration", kHost + "identify/methods",
-                                    kHost + "diagnose/diagnosis", kHost + "diagnose/verdict"}},  // from logs to JSON
+    // From logs to the JSON of a verb; from a robot to that of excite.
+    {"host_sim/diagnose/analysis", {kCode, kHost + "data/logs", kHost + "identify/collision", kHost + "identify/excitation",
+                                    kHost + "identify/calibration", kHost + "identify/methods", kHost + "diagnose/diagnosis",
+                                    kHost + "diagnose/verdict"}},
     {"host_sim/diagnose/fleet", {kCode + "io", kHost + "data/files", kHost + "data/report"}},  // verdicts of many arms over time
     {"host_sim/diagnose/health", {kHost + "client"}},  // a drive's statistics -> a verdict
 

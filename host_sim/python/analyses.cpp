@@ -1,9 +1,11 @@
 // python - what is computed from logs: identify, evaluate, diagnose. A result is the JSON of the verb as a dict.
+#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +19,7 @@
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/python/arrays.hpp"
 #include "host_sim/python/bindings.hpp"
+#include "host_sim/python/long_call.hpp"
 
 namespace armcal::python {
 
@@ -60,8 +63,6 @@ void Warn(const Notes& notes) {
     if (PyErr_WarnEx(PyExc_UserWarning, note.c_str(), 1) != 0) throw nb::python_error();
 }
 
-nb::object ToDict(const ordered_json& json) { return nb::module_::import_("json").attr("loads")(json.dump()); }
-
 void AddMotion(const calibration::HeldOutMotion& motion, ordered_json& json, Notes& notes) {
   for (const std::string& line : verdict::MotionText(motion)) notes.push_back(line);
   json["held_out_motion"] = verdict::ToJson(motion);
@@ -69,19 +70,21 @@ void AddMotion(const calibration::HeldOutMotion& motion, ordered_json& json, Not
 }
 
 nb::object Identify(const codegen::Model& model, nb::handle train, nb::handle test, double cutoff_Hz, double band_Hz,
-                    bool force) {
+                    bool force, nb::handle progress) {
   const std::vector<logs::Log> logs = ReadLogs(train, "train");
   std::vector<logs::Log> held_out;
   if (!test.is_none()) held_out = {ReadTest(test)};
   CheckFrequency(cutoff_Hz, "cutoff_Hz"), CheckFrequency(band_Hz, "band_Hz");
   ordered_json json{{"robot", model.robot().name}};
   Notes notes;
-  {
-    const nb::gil_scoped_release others_run;
+  RunLongCall(progress, [&] {
     const std::vector<calibration::Dataset> data = analysis::CheckedLogs(model, logs, cutoff_Hz, Into(notes));
     for (const std::string& line : analysis::Untold(model, data)) notes.push_back(line);
+    io::SetDone(0.3);
     analysis::Identified found(model, data);
+    io::SetDone(0.6);
     if (model.robot().has_prior) found.ReadOut(data, force);
+    io::SetDone(0.8);
     json.update(found.ToJson());
     if (!held_out.empty()) {
       const calibration::Dataset judged = analysis::CheckedLogs(model, held_out, cutoff_Hz, Into(notes))[0];
@@ -90,20 +93,21 @@ nb::object Identify(const codegen::Model& model, nb::handle train, nb::handle te
     } else {
       json.update(found.Compare(data[0], false, 0).json);
     }
-  }
+  });
   Warn(notes);
   return ToDict(json);
 }
 
-nb::object Evaluate(const codegen::Model& model, nb::handle given_logs, const std::optional<std::string>& table,
-                    double cutoff_Hz, double band_Hz) {
+nb::object Evaluate(const codegen::Model& model, nb::handle given_logs,
+                    const std::optional<std::filesystem::path>& table, double cutoff_Hz, double band_Hz) {
   const std::vector<logs::Log> logs = ReadLogs(given_logs, "logs");
   CheckFrequency(cutoff_Hz, "cutoff_Hz"), CheckFrequency(band_Hz, "band_Hz");
   ordered_json json{{"robot", model.robot().name}};
   Notes notes;
   {
     const nb::gil_scoped_release others_run;
-    const calibration::Given given = table ? calibration::GivenByFile(model, *table) : calibration::GivenByRobot(model);
+    const calibration::Given given =
+        table ? calibration::GivenByFile(model, table->string()) : calibration::GivenByRobot(model);
     for (const std::string& name : given.missing)
       notes.push_back("no value for " + name + ": the robot file's is taken");
     const std::vector<calibration::Dataset> data = analysis::CheckedLogs(model, logs, cutoff_Hz, Into(notes));
@@ -119,7 +123,7 @@ diagnosis::AtTurns AtTurnsOf(std::optional<bool> turns) {
 }
 
 nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle test, std::optional<bool> turns,
-                    double cutoff_Hz, double gain_tolerance) {
+                    double cutoff_Hz, double gain_tolerance, nb::handle progress) {
   const std::vector<logs::Log> logs = ReadLogs(train, "train");
   const logs::Log held_out = ReadTest(test);
   CheckFrequency(cutoff_Hz, "cutoff_Hz");
@@ -127,8 +131,7 @@ nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle te
     throw nb::value_error("gain_tolerance: expected a share from 0 to 0.9");
   ordered_json json;
   Notes notes;
-  {
-    const nb::gil_scoped_release others_run;
+  RunLongCall(progress, [&] {
     codegen::Catalogue catalogue = codegen::LoadCatalogue();
     auto declared = std::make_unique<codegen::Model>(model.robot(), catalogue);
     analysis::Diagnosed run(std::move(declared), std::move(catalogue), logs,
@@ -139,24 +142,31 @@ nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle te
     std::string of = "Train:";
     for (const logs::Log& log : logs) of += " " + log.source;
     json["model_file"] = diagnosis::ModelFile(*run.model, run.catalogue, run.diagnosis->finding(), of).text;
-  }
+  });
   Warn(notes);
   return ToDict(json);
 }
 
 }  // namespace
 
+nb::object ToDict(const ordered_json& json) { return nb::module_::import_("json").attr("loads")(json.dump()); }
+
 void BindAnalyses(nb::module_& m) {
   const char* const common =
       "\n\nlogs are a Log or a list of them. cutoff_Hz: speed and acceleration are derived below this frequency; 0: "
       "chosen from the noise of each log. A UserWarning says what a user should know of the logs. Other threads run "
       "meanwhile. InputError: a log cannot be one of this arm; the line names the log, the joint and the fault.";
-  const auto text = [common](const char* own) { return std::string(own) + common; };
+  const char* const watched =
+      " progress: a callable that gets the share done, 0 to 1, about ten times a second. What it raises ends the call, "
+      "and so does Ctrl-C.";
+  const auto text = [common](const char* own, const char* more = "") { return std::string(own) + common + more; };
   m.def("identify", &Identify, nb::arg("robot"), nb::arg("train"), nb::kw_only(), nb::arg("test") = nb::none(),
         nb::arg("cutoff_Hz") = 0.0, nb::arg("band_Hz") = 0.0, nb::arg("force") = false,
+        nb::arg("progress") = nb::none(),
         text("Fits the declared model to logs, weighted, with the robot file's prior. Returns what armcal identify "
              "--json writes, as a dict. test: a held-out Log; nothing is fitted to it. force: parameters may move that "
-             "the data hardly determine.")
+             "the data hardly determine.",
+             watched)
             .c_str());
   m.def("evaluate", &Evaluate, nb::arg("robot"), nb::arg("logs"), nb::kw_only(), nb::arg("table") = nb::none(),
         nb::arg("cutoff_Hz") = 0.0, nb::arg("band_Hz") = 0.0,
@@ -166,10 +176,12 @@ void BindAnalyses(nb::module_& m) {
             .c_str());
   m.def("diagnose", &Diagnose, nb::arg("robot"), nb::arg("train"), nb::arg("test"), nb::kw_only(),
         nb::arg("turns") = nb::none(), nb::arg("cutoff_Hz") = 0.0, nb::arg("gain_tolerance") = 0.0,
+        nb::arg("progress") = nb::none(),
         text("Finds what the model lacks on the training logs, and judges it on the held-out log. Returns what armcal "
              "diagnose --json writes, as a dict, and under model_file the robot file with the terms, as text. turns: "
              "look at the rows near turns and at rest, too; None: where the torque shows only slow motion. "
-             "gain_tolerance: share by which a joint's torque may be off; 0: the robot file's, or 0.1.")
+             "gain_tolerance: share by which a joint's torque may be off; 0: the robot file's, or 0.1.",
+             watched)
             .c_str());
 }
 

@@ -1,10 +1,13 @@
 // python - makes logs of numpy arrays or files.
+#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "host_sim/data/logs/channels.hpp"
 #include "host_sim/data/logs/log.hpp"
@@ -40,9 +43,11 @@ logs::Log FromArrays(nb::handle t, nb::handle q, nb::handle tau, nb::handle qd, 
   return logs::MakeLog(std::move(raw));
 }
 
-logs::Log FromFile(const std::string& path, const std::optional<std::string>& channels) {
+logs::Log FromFile(const std::filesystem::path& path, const std::optional<std::filesystem::path>& channels,
+                   const std::vector<std::filesystem::path>& messages) {
+  if (!channels && !messages.empty()) throw nb::value_error("msg: expected channels beside it");
   const nb::gil_scoped_release others_run;
-  return channels ? logs::ReadLog(path, logs::ReadChannelMap(*channels)) : logs::ReadLog(path);
+  return channels ? logs::ReadLog(path, logs::ReadChannelMap(*channels, messages)) : logs::ReadLog(path);
 }
 
 }  // namespace
@@ -71,8 +76,11 @@ void BindLogs(nb::module_& m) {
       .def_prop_ro("t", [](const Log& log) { return ToArray(log.t); })
       .def_prop_ro("q", [](const Log& log) { return ToArray(log.q); })
       .def_prop_ro("tau", [](const Log& log) { return ToArray(log.tau); });
-  m.def("read_log", &FromFile, nb::arg("path"), nb::arg("channels") = nb::none(),
-        "A log from a CSV file, plain or gzip. channels: a channel map (TOML) of foreign columns.\n"
+  m.def("read_log", &FromFile, nb::arg("path"), nb::arg("channels") = nb::none(), nb::kw_only(),
+        nb::arg("msg") = std::vector<std::filesystem::path>(),
+        "A log from a file: CSV, plain or gzip; with a channel map also MCAP, rosbag2 or MATLAB.\n\n"
+        "channels: path of a channel map (TOML) of foreign columns. msg: paths of definitions (.msg) of messages that "
+        "the file does not define itself; with channels only.\n"
         "InputError: the file cannot be read as a log.");
 }
 

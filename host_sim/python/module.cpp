@@ -1,8 +1,10 @@
 // python - the module armcal._core: a robot's model and what is computed with it.
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -58,7 +60,9 @@ NB_MODULE(_core, m) {
                                    "InputError: no such file, or a key of it is wrong.")
       .def(
           "__init__",
-          [](codegen::Model* self, const std::string& path) { new (self) codegen::Model(codegen::LoadModel(path)); },
+          [](codegen::Model* self, const std::filesystem::path& path) {
+            new (self) codegen::Model(codegen::LoadModel(path.string()));
+          },
           nanobind::arg("path"))
       .def_prop_ro("name", [](const codegen::Model& model) { return model.robot().name; })
       .def_prop_ro("joints", &codegen::Model::joints)
@@ -66,6 +70,7 @@ NB_MODULE(_core, m) {
       .def_prop_ro("units", &python::ColumnUnits, "units of the parameters of these columns");
   python::BindLogs(m);
   python::BindAnalyses(m);
+  python::BindExcite(m);
   m.def("regressor", &python::Regressor, nanobind::arg("robot"), nanobind::arg("q"), nanobind::arg("qd"),
         nanobind::arg("qdd"), nanobind::kw_only(), nanobind::arg("step_s") = 0.008,
         nanobind::arg("temp") = nanobind::none(),

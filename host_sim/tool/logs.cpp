@@ -31,9 +31,7 @@ void LogReader::PrintUntold(const std::vector<calibration::Dataset>& data) const
 void SayAside(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
 logs::ChannelMap MapOf(const LogFormat& format) {
-  logs::ChannelMap map = logs::ReadChannelMap(format.channels);
-  map.definitions.insert(map.definitions.end(), format.messages.begin(), format.messages.end());
-  return map;
+  return logs::ReadChannelMap(format.channels, {format.messages.begin(), format.messages.end()});
 }
 
 CLI::Option* AddMessages(CLI::App& verb, std::vector<std::string>& messages) {

@@ -94,7 +94,8 @@ const Edges kEdges = {
     // A program of its own flags: headers that stand alone only.
     {"host_sim/study/bench",   {kHost + "identify/calibration", "codegen/generated/", kLib + "math", kLib + "model"}},
     {"host_sim/tool",          {kHost, kCode, kLib}},
-    {"host_sim/python",        {kCode + "io", kCode + "generator", kHost + "data/logs", kHost + "identify/calibration",
+    {"host_sim/python",        {kCode + "io", kCode + "generator", kHost + "data/logs", kHost + "data/trajectory",
+                                kHost + "identify/calibration",
                                 kHost + "diagnose/verdict", kHost + "diagnose/analysis"}},
 
     // Tests may look everywhere; nothing may look into tests.

@@ -270,6 +270,10 @@ class MapReader {
 
 }  // namespace
 
-ChannelMap ReadChannelMap(const std::filesystem::path& path) { return MapReader(path).Read(); }
+ChannelMap ReadChannelMap(const std::filesystem::path& path, const std::vector<std::filesystem::path>& definitions) {
+  ChannelMap map = MapReader(path).Read();
+  map.definitions.insert(map.definitions.end(), definitions.begin(), definitions.end());
+  return map;
+}
 
 }  // namespace armcal::logs

@@ -50,7 +50,8 @@ struct ChannelMap {
   std::vector<std::filesystem::path> definitions = {};  // files *.msg
 };
 
-// InputError with file, key and what was expected.
-ChannelMap ReadChannelMap(const std::filesystem::path& path);
+// definitions: further files *.msg. InputError with file, key and what was expected.
+ChannelMap ReadChannelMap(const std::filesystem::path& path,
+                          const std::vector<std::filesystem::path>& definitions = {});
 
 }  // namespace armcal::logs

@@ -2,8 +2,8 @@
 import pathlib
 
 from . import _core
-from ._core import InputError, Log, Robot, diagnose, evaluate, identify, read_log, regressor
+from ._core import InputError, Log, Robot, diagnose, evaluate, excite, identify, read_log, regressor
 
-__all__ = ["InputError", "Log", "Robot", "diagnose", "evaluate", "identify", "read_log", "regressor"]
+__all__ = ["InputError", "Log", "Robot", "diagnose", "evaluate", "excite", "identify", "read_log", "regressor"]
 
 _core._set_installed_home(str(pathlib.Path(__file__).parent / "data"))

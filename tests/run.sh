@@ -85,6 +85,7 @@ if [[ $scope == peers ]]; then
   python_package() { build/peers/venv/bin/pip install -q --disable-pip-version-check -C "cmake.define.ARMCAL_BUILT=$PWD/build/host" ./host_sim/python; }
   step "the Python package" python_package || finish
   step "its regressor and Pinocchio" build/peers/venv/bin/python tests/peers/python_test.py build/host/armcal build/peers/python
+  step "its long calls and its example" build/peers/venv/bin/python tests/peers/python_calls_test.py build/host/armcal build/peers/python_calls
   step "packages of Conan, colcon, PlatformIO and Zephyr" build/peers/venv/bin/python tests/peers/packages_test.py . build/peers/packages
   if step "docs packages" toolchains/install.sh docs; then step "the site" cmake --build --preset host --target docs_site; fi
   step "the page about TLS" tests/docs/follow.sh docs/tls.md build/peers/tls build/host/armcal

@@ -39,7 +39,7 @@ nonlinear = { lo = -1.27, hi = 1.27 }'
 errors() {  # ROBOT HELD_OUT TRAIN...
   "${ARMCAL:-build/host/armcal}" identify --robot "$1" --channels host_sim/data/channels/kuka_lwr4.toml \
     --train "${@:3}" --test "${lwr}_$2.csv.gz" |
-    awk -v what="run $2, $(basename "$1" .toml):" '/^ +[1-7] /{ what = what " " $3 } END { print what }'
+    awk -v what="run $2, $(basename "$1" .toml):" '/^ +[1-7] /{ what = what " " $4 } END { print what }'
 }
 for model in codegen/robots/kuka_lwr4.toml "$out/kuka_lwr4_free.toml"; do
   with="$out/$(basename "$model" .toml)_q7.toml"

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <sys/stat.h>
 
+#include <chrono>
 #include <cstdio>
 #include <ctime>
 
@@ -13,6 +14,18 @@
 
 namespace armcal::tool {
 namespace {
+
+// What is wrong with "2026-03-01" or "2026-03-01T12:00:00Z"; empty: nothing.
+std::string WhyNoDate(const std::string& text) {
+  int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0, end = 0;
+  const int read = std::sscanf(text.c_str(), "%4d-%2d-%2d%nT%2d:%2d:%2dZ%n", &year, &month, &day, &end, &hour, &minute,
+                               &second, &end);
+  const bool whole = (read == 3 || read == 6) && static_cast<std::size_t>(end) == text.size();
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (whole && month > 0 && day > 0 && date.ok() && hour < 24 && minute < 60 && second < 60) return "";
+  return text + ": expected a date as 2026-03-01 or 2026-03-01T12:00:00Z";
+}
 
 std::string Utc(std::time_t time) {
   std::tm parts{};
@@ -79,7 +92,7 @@ void KeepHealth(const FleetOptions& o, client::DriveClient& drive, const nlohman
 void AddFleetOptions(CLI::App& verb, FleetOptions& o, const std::string& what, const std::string& when,
                      const std::string& usual) {
   auto* database = verb.add_option("--db", o.database, "keep " + what + " in this SQLite file, for armcal history");
-  verb.add_option("--date", o.date, "with --db: " + when)->needs(database);
+  verb.add_option("--date", o.date, "with --db: " + when)->needs(database)->check(CLI::Validator(WhyNoDate, "DATE"));
   auto* arm = verb.add_option("--arm", o.arm, "with --db: name of the arm" + usual);
   if (usual.empty()) database->needs(arm), arm->needs(database);
 }

@@ -74,8 +74,8 @@ int Run(const ImportOptions& o) {
   for (const std::string& fault : collision::MeshFaults(read))
     robot.said.push_back(fault + ": collisions cannot be checked");
   PrintGuesses(robot);
-  fmt::print("the arm's joints: {}; it ends at {}\n", fmt::join(robot.joints, ", "),
-             robot.choice.tip.empty() ? "the URDF's only end" : robot.choice.tip);
+  fmt::print("the arm's joints: {}{}\n", fmt::join(robot.joints, ", "),
+             robot.choice.tip.empty() ? "" : "; it ends at link " + robot.choice.tip);
   fmt::print("{}: {} joints, {}\nnext: armcal excite --robot {} --out train.csv\n", out.string(), read.joints(),
              read.has_prior ? "bodies from the URDF" : "no bodies: prior = \"none\"", out.string());
   nlohmann::ordered_json json{{"file", out.string()},    {"robot", read.name},          {"joints", robot.joints},

@@ -45,7 +45,7 @@ class Faults {
   std::vector<std::string> line_;
 };
 
-// The word of `known` that takes the fewest edits to write; empty if none is near.
+// The word of `known` that takes the fewest edits to write, or one that begins with `word`; empty if there is neither.
 template <class Words>
 std::string Nearest(std::string_view word, const Words& known) {
   const auto distance = [&word](std::string_view other) {
@@ -66,6 +66,10 @@ std::string Nearest(std::string_view word, const Words& known) {
   std::size_t fewest = std::max<std::size_t>(2, word.size() / 3) + 1;
   for (const auto& other : known)
     if (const std::size_t edits = distance(other); edits < fewest) fewest = edits, best = std::string(other);
+  constexpr std::size_t kFewestLetters = 4;
+  if (best.empty() && word.size() >= kFewestLetters)
+    for (const auto& other : known)
+      if (std::string_view(other).starts_with(word)) return std::string(other);
   return best;
 }
 

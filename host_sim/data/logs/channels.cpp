@@ -119,7 +119,7 @@ class MapReader {
     // The torque that is not used must be right, too: the map is for both.
     for (const std::string& other : {std::string("tau"), std::string(kLinkTorque)})
       if (const toml::table* table = root_[other].as_table(); table != nullptr && other != torque)
-        Channels(other, *table, "torque"), Matrix(other, *table);
+        Channels(other, *table, "torque"), Matrix(other, *table), map.unused = other;
     CheckPower(map, torque);
     return map;
   }

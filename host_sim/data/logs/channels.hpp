@@ -48,6 +48,7 @@ struct ChannelMap {
   std::vector<Quantity> quantities;
   std::string source;
   std::vector<std::filesystem::path> definitions = {};  // files *.msg
+  std::string unused = {};                              // the torque that is not read, of a map with two; or empty
 };
 
 // definitions: further files *.msg. InputError with file, key and what was expected.

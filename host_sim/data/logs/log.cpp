@@ -130,6 +130,9 @@ RawLog Raw(const std::string& file, Table table, const ChannelMap& map) {
   raw.first_line = table.first_line;
   raw.log.ignored = std::move(table.numbers.ignored);
   raw.log.notes = std::move(table.notes);
+  if (!map.unused.empty())
+    raw.log.notes.push_back(map.unused + " of the channel map is not read; torque = \"" + map.unused +
+                            "\" in the map takes it");
   return raw;
 }
 

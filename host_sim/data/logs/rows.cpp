@@ -289,10 +289,11 @@ class Chooser {
     const double step_s = MedianStep(out_.t), rate_Hz = 1 / step_s;
     if (rate_Hz > 1.001 * kSlowest_Hz && rate_Hz <= kFastest_Hz) return;
     std::string looks;
-    for (const auto& [unit, factor] : {std::pair{"ms", 1e3}, std::pair{"us", 1e6}, std::pair{"ns", 1e9}}) {
+    for (const auto& [wrong, factor] : {std::pair{"ms read as s, us as ms or ns as us", 1e3},
+                                        std::pair{"us read as s or ns as ms", 1e6}, std::pair{"ns read as s", 1e9}}) {
       const double as_s = rate_Hz * factor, as_less = rate_Hz / factor;
       if (as_s >= kUsualSlowest_Hz && as_s <= kUsualFastest_Hz)
-        looks = fmt::format("; it looks like {} read as s ({:.4g} Hz)", unit, as_s);
+        looks = fmt::format("; it looks like {} ({:.4g} Hz)", wrong, as_s);
       else if (as_less >= kUsualSlowest_Hz && as_less <= kUsualFastest_Hz)
         looks = fmt::format("; it looks {:g} times too short ({:.4g} Hz)", factor, as_less);
       if (!looks.empty()) break;

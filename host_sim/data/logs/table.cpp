@@ -1,11 +1,14 @@
 // logs - makes one table of a CSV file or of the topics of a recording.
 #include "host_sim/data/logs/table.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/bags/mat.hpp"
+#include "host_sim/data/bags/one_line.hpp"
 
 namespace armcal::logs {
 
@@ -93,6 +96,14 @@ Table FromRecording(const std::filesystem::path& path, const ChannelMap& map) {
       bags::ReadRecording(path, {{columns.begin(), columns.end()}, map.definitions, recorder_time});
   Table table{{}, path.string(), "its topics are", 1, std::move(recording.notes)};
   for (const std::string& topic : recording.topics) table.has += " " + topic;
+  if (recording.streams.empty() && !recording.ignored.empty()) {  // its joints have other names
+    const std::size_t shown = std::min<std::size_t>(recording.ignored.size(), 8);
+    throw io::InputError(bags::OneLine(fmt::format(
+        "{}: no column '{}' nor another one of the map; its topic has {}{}; armcal channels shows all", path.string(),
+        map.quantities.at(0).joint.at(0).column,
+        fmt::join(recording.ignored.begin(), recording.ignored.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+        shown < recording.ignored.size() ? ", .." : "")));
+  }
   if (recording.streams.empty()) return table;
   std::int64_t begin_ns = recording.streams[0].stamp_ns[0];
   for (const bags::Stream& stream : recording.streams) begin_ns = std::min(begin_ns, stream.stamp_ns[0]);

@@ -130,6 +130,7 @@ TEST_F(RobotFile, OfDhRows_SaysAllFaultsAtOnce) {
         ": joint[1].torque_noise_Nm: missing, expected a number above zero"}},
       {{{"torque_noise_Nm", "torque_noize_Nm"}},
        {"joint[1].torque_noize_Nm: unknown key; the nearest is torque_noise_Nm"}},
+      {{{"v_min_radps", "v_min"}}, {"joint[1].v_min: unknown key; the nearest is v_min_radps"}},
       {{{"gravity_mps2", "gravity_mps"}, {"v_min_mps", "vmin_mps"}},
        {"gravity_mps: unknown key; the nearest is gravity_mps2",
         "joint[2].vmin_mps: unknown key; the nearest is v_min_mps"}},

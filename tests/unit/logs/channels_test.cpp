@@ -130,6 +130,8 @@ TEST(Channels, OfTwoTorques_TheNamedOneIsRead) {
   EXPECT_EQ(log.ignored, (std::vector<std::string>{"current1", "current2"}));
   const Log motors = ReadLog(path, ReadChannelMap(folder.Write("m.toml", "torque = \"tau\"\n" + kCoupled)), 2);
   EXPECT_DOUBLE_EQ(motors.tau(0, 1), 2);
+  const std::string unused = "tau_link of the channel map is not read; torque = \"tau_link\" in the map takes it";
+  EXPECT_EQ(motors.notes.back(), unused);
 }
 
 TEST(Channels, NumbersFromZeroAndNames_StandForTheJoints) {

@@ -61,6 +61,18 @@ TEST(RecordedLog, WithoutAMapOrAColumn_IsRefusedInOneLine) {
                 "(sensor_msgs/msg/JointState)");
 }
 
+TEST(RecordedLog, OfJointsWithOtherNames_SaysWhichItHas) {
+  const TemporaryFolder folder;
+  std::string text = kJointStates;
+  const auto names = text.find("names"), end = text.find('\n', names);
+  text.replace(names, end - names, "names = [\"a\", \"b\", \"c\"]");
+  const ChannelMap map = ReadChannelMap(folder.Write("map.toml", text));
+  const std::string error = ErrorOf([&] { ReadLog(kRecordings / "plain.db3.zst", map); });
+  EXPECT_NE(error.find("no column '/joint_states/a/position'"), error.npos) << error;
+  EXPECT_NE(error.find("/joint_states/shoulder/position"), error.npos) << error;
+  EXPECT_NE(error.find("armcal channels"), error.npos) << error;
+}
+
 TEST(RecordedLog, TopicsOfDifferentRates_AreInterpolated) {
   // Torque comes from /ft at half the rate, so its times count. Positions come from /tcp, which has these times, too.
   const TemporaryFolder folder;

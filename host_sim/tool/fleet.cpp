@@ -15,16 +15,16 @@
 namespace armcal::tool {
 namespace {
 
-// What is wrong with "2026-03-01" or "2026-03-01T12:00:00Z"; empty: nothing.
+// What is wrong with "2026-03", "2026-03-01" or "2026-03-01T12:00:00Z"; empty: nothing.
 std::string WhyNoDate(const std::string& text) {
-  int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0, end = 0;
-  const int read = std::sscanf(text.c_str(), "%4d-%2d-%2d%nT%2d:%2d:%2dZ%n", &year, &month, &day, &end, &hour, &minute,
-                               &second, &end);
-  const bool whole = (read == 3 || read == 6) && static_cast<std::size_t>(end) == text.size();
+  int year = 0, month = 0, day = 1, hour = 0, minute = 0, second = 0, end = 0;
+  const int read = std::sscanf(text.c_str(), "%4d-%2d%n-%2d%nT%2d:%2d:%2dZ%n", &year, &month, &end, &day, &end, &hour,
+                               &minute, &second, &end);
+  const bool whole = (read == 2 || read == 3 || read == 6) && static_cast<std::size_t>(end) == text.size();
   const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};
   if (whole && month > 0 && day > 0 && date.ok() && hour < 24 && minute < 60 && second < 60) return "";
-  return text + ": expected a date as 2026-03-01 or 2026-03-01T12:00:00Z";
+  return text + ": expected a date as 2026-03, 2026-03-01 or 2026-03-01T12:00:00Z";
 }
 
 std::string Utc(std::time_t time) {

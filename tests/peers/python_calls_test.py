@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 import warnings
 
 import numpy as np
@@ -17,7 +16,6 @@ import armcal
 from python_test import refused, run_of_arm, urdf, write_csv
 
 CHECKOUT = pathlib.Path(__file__).resolve().parent.parent.parent
-MOST_S = 2.0  # from SIGINT to the end of the process
 
 
 def check_excite(program, folder):
@@ -126,31 +124,36 @@ def check_threads(robot, logs):
 
 
 INTERRUPTED = """
-import sys, time, armcal
+import signal, sys, armcal
 robot, files, call = armcal.Robot(sys.argv[1]), sys.argv[2:4], sys.argv[4]
 logs = [armcal.read_log(file) for file in files]
-print("begun", flush=True)
+shares, told, told_before = [], [], []
+def tell(share):
+    shares.append(share), told.append(share)
+    if len(told) == 1:
+        print("begun", flush=True)
+def stop(*_):
+    told_before.append(len(told))
+    raise KeyboardInterrupt
+signal.signal(signal.SIGINT, stop)
 try:
     while call == "diagnose":  # however fast the machine is
-        armcal.diagnose(robot, *logs)
-    armcal.excite(armcal.Robot("er20_like"), seconds=600)
+        shares.clear()
+        armcal.diagnose(robot, *logs, progress=tell)
+    armcal.excite(armcal.Robot("er20_like"), seconds=600, progress=tell)
 except KeyboardInterrupt:
-    print("interrupted", flush=True)
+    print("interrupted", shares[-1] < 1, len(told) - told_before[0], flush=True)
 """
 
 
+# The call ends before its work is done, and it tells nothing more after the signal.
 def check_interrupt(robot_file, files):
     for call in ("diagnose", "excite"):
         child = subprocess.Popen([sys.executable, "-W", "ignore", "-c", INTERRUPTED, robot_file, *files, call], stdout=subprocess.PIPE, text=True)
         assert child.stdout.readline() == "begun\n"
-        time.sleep(1)
         child.send_signal(signal.SIGINT)
-        begin = time.monotonic()
         said = child.communicate(timeout=60)[0]
-        took = time.monotonic() - begin
-        print(f"{call} ends {took:.2f} s after Ctrl-C")
-        assert (said, child.returncode) == ("interrupted\n", 0), (said, child.returncode)
-        assert took < MOST_S, took
+        assert (said, child.returncode) == ("interrupted True 0\n", 0), (said, child.returncode)
 
 
 def check_paths(folder, robot_file, files):

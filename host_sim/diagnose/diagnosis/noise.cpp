@@ -159,7 +159,9 @@ VectorXd Whiten(const NoiseModel& noise, const RowIndex& rows, const Eigen::Ref<
 Eigen::MatrixXd WhitenColumns(const NoiseModel& noise, const RowIndex& rows, const Eigen::MatrixXd& m) {
   if (IsWhite(noise)) return m * (1 / noise.innovation);
   Eigen::MatrixXd out(m.rows(), m.cols());
-  for (int c = 0; c < m.cols(); ++c) out.col(c) = Whiten(noise, rows, m.col(c));
+  for (const auto& [begin, end] : Stretches(rows))
+    for (int c = 0; c < m.cols(); ++c)
+      WhitenStretch(noise, m.col(c).data() + begin, end - begin, out.col(c).data() + begin);
   return out;
 }
 

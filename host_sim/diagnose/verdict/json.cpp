@@ -134,7 +134,8 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   nlohmann::ordered_json j;
   j["verdict"] = AnyConfirmed(f) ? "effect" : "none";
   j["joint_base"] = 1;
-  j["headline"] = Headline(f, !StrangeJoints(v).empty());
+  const std::vector<Strange> strange = StrangeJoints(v);
+  j["headline"] = Headline(f, !strange.empty());
   AddRobot(j, v.model->robot());
   j["terms"] = nlohmann::ordered_json::array();
   for (const std::size_t n : OrderOfTerms(v)) {
@@ -223,9 +224,9 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
   j["at_rest"] = nlohmann::ordered_json::array();
   for (const int joint : Rested(v)) j["at_rest"].push_back(joint + 1);
   j["held_out_differs"] = nlohmann::ordered_json::array();
-  for (const Strange& s : StrangeJoints(v))
+  for (const Strange& s : strange)
     j["held_out_differs"].push_back({{"joint", s.joint + 1}, {"held_out", s.held_out}, {"training", s.training}});
-  j["held_out_differs_text"] = StrangeText(v);
+  j["held_out_differs_text"] = StrangeText(strange, v.model->robot());
   j["held_out_text"] = MotionText(v.motion);
   j["exogeneity_text"] = ExogeneityText(v.exogeneity, kLacksMore);
   j["declared_parameters"] = DeclaredJson(v);

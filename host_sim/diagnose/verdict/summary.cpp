@@ -4,6 +4,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 
 #include "host_sim/data/report/page.hpp"
 #include "host_sim/diagnose/verdict/json_values.hpp"
@@ -58,18 +60,20 @@ report::Table VerdictTable(const ordered_json& summary) {
 // Of every log what is farthest from its type.
 report::Table FarTable(const ordered_json& summary) {
   report::Table t{{"log", "parameter", "value", "its type", "deviations", "others"}, {}};
-  for (const auto& v : summary.at("verdicts")) {
-    const ordered_json far = v.value("far_from_type", ordered_json::array());
-    if (far.empty()) continue;
+  std::multimap<double, const ordered_json*, std::greater<>> verdicts;  // by the deviations of the farthest
+  for (const auto& v : summary.at("verdicts"))
+    if (v.contains("far_from_type") && !v.at("far_from_type").empty())
+      if (const double far = NumberOf(v.at("far_from_type").at(0).at("deviations")); std::isfinite(far))
+        verdicts.emplace(far, &v);
+  for (const auto& [deviations, verdict] : verdicts) {
+    const ordered_json& far = verdict->at("far_from_type");
     const ordered_json& most = far.at(0);
     const auto number = [&most](const char* key) { return NumberOf(most.at(key)); };
-    t.rows.push_back({v.at("name"), most.at("parameter"),
+    t.rows.push_back({verdict->at("name"), most.at("parameter"),
                       fmt::format("{:.4g} {}", number("value"), most.at("unit").get<std::string>()),
                       fmt::format("{:.4g} +- {:.2g}", number("median"), number("spread")),
-                      fmt::format("{:.1f}", number("deviations")), std::to_string(far.size() - 1)});
+                      fmt::format("{:.1f}", deviations), std::to_string(far.size() - 1)});
   }
-  std::stable_sort(t.rows.begin(), t.rows.end(),
-                   [](const auto& a, const auto& b) { return std::stod(a[4]) > std::stod(b[4]); });
   return t;
 }
 

@@ -72,7 +72,7 @@ Dependence DependenceOf(const DiagnosisView& v, std::size_t term) {
 }
 
 std::string DiagnosisText(const DiagnosisView& v) {
-  const std::vector<std::string> strange = StrangeText(v);
+  const std::vector<std::string> strange = StrangeText(StrangeJoints(v), v.model->robot());
   std::string out = "verdict: " + Headline(*v.finding, !strange.empty()) + "\n";
   for (const std::string& line : strange) out += "  " + line + "\n";
   for (const std::string& line : PayloadText(v)) out += "  " + line + "\n";

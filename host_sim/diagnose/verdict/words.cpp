@@ -41,12 +41,12 @@ std::vector<Strange> StrangeJoints(const DiagnosisView& v) {
   return out;
 }
 
-std::vector<std::string> StrangeText(const DiagnosisView& v) {
+std::vector<std::string> StrangeText(const std::vector<Strange>& strange, const codegen::Robot& robot) {
   std::vector<std::string> lines;
-  for (const Strange& s : StrangeJoints(v))
-    lines.push_back(fmt::format(
-        "joint {}: the held-out log leaves {:.3g} {}, {:.1f} times what the training logs leave", s.joint + 1,
-        s.held_out, calibration::TorqueUnit(v.model->robot().joint[s.joint]), s.held_out / s.training));
+  for (const Strange& s : strange)
+    lines.push_back(
+        fmt::format("joint {}: the held-out log leaves {:.3g} {}, {:.1f} times what the training logs leave",
+                    s.joint + 1, s.held_out, calibration::TorqueUnit(robot.joint[s.joint]), s.held_out / s.training));
   if (!lines.empty())
     lines.emplace_back(
         "so the held-out log differs from the training logs: another load, temperature, cable, contact or arm; "

@@ -25,7 +25,7 @@ struct Strange {
 };
 std::vector<Strange> StrangeJoints(const DiagnosisView& v);
 // "joint 2: the held-out log leaves 2.21 N m, 40 times what the training logs leave. ..."
-std::vector<std::string> StrangeText(const DiagnosisView& v);
+std::vector<std::string> StrangeText(const std::vector<Strange>& strange, const codegen::Robot& robot);
 
 // "3", "5-6", "all", "base", "flange": how a report names the joints of a term.
 std::string JointName(const diagnosis::Term& term);

@@ -32,9 +32,8 @@ std::string WhyUncheckable(const codegen::Robot& robot);
 // May be used by several threads at once.
 class Clearance {
  public:
-  // margin_m: the distance that is asked for. Throws io::InputError: a mesh that cannot be read, or a
-  // shape that is not in metres. WhyUncheckable must be
-  // empty.
+  // margin_m: the distance that is asked for. Throws io::InputError: a mesh that cannot be read, or a shape that is not
+  // in metres. WhyUncheckable must be empty.
   Clearance(const codegen::Robot& robot, const Cell& cell, double margin_m);
 
   double margin_m() const { return margin_m_; }

@@ -187,9 +187,9 @@ Description ToUrdf(const DescribedArm& arm, const std::string& urdf, bool merge)
     edits.SetDynamics(
         joint,
         {"dynamics", {{"damping", Exact(arm.joint[j].viscous_Nmsprad)}, {"friction", Exact(arm.joint[j].coulomb_Nm)}}});
-    for (const XmlAttribute& a :
-         joint.Find("dynamics") ? joint.Find("dynamics")->attribute : std::vector<XmlAttribute>())
-      if (a.name != "damping" && a.name != "friction") kept[a.name].push_back(arm.robot.joint[j].name);
+    if (const XmlElement* given = joint.Find("dynamics"))
+      for (const XmlAttribute& a : given->attribute)
+        if (a.name != "damping" && a.name != "friction") kept[a.name].push_back(arm.robot.joint[j].name);
     if (merge && !names.empty())
       d.left_out.push_back(fmt::format("inertials of {}: they are in {}", names, parts[0].link));
   }

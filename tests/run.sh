@@ -47,7 +47,8 @@ step() {
 run_ctest() {
   local name=$1 start=$SECONDS results=$2/Testing/results.xml
   rm -f "$results"
-  ctest --test-dir "$2" -L "$3" -R "${4:-.}" -j "$jobs" --output-on-failure --no-tests=error --output-junit Testing/results.xml \
+  # One more than there are cores: a test that waits for a drive leaves a core idle.
+  ctest --test-dir "$2" -L "$3" -R "${4:-.}" -j $((jobs + 1)) --output-on-failure --no-tests=error --output-junit Testing/results.xml \
     --test-output-size-passed 1000000 >"$log" 2>&1
   local status=$? total bad absent skipped
   count() { grep -om1 "\b$1=\"[0-9]*\"" "$results" 2>/dev/null | tr -dc 0-9; }
@@ -78,7 +79,7 @@ if [[ $scope == peers ]]; then
   step "peers packages" toolchains/install.sh peers || finish
   step "other people's programs" peers_programs || finish
   step "build armcal" configure_and_build host --target armcal armcal-generate armcal_analysis practice_robot judged_set judged_score || finish
-  step "exports in MuJoCo and Pinocchio" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
+  step "exports in MuJoCo, Pinocchio and libsdformat" build/peers/venv/bin/python tests/peers/exports_test.py build/host/armcal build/peers/exports
   step "excitations in MuJoCo" build/peers/venv/bin/python tests/peers/collisions_test.py build/host/armcal build/peers/collisions
   step "arms of public collections" build/peers/venv/bin/python tests/peers/arms_test.py build/host/armcal build/peers/arms
   step "logs by other people's libraries" build/peers/venv/bin/python tests/peers/logs_test.py build/host/armcal build/peers/logs

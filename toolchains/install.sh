@@ -13,14 +13,14 @@ set -euo pipefail
 host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
   libeigen3-dev liborocos-kdl-dev libmodbus-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev zlib1g-dev
   libgtest-dev googletest dpkg-dev file mbpoll liburdfdom-dev libkdl-parser-dev libtinyxml2-dev libpagmo-dev libboost-dev
-  libjs-dygraphs libssl-dev liblz4-dev libzstd-dev libsqlite3-dev libmatio-dev libfcl-dev)
+  libjs-dygraphs libssl-dev liblz4-dev libzstd-dev libsqlite3-dev libmatio-dev libfcl-dev libassimp-dev)
 cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   qemu-system-arm python3)
 fuzz_packages=(clang libclang-rt-dev)
 fleet_packages=(slurmctld slurmd slurm-client munge parallel)
 fresh_packages=(debootstrap)
 peers_packages=(python3 python3-dev python3-venv python3-pip chromium colcon python3-colcon-cmake python3-colcon-ros
-  stunnel4 openssl)
+  stunnel4 openssl libsdformat-dev)
 docs_packages=(python3 python3-sphinx python3-myst-parser doxygen)
 
 wanted=()

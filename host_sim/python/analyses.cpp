@@ -99,20 +99,21 @@ nb::object Identify(const codegen::Model& model, nb::handle train, nb::handle te
 }
 
 nb::object Evaluate(const codegen::Model& model, nb::handle given_logs,
-                    const std::optional<std::filesystem::path>& table, double cutoff_Hz, double band_Hz) {
+                    const std::optional<std::filesystem::path>& table, double cutoff_Hz, double band_Hz,
+                    nb::handle progress) {
   const std::vector<logs::Log> logs = ReadLogs(given_logs, "logs");
   CheckFrequency(cutoff_Hz, "cutoff_Hz"), CheckFrequency(band_Hz, "band_Hz");
   ordered_json json{{"robot", model.robot().name}};
   Notes notes;
-  {
-    const nb::gil_scoped_release others_run;
+  RunLongCall(progress, [&] {
     const calibration::Given given =
         table ? calibration::GivenByFile(model, table->string()) : calibration::GivenByRobot(model);
     for (const std::string& name : given.missing)
       notes.push_back("no value for " + name + ": the robot file's is taken");
     const std::vector<calibration::Dataset> data = analysis::CheckedLogs(model, logs, cutoff_Hz, Into(notes));
+    io::SetDone(0.5);
     json.update(analysis::Evaluate(model, given, data, band_Hz).json);
-  }
+  });
   Warn(notes);
   return ToDict(json);
 }
@@ -169,10 +170,11 @@ void BindAnalyses(nb::module_& m) {
              watched)
             .c_str());
   m.def("evaluate", &Evaluate, nb::arg("robot"), nb::arg("logs"), nb::kw_only(), nb::arg("table") = nb::none(),
-        nb::arg("cutoff_Hz") = 0.0, nb::arg("band_Hz") = 0.0,
+        nb::arg("cutoff_Hz") = 0.0, nb::arg("band_Hz") = 0.0, nb::arg("progress") = nb::none(),
         text("The torque error of a given model on logs; nothing is fitted. Returns what armcal evaluate --json "
              "writes, as a dict. table: path of a parameter table, or of a JSON that armcal identify wrote; without "
-             "it the robot file's own values.")
+             "it the robot file's own values.",
+             watched)
             .c_str());
   m.def("diagnose", &Diagnose, nb::arg("robot"), nb::arg("train"), nb::arg("test"), nb::kw_only(),
         nb::arg("turns") = nb::none(), nb::arg("cutoff_Hz") = 0.0, nb::arg("gain_tolerance") = 0.0,

@@ -13,6 +13,7 @@
 #include "host_sim/data/logs/log.hpp"
 #include "host_sim/python/arrays.hpp"
 #include "host_sim/python/bindings.hpp"
+#include "host_sim/python/long_call.hpp"
 
 namespace armcal::python {
 
@@ -46,8 +47,11 @@ logs::Log FromArrays(nb::handle t, nb::handle q, nb::handle tau, nb::handle qd, 
 logs::Log FromFile(const std::filesystem::path& path, const std::optional<std::filesystem::path>& channels,
                    const std::vector<std::filesystem::path>& messages) {
   if (!channels && !messages.empty()) throw nb::value_error("msg: expected channels beside it");
-  const nb::gil_scoped_release others_run;
-  return channels ? logs::ReadLog(path, logs::ReadChannelMap(*channels, messages)) : logs::ReadLog(path);
+  logs::Log log;
+  RunLongCall(nb::none(), [&] {
+    log = channels ? logs::ReadLog(path, logs::ReadChannelMap(*channels, messages)) : logs::ReadLog(path);
+  });
+  return log;
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "host_sim/identify/calibration/prior.hpp"
 #include "host_sim/python/arrays.hpp"
 #include "host_sim/python/bindings.hpp"
+#include "host_sim/python/long_call.hpp"
 
 namespace armcal::python {
 namespace {
@@ -39,12 +40,11 @@ nb::object Regressor(const codegen::Model& model, nb::handle q, nb::handle qd, n
   if (!(step_s > 0 && step_s < 1e300)) throw nb::value_error("step_s: expected a time above 0 s");
   s.t = Eigen::VectorXd::LinSpaced(s.q.rows(), 0, step_s * static_cast<double>(s.q.rows() - 1));
   std::vector<Eigen::MatrixXd> row;
-  {
-    const nb::gil_scoped_release others_run;
+  RunLongCall(nb::none(), [&] {
     const Eigen::VectorXd committed = calibration::MakePrior(model).mean.head(model.columns());
     const std::vector<double> eta = calibration::MeanUnknowns(model);
     model.Regressor(s, {committed.data(), static_cast<std::size_t>(committed.size())}, eta, row);
-  }
+  });
   return ToArray(row);
 }
 

@@ -5,7 +5,9 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/data/files/files.hpp"
+#include "host_sim/data/report/progress.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
@@ -31,7 +33,10 @@ void Print(const analysis::Diagnosed& run, const DiagnoseOptions& o) {
       row.push_back(json[key][j].is_null() ? "-" : fmt::format("{:.4g}", json[key][j].get<double>()));
     table.rows.push_back(row);
   }
-  fmt::print("held out: {}, RMS of measured minus predicted torque\n{}", o.test, report::Text(table));
+  fmt::print(
+      "held out: {}, RMS of measured minus predicted torque of all samples; moving: without those at rest and beside a "
+      "jolt\n{}",
+      o.test, report::Text(table));
   if (!o.model_out.empty() && !run.view.finding->terms.empty()) {
     const bool held = std::any_of(json["terms"].begin(), json["terms"].end(),
                                   [](const auto& t) { return t["in_model"].template get<bool>(); });
@@ -58,8 +63,12 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
     if (std::error_code none; std::filesystem::equivalent(p, o.test, none))
       throw io::InputError("--test " + o.test + ": expected another log than those of --train");
   const LogReader read(model, o.format);
-  auto run = std::make_unique<analysis::Diagnosed>(std::move(declared), std::move(catalogue), read.Raw(o.train), o.how,
-                                                   SayAside);
+  const std::vector<logs::Log> train = read.Raw(o.train);
+  report::Progress line("diagnose");
+  const io::Watch watch([&line](double share) { line.Set(share); });
+  const auto say = [&line](const std::string& text) { line.Clear(), SayAside(text); };
+  auto run = std::make_unique<analysis::Diagnosed>(std::move(declared), std::move(catalogue), train, o.how, say);
+  line.Clear();
   read.PrintUntold(run->train);
   const diagnosis::Finding& finding = run->diagnosis->finding();
 
@@ -68,13 +77,16 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
   for (const std::string& p : o.train)
     provenance +=
         " " + std::filesystem::path(p).filename().string() + " (sha256 " + files::FileHash(p).substr(0, 16) + ")";
-  const std::string before_test = diagnosis::ModelFile(model, run->catalogue, finding, provenance).text;
+  const auto folder =
+      o.model_out.empty() ? std::filesystem::path() : std::filesystem::absolute(o.model_out).parent_path();
+  const std::string before_test = diagnosis::ModelFile(model, run->catalogue, finding, provenance, folder).text;
   if (!o.model_out.empty()) {
     files::WriteWholeFile(o.model_out, before_test);
     model_hash = files::FileHash(o.model_out);
   }
-  run->Judge(read.Raw(o.test), o.robot, o.json, SayAside);
-  const diagnosis::NewModel after_test = diagnosis::ModelFile(model, run->catalogue, finding, provenance);
+  run->Judge(read.Raw(o.test), o.robot, o.json, say);
+  line.Clear();
+  const diagnosis::NewModel after_test = diagnosis::ModelFile(model, run->catalogue, finding, provenance, folder);
   if (!o.model_out.empty() && after_test.text != before_test)
     files::WriteWholeFile(o.model_out, after_test.text);  // what was not confirmed is taken out
   nlohmann::ordered_json& json = run->json;

@@ -91,13 +91,17 @@ verdict::Verdicts DiagnoseAll(const std::vector<DiagnosisCase>& cases, const Dia
 }
 
 const char* const kLayout =
-    "NAME.train.csv and NAME.test.csv (or .csv.gz), or folders NAME with train.csv and test.csv";
+    "NAME.train.csv and NAME.test.csv, or folders NAME with train.csv and test.csv (or .csv.gz, .mcap, .db3, .mat, a "
+    "folder of rosbag2)";
+const std::vector<std::string> kLogEnds = {".csv", ".csv.gz", ".mcap", ".mcap.zst", ".db3", ".db3.zst", ".mat"};
 
-// "arm7.train.csv.gz" of role "train" -> "arm7."; "train.csv" -> "". False for another role.
-bool Strip(const std::string& file, const std::string& role, std::string& name) {
-  for (const std::string& end : {role + ".csv", role + ".csv.gz"})
-    if (file.ends_with(end)) {
-      name = file.substr(0, file.size() - end.size());
+// "arm7.train.csv.gz" of role "train" -> "arm7."; "train.csv" -> "". A folder has no end. False for another role.
+bool Strip(const fs::path& path, const std::string& role, std::string& name) {
+  const std::string file = path.filename().string();
+  const std::vector<std::string> folder{""};
+  for (const std::string& end : fs::is_directory(path) ? folder : kLogEnds)
+    if (file.ends_with(role + end)) {
+      name = file.substr(0, file.size() - role.size() - end.size());
       return true;
     }
   return false;
@@ -111,7 +115,7 @@ std::vector<DiagnosisCase> FindCases(const fs::path& folder, const std::string& 
   const auto add = [&](const fs::path& file, const std::string& inside) {
     for (const char* role : {"train", "test"}) {
       std::string name;
-      if (!Strip(file.filename().string(), role, name)) continue;
+      if (!Strip(file, role, name)) continue;
       const bool pair = name.size() > 1 && name.back() == '.';
       if (inside.empty() ? !pair : !name.empty()) continue;
       name = inside.empty() ? name.substr(0, name.size() - 1) : inside;
@@ -127,11 +131,12 @@ std::vector<DiagnosisCase> FindCases(const fs::path& folder, const std::string& 
     }
   };
   for (const auto& e : fs::directory_iterator(folder)) {
-    if (!e.is_directory()) {
+    const std::string name = e.path().filename().string();
+    if (!e.is_directory() || name.ends_with(".train") || name.ends_with(".test")) {
       add(e.path(), "");
       continue;
     }
-    for (const auto& inner : fs::directory_iterator(e.path())) add(inner.path(), e.path().filename().string());
+    for (const auto& inner : fs::directory_iterator(e.path())) add(inner.path(), name);
   }
   std::vector<DiagnosisCase> cases;
   for (auto& [name, c] : found) {
@@ -182,7 +187,9 @@ void Check(const DiagnoseOptions& one, const BatchOptions& batch) {
 // "runs/a.csv.gz" -> "a".
 std::string RunName(const std::string& path) {
   const std::string file = fs::path(path).filename().string();
-  return file.substr(0, file.find(".csv"));
+  for (const std::string& end : kLogEnds)
+    if (file.ends_with(end)) return file.substr(0, file.size() - end.size());
+  return file;
 }
 
 // Holds out each run once. All runs outside of its group are its training logs.

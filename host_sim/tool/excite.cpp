@@ -19,12 +19,14 @@ struct ExciteOptions {
   analysis::ExciteOptions how = {};
 };
 
-void PrintClearance(const collision::Clearance& clearance, const collision::Nearest& nearest) {
+void PrintClearance(const collision::Clearance& clearance, const collision::Nearest& nearest,
+                    const std::vector<double>& too_far_m) {
   if (clearance.pairs() == 0) fmt::print("collisions: no pair of solids to check\n");
   else
     fmt::print("collisions: {} pairs keep {:.1f} mm; nearest {:.1f} mm at {:.3f} s, {} and {}\n", clearance.pairs(),
                1e3 * clearance.margin_m(), 1e3 * nearest.distance_m,
                excitation::kCheckStep_s * static_cast<double>(nearest.sample), nearest.a, nearest.b);
+  for (const double distance : too_far_m) fmt::print("  no motion was found that keeps {:.1f} mm\n", 1e3 * distance);
   std::map<std::string, std::vector<std::string>> by_reason;
   for (const auto& [a, b, reason] : clearance.unchecked()) by_reason[reason].push_back(a + " - " + b);
   for (const auto& [reason, pairs] : by_reason) fmt::print("  not checked, {}: {}\n", reason, fmt::join(pairs, ", "));
@@ -112,7 +114,7 @@ int RunExcite(const ExciteOptions& o) {
   fmt::print("sections:");
   for (const auto& s : composed.sections)
     fmt::print(" {} {:.1f}-{:.1f} s{}", s.name, s.begin_s, s.end_s, &s == &composed.sections.back() ? "\n" : ",");
-  if (found.clearance) PrintClearance(*found.clearance, composed.nearest);
+  if (found.clearance) PrintClearance(*found.clearance, composed.nearest, found.too_far_m);
   else fmt::print("collisions are not checked: look at the motion, and run it slowly first\n  {}\n", found.unchecked);
   fmt::print("written: {} ({:.1f} s, {} points, {:g} ms)\n", o.out, composed.trajectory.duration_s(),
              composed.trajectory.q.rows(), 1e3 * composed.trajectory.step_s);

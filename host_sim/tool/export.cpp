@@ -1,6 +1,7 @@
 // tool - armcal export: writes an identified arm for other programs, and says what their format cannot hold.
 #include <fmt/format.h>
 
+#include "host_sim/data/files/files.hpp"
 #include "host_sim/identify/description/described_arm.hpp"
 #include "host_sim/tool/given.hpp"
 
@@ -9,14 +10,19 @@ namespace {
 
 struct ExportOptions {
   GivenOptions given;
-  std::string format, urdf, out, json;
+  std::string format, into, out, json;
   bool merge = false;
 };
 
 description::Description Write(const ExportOptions& o, const description::DescribedArm& arm) {
-  if (o.format == "urdf") return description::ToUrdf(arm, o.urdf, o.merge);
-  if (o.merge || !o.urdf.empty())
-    throw io::InputError("--urdf, --merge: expected --format urdf beside them, not " + o.format);
+  const bool into = !o.into.empty();
+  if (into && o.format != "urdf" && o.format != "sdf" && o.format != "mjcf")
+    throw io::InputError("--into: expected --format urdf, sdf or mjcf beside it, not " + o.format);
+  if (o.merge && o.format != "urdf" && !(into && o.format == "mjcf"))
+    throw io::InputError("--merge: expected --format urdf, or --format mjcf with --into, beside it");
+  if (o.format == "urdf") return description::ToGivenUrdf(arm, o.into, o.merge);
+  if (into && o.format == "sdf") return description::ToGivenSdf(arm, o.into, files::ReadWholeFile(o.into));
+  if (into && o.format == "mjcf") return description::ToGivenMjcf(arm, o.into, files::ReadWholeFile(o.into), o.merge);
   if (o.format == "sdf") return description::ToSdf(arm);
   if (o.format == "mjcf") return description::ToMjcf(arm);
   if (o.format == "yaml") return description::ToYaml(arm);
@@ -31,9 +37,9 @@ int Run(const ExportOptions& o) {
   const calibration::Given given = ReadGiven(o.given, model);
   const description::DescribedArm arm = description::Describe(model, given, source);
   const description::Description d = Write(o, arm);
-  const std::filesystem::path urdf = o.urdf.empty() ? model.robot().urdf.path : std::filesystem::path(o.urdf);
-  if (std::error_code none; std::filesystem::equivalent(o.out, urdf, none))
-    throw io::InputError("--out " + o.out + ": is the URDF that is read; expected another file");
+  const std::filesystem::path read = o.into.empty() ? model.robot().urdf.path : std::filesystem::path(o.into);
+  if (std::error_code none; std::filesystem::equivalent(o.out, read, none))
+    throw io::InputError("--out " + o.out + ": is the file that is read; expected another file");
   files::WriteWholeFile(o.out, d.text);
   if (o.given.table.empty())
     fmt::print("values: those that {} states; --table takes what armcal identify found\n", robot);
@@ -60,8 +66,9 @@ void AddExport(CLI::App& app, Action& action) {
   auto o = std::make_shared<ExportOptions>();
   AddGivenOptions(*verb, o->given);
   verb->add_option("--format", o->format, "urdf, sdf, mjcf, yaml or c")->required();
-  verb->add_option("--urdf", o->urdf, "the URDF to write into (default: the one that the robot file names)");
-  verb->add_flag("--merge", o->merge, "urdf: a moving link gets the whole body, the links fixed to it get none");
+  verb->add_option("--into,--urdf", o->into,
+                   "a URDF, SDF or MJCF of this arm to write into (urdf: default the one that the robot file names)");
+  verb->add_flag("--merge", o->merge, "urdf, mjcf: a moving link gets the whole body, the links fixed to it get none");
   verb->add_option("-o,--out", o->out, "file to write")->required();
   verb->add_option("--json", o->json, "write what was written, and what was left out, here");
   verb->callback([o, &action] { action = [o] { return Run(*o); }; });

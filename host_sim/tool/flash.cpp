@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "armcal/core/crc.hpp"
+#include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_backup.hpp"

@@ -54,7 +54,8 @@ std::string TermText(const health::Term& t) {
 std::string Sentence(const JointHealth& h) {
   std::string text = fmt::format("joint {} {}", h.joint, VerdictText(h.verdict));
   if (h.verdict == health::Verdict::kTooEarly)
-    return text + fmt::format(": {:.0f} samples in motion since the table was adopted", h.rows);
+    return text + fmt::format(": {:.0f} samples in motion since the table was adopted, an answer needs {:.0f} more",
+                              h.rows, h.missing_rows);
   if (h.verdict != health::Verdict::kFits) {
     text += h.looks_like.terms.empty() ? ": can't tell what it is" : ": looks like ";
     for (std::size_t i = 0; i < h.looks_like.terms.size(); ++i)
@@ -85,7 +86,8 @@ ordered_json JointJson(const JointHealth& h) {
                  {"residual_Nm", h.rms_now_Nm},
                  {"residual_at_adoption_Nm", h.rms_then_Nm},
                  {"torque_noise_Nm", h.sigma_Nm},
-                 {"rows", h.rows}};
+                 {"rows", h.rows},
+                 {"missing_rows", h.missing_rows}};
   for (const health::Term& t : h.looks_like.terms) j["looks_like"].push_back(TermJson(t));
   if (h.onset) {
     j["since_s"] = h.elapsed_s - h.onset->at_s;

@@ -154,7 +154,9 @@ const char* const kUnit[] = {"kg", "m", "m", "m", "kg*m^2", "kg*m^2", "kg*m^2", 
 
 void Check(const PayloadOptions& o) {
   if (o.with.empty()) throw io::InputError("--with: expected log(s) of runs with the payload");
-  if (o.without.empty()) throw io::InputError("--without: expected log(s) of runs without the payload");
+  if (o.without.empty())
+    throw io::InputError(
+        "--without: expected log(s) of runs without the payload; the log that identified the arm will do");
   for (const auto& [option, given] : {std::pair{"--payload-out", &o.payload_out}, std::pair{"--ros-out", &o.ros_out}})
     if (!o.payload.empty() && !given->empty())
       throw io::InputError(std::string(option) + ": expected no --payload; what is known is not identified");

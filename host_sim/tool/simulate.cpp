@@ -3,6 +3,7 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/atomic_write.hpp"
+#include "host_sim/machine/plant/robot_file.hpp"
 #include "host_sim/machine/plant/scenario.hpp"
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/compiled_firmware.hpp"
@@ -39,7 +40,9 @@ int RunSimulate(const SimulateOptions& o) {
   if (!o.drive.empty() && !fs::is_regular_file(o.drive)) throw io::InputError(o.drive + ": no such program");
   if (const auto folder = fs::path(o.storage).parent_path(); !folder.empty()) io::MakeFolder(folder);
   const codegen::Robot arm = codegen::ReadRobot(robot);
-  plant::RequireRobot(plant::ReadScenario(scenario.string()), arm.name, robot.string());  // before anything is compiled
+  // Before anything is compiled: the scenario is of this arm, and the arm can be simulated.
+  plant::RequireRobot(plant::ReadScenario(scenario.string()), arm.name, robot.string());
+  plant::ReadRobotFile(robot.string());
   std::vector<std::string> words =
       o.drive.empty() ? DriveFor({arm, LoadCatalogue()}) : std::vector<std::string>{o.drive};
   words.insert(words.end(), {"--scenario", scenario.string(), "--robot", robot.string(), "--storage", o.storage,

@@ -31,7 +31,12 @@ for block in blocks/*; do
     *.sh)
       echo "== $(basename "$page"), $block"
       cat "$block"
-      bash -euo pipefail "$block" >out.txt 2>err.txt || { cat out.txt err.txt; echo "FAILED: $block"; exit 1; } ;;
+      bash -euo pipefail "$block" >out.txt 2>err.txt || {
+        cat out.txt err.txt
+        find . -name "*.pid" | while read -r pid; do tail -n 20 "${pid%.pid}.txt" || true; done  # what the drive said
+        echo "FAILED: $block"
+        exit 1
+      } ;;
     *.text | *.diff)
       diff -u "$block" out.txt || { echo "FAILED: the page shows another output (left) than its commands print (right)"; exit 1; } ;;
     *)

@@ -122,6 +122,23 @@ TEST_F(Batch, GivesEveryLogALine_AndABadOneStopsNoOther) {
   EXPECT_EQ(Tool({"history", "folder", "--db", Path("resumed.sqlite")}).code, 0);  // kept ones are in the database
 }
 
+TEST_F(Batch, LogsOfOtherFormats_AreFound) {
+  const std::filesystem::path folder = FreshFolder("batch_formats");
+  for (const char* bag : {"bag.train", "inner/train"}) std::filesystem::create_directories(folder / bag);
+  for (const char* file : {"rec.train.mcap", "rec.test.mat", "inner/test.db3.zst"})
+    std::ofstream(folder / file) << "no log";
+  const Outcome o =
+      Run({"--batch", folder.string(), "--robot", "two_link", "--out", Path("formats"), "--json", Path("f.json")});
+  EXPECT_EQ(o.code, kPartial) << o.err;
+  std::map<std::string, std::string> error;
+  const nlohmann::json formats = ReadJson(Path("f.json"));
+  for (const auto& v : formats.at("verdicts")) error[v.at("name")] = v.at("error");
+  ASSERT_EQ(error.size(), 3u);
+  EXPECT_EQ(error.at("bag"), "no test log");
+  EXPECT_NE(error.at("rec").find("rec.train.mcap"), std::string::npos) << error.at("rec");
+  EXPECT_NE(error.at("inner").find("inner/train"), std::string::npos) << error.at("inner");
+}
+
 TEST_F(Batch, OptionsThatMakeNoSense_AreRefused) {
   const std::string empty = FreshFolder("batch_empty").string();
   ExpectOneLine(Run({}), kBadInput, "--train");

@@ -1,6 +1,7 @@
 // end-to-end tests - a URDF as it comes: import, generate, excite, identify, diagnose, with no editing between.
 #include <algorithm>
 #include <fstream>
+#include <regex>
 #include <sstream>
 
 #include "tests/e2e/own_arms.hpp"
@@ -145,6 +146,23 @@ TEST_F(Import, OfARoundedInertiaAndAFrameWithInertia_KeepsTheBodies) {
   EXPECT_EQ(Tool({"generate", "--robot", Path("arm.toml"), "--out", Path("generated")}).code, 0);
 }
 
+// Bodies that can exist and that nobody built: they are said, and taken.
+TEST_F(Import, OfMassesInGramsAndOfEqualLinks_SaysSo) {
+  const Outcome o =
+      Try(std::regex_replace(Scara().urdf, std::regex("<mass value=\"([0-9.]+)\"/>"), "<mass value=\"$1e3\"/>"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.out.find(" mm: a mass in grams, or a placeholder?"), o.out.npos) << o.out;
+  EXPECT_NE(o.out.find(": gravity can ask for "), o.out.npos) << o.out;
+  std::string twins = Scara().urdf;
+  for (const char* link : {"s1", "s2"}) {
+    const auto begin = twins.find(std::string("<link name=\"") + link + "\">"), end = twins.find("</link>", begin) + 7;
+    ASSERT_NE(begin, twins.npos);
+    twins.replace(begin, end - begin, LinkText(link, 3, "0 0 0.1", "0.1 0 0 0.1 0 0.1"));
+  }
+  EXPECT_NE(Try(twins).out.find("links s1 and s2 have the same inertia: equal parts, or a placeholder?"),
+            std::string::npos);
+}
+
 TEST_F(Import, OfLimitsInDegrees_TakesThemAsAGuess) {
   const Outcome o = Try(Replaced(Scara().urdf, "lower=\"-2.2\" upper=\"2.2\"", "lower=\"-91\" upper=\"115\""));
   ASSERT_EQ(o.code, 0) << o.err;
@@ -162,6 +180,8 @@ TEST_F(Import, OfWhatIsNoArm_SaysEveryFaultOnce) {
                 "link \"s5\": expected a link of the URDF as the tip; the nearest is");
   ExpectOneLine(Try(Scara().urdf, {"--fixed", "quil"}), 2,
                 "joint \"quil\": expected a joint of the URDF to hold; the nearest is quill");
+  ExpectOneLine(Try(Scara().urdf, {"--fixed", "quill=5"}), 2,
+                "joint \"quill\": expected to be held within its limits, ");
   ExpectOneLine(Try(Scara().urdf, {"--fixed", "quill=low"}), 2, "expected JOINT or JOINT=POSITION");
   const Outcome o = Try(
       Replaced(Replaced(Scara().urdf, "xyz=\"0 0 0.4\"", "xyz=\"0 0 400\""), "xyz=\"0.325 0 0\"", "xyz=\"325 0 0\""));

@@ -142,11 +142,15 @@ TEST_P(EachKind, IsNamedOnItsJoint) {
 INSTANTIATE_TEST_SUITE_P(Long, EachKind, testing::ValuesIn(DrawnKinds()),
                          [](const auto& kind) { return kind.param.kind; });
 
+// One that two joints share, and one that shows in flight alone, on a joint without gravity.
 TEST(Kinds, OfASample_AreNamedOnTheirJoint) {
-  const auto& all = DrawnKinds();
-  const auto kind = std::find_if(all.begin(), all.end(), [](const DrawnKind& k) { return k.kind == "wrist_coupling"; });
-  ASSERT_NE(kind, all.end());
-  EXPECT_TRUE(Draw(*kind, SeedOf(*kind, 0), Motions(1)));
+  const Motions motions(1);
+  for (const auto& [name, draw] : {std::pair{"wrist_coupling", 0}, std::pair{"backlash", 1}}) {
+    const auto& all = DrawnKinds();
+    const auto kind = std::find_if(all.begin(), all.end(), [&](const DrawnKind& k) { return k.kind == name; });
+    ASSERT_NE(kind, all.end());
+    EXPECT_TRUE(Draw(*kind, SeedOf(*kind, draw), motions)) << name;
+  }
 }
 
 }  // namespace

@@ -218,26 +218,20 @@ TEST(Measured, Kr300_DiagnosisWritesTheWholeVerdict) {
   EXPECT_EQ(again.code, 0) << again.err;  // the new robot file is one that the tool itself can read
 }
 
-// host_sim/findings.sh: every run held out once. docs/findings.md claims nothing, for what holds with link data must
-// hold with free bodies, too.
-TEST(Measured, Findings_AreWhatThePageSays) {
+// host_sim/findings.sh: every run held out once. docs/findings.md claims nothing, for nothing holds on every split.
+TEST(LongMeasured, Findings_AreWhatThePageSays) {
   for (const char* set : {"emps", "kuka_kr300", "kuka_lwr4"}) SKIP_WITHOUT(Measured(set), set);
   const fs::path out = FreshFolder("findings");
   const Outcome o =
       RunProgram({"env", std::string("ARMCAL=") + ARMCAL_TOOL, "bash", "host_sim/findings.sh", out.string()});
   ASSERT_EQ(o.code, 0) << o.err << o.out;
-  for (const char* model : {"emps", "kuka_kr300", "kuka_lwr4_free"})
+  for (const char* model : {"emps", "kuka_kr300", "kuka_lwr4", "kuka_lwr4_free"})
     EXPECT_TRUE(ReadJson(out / (std::string(model) + ".json")).at("holds").empty()) << model;
+  // Joint 6 of the LWR4: the ripple that runs 1 and 2 confirm lowers its error by a quarter and more.
   const nlohmann::json found = ReadJson(out / "kuka_lwr4.json");
-  ASSERT_EQ(found.at("holds").size(), 1u);
-  const nlohmann::json& term = found["holds"][0];
-  EXPECT_EQ(term.at("joint"), "1-6");
-  EXPECT_EQ(term.at("kinds"), nlohmann::json({"cross_ripple"}));
-  ASSERT_EQ(term.at("splits").size(), 3u);
-  for (const auto& [run, split] : term.at("splits").items()) {
-    std::printf("%s held out: joint 6 %.3f -> %.3f N m\n", run.c_str(), split.at("before").get<double>(),
-                split.at("after").get<double>());
-    EXPECT_LT(split.at("after").get<double>(), 0.6 * split.at("before").get<double>()) << run;
+  for (const char* run : {"measurements_1", "measurements_2"}) {
+    const auto before = found.at("splits").at(run).at("before_moving"), after = found["splits"][run].at("after_moving");
+    EXPECT_LT(after[5].get<double>(), 0.75 * before[5].get<double>()) << run;
   }
   // Runs 1 and 2 are one trajectory: neither is trained on when the other is held out.
   EXPECT_EQ(found.at("splits").at("measurements_1").at("train"), nlohmann::json({"measurements_3"}));

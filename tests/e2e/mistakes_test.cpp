@@ -223,7 +223,7 @@ TEST_F(Mistakes, OnTheCommandLine) {
       {"replay --robot er20_like --segment 0 {}/good.csv", {"--segment 0"}, {"a number above 0"}},
       {"replay --robot er20_like --segment nan {}/good.csv", {"--segment nan"}, {"a number above 0"}},
       {"export --robot er20_like --format xml --out {}/x", {"--format xml"}, {"urdf, sdf, mjcf, yaml or c"}},
-      {"export --robot er20_like --format urdf --out {}/x", {"names no URDF"}, {"expected --urdf FILE"}},
+      {"export --robot er20_like --format urdf --out {}/x", {"names no URDF"}, {"expected --into FILE"}},
       {"estimate --robot er20_like", {"estimate"}, {"either --connect or --log"}},
       {"simulate --port 99999", {"--port 99999"}, {"an integer from 0 to 65535"}},
   });

@@ -70,6 +70,9 @@ TEST_F(CompiledDrive, OfAScara_IsCompiledOnceAndItsEstimatesAreTheDrives) {
 
   setenv("CXX", "no-such-compiler", 1);
   ExpectOneLine(Simulate(), 2, "no-such-compiler: not found");
+  // An arm without bodies is refused before anybody looks for a compiler.
+  ExpectOneLine(Tool({"simulate", "--robot", "kuka_kr300", "--port", "0", "--storage", Path("drive.nor")}), 2,
+                "joint[1].link");
   EXPECT_TRUE(Kept(".part").empty());
 
   CompileWith("echo no memory left\nfor word; do case $word in *.so) echo half >\"$word\";; esac; done\nexit 1\n");

@@ -17,7 +17,7 @@ TEST(RebuildPath, Stribeck_IsFoundGeneratedBuiltAndFlashed) {
 }
 
 // Written here, never shipped: whoever tuned the product on the shipped scenarios has not seen it.
-TEST(RebuildPath, AStrangersScenario_IsServedLikeTheShippedOnes) {
+TEST(LongRebuildPath, AStrangersScenario_IsServedLikeTheShippedOnes) {
   const fs::path folder = FreshFolder("stranger");
   const fs::path scenario = folder / "stranger.toml";
   std::ofstream(scenario) << R"(title = "churning in joint 4 of another arm"

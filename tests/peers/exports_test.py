@@ -1,13 +1,17 @@
-# peers - what armcal export writes, read by MuJoCo and Pinocchio, and computed from the YAML by a recursion of this file.
+# peers - what armcal export writes, read by MuJoCo, Pinocchio and libsdformat, and computed from the YAML by a recursion
+# of this file.
 #
 #   exports_test.py ARMCAL FOLDER
 # A URDF is imported, other bodies are identified from a log whose torque Pinocchio made, and the arm is exported as URDF,
-# MJCF and YAML. At random states the inverse dynamics of all three must agree to 1e-9 of the joint's largest torque. Pinocchio leaves friction and
-# damping of a URDF out, and a URDF has no rotors, so the test adds them from the YAML. MuJoCo's friction loss is a soft
-# constraint and is not compared.
+# SDF, MJCF and YAML. SDF and MJCF are also written into given files: the SDF is the URDF as libsdformat converts it, the
+# MJCF has other link frames and zeros, and a tool that is welded on. At random states the inverse dynamics of all must
+# agree to 1e-9 of the joint's largest torque. Pinocchio leaves friction and damping out, and URDF and SDF have no
+# rotors, so the test adds them from the YAML. MuJoCo's friction loss is a soft constraint and is not compared.
+import json
 import pathlib
 import subprocess
 import sys
+import xml.etree.ElementTree as ElementTree
 
 import mujoco
 import numpy as np
@@ -121,7 +125,110 @@ def reduced(path):
     return pinocchio.buildReducedModel(full, held, pinocchio.neutral(full))
 
 
-def compare(armcal, folder, name, slide):
+def placed(rotated, moved):
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotated, moved
+    return T
+
+
+def words(numbers):
+    return " ".join(repr(float(value)) for value in numbers)
+
+
+def turned(element, R, how):
+    """Writes a rotation in one of the ways that MJCF has."""
+    for old in ("quat", "axisangle", "xyaxes", "zaxis", "euler"):
+        element.attrib.pop(old, None)
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, R.reshape(9))
+    if how == 0:
+        element.set("xyaxes", words(2.0 * R[:, :2].T.reshape(6)))
+    elif how == 1:
+        axis = quat[1:] / np.linalg.norm(quat[1:])
+        element.set("axisangle", words([*axis, np.degrees(2 * np.arctan2(np.linalg.norm(quat[1:]), quat[0]))]))
+    elif how == 2:  # Rx(a) Ry(b) Rz(c)
+        b = np.arcsin(R[0, 2])
+        element.set("euler", words(np.degrees([np.arctan2(-R[1, 2], R[2, 2]), b, np.arctan2(-R[0, 1], R[0, 0])])))
+    else:
+        element.set("quat", words(quat))
+
+
+def with_other_frames(text, seed):
+    """The arm of an MJCF file with other link frames, references, classes and weights, and a tool of its own."""
+    random = np.random.default_rng(seed)
+    root = ElementTree.fromstring(text)
+    root.find("compiler").set("angle", "degree")
+    root.insert(0, ElementTree.fromstring('<default><default class="own"><joint type="slide" damping="70" armature="3"/></default>'
+                                          '<joint axis="0 0 1" frictionloss="9"/></default>'))
+    before, k = np.eye(4), 0
+    body = root.find("worldbody").find("body")
+    while body is not None:
+        joint, inertial = body.find("joint"), body.find("inertial")
+        R = np.zeros(9)
+        mujoco.mju_quat2Mat(R, np.array(list(map(float, body.get("quat").split()))))
+        T = placed(R.reshape(3, 3), list(map(float, body.get("pos").split())))
+        slides = joint.get("type") == "slide"
+        ref = random.uniform(-0.4, 0.4)
+        T = T @ (placed(np.eye(3), [0, 0, ref]) if slides else placed(rotation("z", ref), np.zeros(3)))
+        G = placed(rotation("x", random.uniform(-3, 3)) @ rotation("z", random.uniform(-3, 3)), random.uniform(-0.2, 0.2, 3))
+        own = np.linalg.inv(before) @ T @ G
+        body.set("pos", words(own[:3, 3]))
+        turned(body, own[:3, :3], k % 4)
+        joint.set("pos", words(np.linalg.inv(G)[:3, 3]))
+        joint.set("axis", words(3 * G[:3, :3].T @ [0, 0, 1]))
+        joint.set("ref", words([ref if slides else np.degrees(ref)]))
+        del joint.attrib["type"]
+        if slides:
+            joint.set("class", "own")
+        for value in ("damping", "armature", "frictionloss", "range"):
+            joint.attrib.pop(value, None)
+        if k == 0:
+            body.remove(inertial)
+        else:
+            inertial.set("mass", "50")
+        before, k, last = G, k + 1, body
+        body = body.find("body")
+    center = np.linalg.inv(before) @ [*map(float, inertial.get("pos").split()), 1]
+    last.append(ElementTree.fromstring(f'<frame pos="{words(center[:3])}" euler="20 0 10"><body name="tool" pos="0.02 0 0.01" axisangle="1 1 0 40">'
+                                       '<inertial pos="0 0 0.01" mass="0.1" fullinertia="4e-5 3e-5 2e-5 1e-6 2e-6 -1e-6"/></body></frame>'))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def by_libsdformat(reader, path, names):
+    """A Pinocchio model of the arm that libsdformat reads; joints that have other names are held."""
+    read = json.loads(subprocess.run([reader, "read", path], check=True, capture_output=True, text=True).stdout)
+
+    def pose(seven):
+        w, x, y, z = seven[3:]
+        return pinocchio.SE3(pinocchio.Quaternion(w, x, y, z).matrix(), np.array(seven[:3]))
+
+    links = {link["name"]: link for link in read["link"]}
+    model = pinocchio.Model()
+    at = {"world": (0, pinocchio.SE3.Identity())}  # link -> joint that moves it, and that joint's frame in the model
+    root = ({link for link in links} - {joint["child"] for joint in read["joint"]}).pop() if not any(
+        joint["parent"] == "world" for joint in read["joint"]) else "world"
+    at[root] = (0, pinocchio.SE3.Identity())
+    open_joints = list(read["joint"])
+    while open_joints:
+        joint = next(one for one in open_joints if one["parent"] in at)
+        open_joints.remove(joint)
+        number, frame = at[joint["parent"]]
+        if joint["name"] in names:
+            where = pose(joint["pose"])
+            axis = where.rotation.T @ np.array(joint["axis"])
+            kind = pinocchio.JointModelPrismaticUnaligned(axis) if joint["slides"] else pinocchio.JointModelRevoluteUnaligned(axis)
+            number, frame = model.addJoint(number, kind, frame.inverse() * where, joint["name"]), where
+        link = links[joint["child"]]
+        i = link["inertia"]
+        inertia = pinocchio.Inertia(link["mass"], np.zeros(3), np.array([[i[0], i[1], i[2]], [i[1], i[3], i[4]], [i[2], i[4], i[5]]]))
+        if number:
+            model.appendBodyToJoint(number, inertia.se3Action(pose(link["inertial_pose"])), frame.inverse() * pose(link["pose"]))
+        at[joint["child"]] = (number, frame)
+    assert [model.names[k] for k in range(1, model.njoints)] == names
+    return model, {joint["name"]: joint for joint in read["joint"]}
+
+
+def compare(armcal, folder, reader, name, slide):
     folder = pathlib.Path(folder) / name
     folder.mkdir(parents=True, exist_ok=True)
 
@@ -134,41 +241,79 @@ def compare(armcal, folder, name, slide):
     run("generate", "--robot", robot, "--out", folder / "generated")
     written_log(folder / "log.csv", reduced(folder / "arm.urdf"), 7)
     run("identify", "--robot", robot, "--train", folder / "log.csv", "--table-out", folder / "table.toml")
-    for kind in ("urdf", "mjcf", "yaml"):
-        run("export", "--robot", robot, "--table", folder / "table.toml", "--format", kind, "-o", folder / f"out.{kind}")
+
+    def export(kind, out, *more):
+        run("export", "--robot", robot, "--table", folder / "table.toml", "--format", kind, "-o", folder / out, *more)
+
+    for kind in ("urdf", "sdf", "mjcf", "yaml"):
+        export(kind, f"out.{kind}")
+    (folder / "given.xml").write_text(with_other_frames((folder / "out.mjcf").read_text(), 3))
+    export("mjcf", "into.xml", "--into", folder / "given.xml")
+    # libsdformat leaves a root link without weight out, and all that hangs on it.
+    weighed = LINK.format("base", 9, "0 0 0", "0 0 0", [1, 0, 0, 1, 0, 1])
+    (folder / "weighed.urdf").write_text((folder / "arm.urdf").read_text().replace('<link name="base"/>', weighed))
+    subprocess.run([reader, "convert", folder / "weighed.urdf", folder / "given.sdf"], check=True)
+    export("sdf", "into.sdf", "--into", folder / "given.sdf")
     arm = yaml.safe_load((folder / "out.yaml").read_text())
     joints = arm["joints"]
     n = len(joints)
-    model = mujoco.MjModel.from_xml_path(str(folder / "out.mjcf"))
-    data = mujoco.MjData(model)
-    model.dof_frictionloss[:] = 0
-    pin = reduced(folder / "out.urdf")
-    other = pin.createData()
+    names = [joint["name"] for joint in joints]
+
+    def by_mujoco(path):
+        model = mujoco.MjModel.from_xml_path(str(folder / path))
+        assert model.nq == n, path
+        for k, joint in enumerate(joints):  # the same digits as in the YAML
+            assert model.dof_armature[k] == rotor(joint) and model.dof_damping[k] == viscous(joint), path
+        model.dof_frictionloss[:] = 0
+        data = mujoco.MjData(model)
+
+        def torque(q, v, a):
+            data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
+            mujoco.mj_inverse(model, data)
+            return data.qfrc_inverse.copy()
+
+        return torque, model
+
+    def by_pinocchio(model):
+        data = model.createData()
+        drives = np.array([rotor(j) for j in joints]), np.array([viscous(j) for j in joints])
+        return lambda q, v, a: pinocchio.rnea(model, data, q, v, a) + drives[0] * a + drives[1] * v
+
+    mjcf, model = by_mujoco("out.mjcf")
+    programs = {"MuJoCo": mjcf, "MuJoCo, a given file": by_mujoco("into.xml")[0],
+                "Pinocchio, the given URDF": by_pinocchio(reduced(folder / "out.urdf"))}
+    for label, path in (("libsdformat", "out.sdf"), ("libsdformat, a given file", "into.sdf")):
+        read, of_name = by_libsdformat(reader, folder / path, names)
+        for joint in joints:
+            assert of_name[joint["name"]]["damping"] == viscous(joint), path
+        programs[label] = by_pinocchio(read)
     # The YAML does not say how the arm is mounted: the first body's pose in the MJCF does.
     mounted, first = np.zeros(9), joints[0]["modified_dh"]
     mujoco.mju_quat2Mat(mounted, model.body_quat[1])
     base = mounted.reshape(3, 3) @ (rotation("x", first["alpha_rad"]) @ rotation("z", first["theta_rad"])).T
     random = np.random.default_rng(1)
-    torque = {"MuJoCo": [], "Pinocchio": [], "YAML": []}
+    torque, reference = {label: [] for label in programs}, []
     for _ in range(STATES):
         q, v, a = (random.uniform(-1.5, 1.5, n) for _ in range(3))
-        data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
-        mujoco.mj_inverse(model, data)
-        torque["MuJoCo"].append(data.qfrc_inverse.copy())
+        for label, program in programs.items():
+            torque[label].append(program(q, v, a))
         more = np.array([rotor(j) for j in joints]) * a + np.array([viscous(j) for j in joints]) * v
-        torque["Pinocchio"].append(pinocchio.rnea(pin, other, q, v, a) + more)
-        torque["YAML"].append(newton_euler(joints, np.array([0, 0, -9.81]), base, q, v, a) + more)
-    reference = np.array(torque["YAML"])
+        reference.append(newton_euler(joints, np.array([0, 0, -9.81]), base, q, v, a) + more)
+    reference = np.array(reference)
     largest = np.abs(reference).max(axis=0)
     worst = 0.0
-    for program in ("MuJoCo", "Pinocchio"):
-        error = (np.abs(np.array(torque[program]) - reference).max(axis=0) / largest).max()
-        print(f"{name}: {program} and the YAML differ by {error:.1e} of the largest torque")
+    for label in programs:
+        error = (np.abs(np.array(torque[label]) - reference).max(axis=0) / largest).max()
+        print(f"{name}: {label} and the YAML differ by {error:.1e} of the largest torque")
         worst = max(worst, error)
     return worst <= TOLERANCE
 
 
 if __name__ == "__main__":
     cases = {"four_turns": False, "with_a_slide": True}
-    bad = [name for name, slide in cases.items() if not compare(sys.argv[1], sys.argv[2], name, slide)]
+    reader = pathlib.Path(sys.argv[2]) / "sdf_arm"
+    reader.parent.mkdir(parents=True, exist_ok=True)
+    flags = subprocess.run(["pkg-config", "--cflags", "--libs", "sdformat12"], check=True, capture_output=True, text=True).stdout
+    subprocess.run(["g++", "-o", reader, pathlib.Path(__file__).with_name("sdf_arm.cpp"), *flags.split()], check=True)
+    bad = [name for name, slide in cases.items() if not compare(*sys.argv[1:3], reader, name, slide)]
     sys.exit(f"more than {TOLERANCE}: {', '.join(bad)}" if bad else 0)

@@ -94,6 +94,7 @@ def check_progress(robot, logs):
 
     for call in (lambda stop: armcal.excite(robot, starts=1000, seconds=600, progress=stop),
                  lambda stop: armcal.identify(robot, logs[0], progress=stop),
+                 lambda stop: armcal.evaluate(robot, logs[0], progress=stop),
                  lambda stop: armcal.diagnose(robot, logs[0], logs[1], progress=stop)):
         for stop in (enough, late):
             try:

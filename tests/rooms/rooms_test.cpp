@@ -56,7 +56,7 @@ const Edges kEdges = {
 
     // Identify: parameters from logs, and the motions that show them.
     {"host_sim/identify/search", {kCode + "io"}},  // minimises functions of numbers; the only room that sees pagmo
-    {"host_sim/identify/collision", {kCode}},  // distances of solids; the only room that sees FCL
+    {"host_sim/identify/collision", {kCode}},  // distances of solids; the only room that sees FCL and Assimp
     {"host_sim/identify/excitation", {kCode, kHost + "data/trajectory", kHost + "identify/search", kHost + "identify/collision"}},
     {"host_sim/identify/calibration", {kCode, kHost + "data/files", kHost + "data/logs", kLib + "math", kLib + "model"}},
     {"host_sim/identify/methods", {kCode, kHost + "data/logs", kHost + "identify/search", kHost + "identify/calibration"}},

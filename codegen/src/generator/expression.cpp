@@ -64,6 +64,25 @@ Expr Spring(Graph& g, const std::vector<Expr>& a, bool is_rate) {
   return is_rate ? speed(ahead, rate) : stretch(ahead, rate);
 }
 
+// A mass between two stops that are `gap` apart, against these stops: its place from the middle, and whether it is in
+// flight, 1 or 0. a: its acceleration, straight between samples. It stays where it lands, until a pushes it away.
+Expr Flight(Graph& g, const std::vector<Expr>& a, bool is_place) {
+  const Expr half = 0.5 * a[1], dt = g.Input({Quantity::kTimeStep}), before = Previous(g, {a[0]});
+  const auto flown = [&](Expr place, Expr speed) {
+    return place + (speed + (2.0 * before + a[0]) * dt / g.Constant(6)) * dt;
+  };
+  const auto lands = [&](Expr to) { return g.Binary(Op::kMin, g.Binary(Op::kMax, to, -half), half); };
+  const auto flies = [&](Expr to) { return g.Constant(1) - g.Unary(Op::kAbs, g.Unary(Op::kSign, to - lands(to))); };
+  const std::string name = StateName("flight", a), speed_name = StateName("flight", a, 1);
+  const Expr place = g.State(name, half * g.Unary(Op::kSign, a[0]), [&](Expr p) {
+    const Expr speed = g.State(speed_name, g.Constant(0),
+                               [&](Expr v) { return flies(flown(p, v)) * (v + 0.5 * ((before + a[0]) * dt)); });
+    return lands(flown(p, speed));
+  });
+  const Expr to = flown(place, g.State(speed_name, g.Constant(0), [](Expr v) { return v; }));
+  return is_place ? lands(to) : flies(to);
+}
+
 Expr Play(Graph& g, const std::vector<Expr>& a) {
   const Expr half = 0.5 * a[1];
   const auto step = [&](Expr z) { return g.Binary(Op::kMin, g.Binary(Op::kMax, z, a[0] - half), a[0] + half); };
@@ -216,6 +235,8 @@ class Parser {
     if (name == "spring_stretch") return need(3), Spring(g_, a, false);
     if (name == "spring_rate") return need(3), Spring(g_, a, true);
     if (name == "play") return need(2), Play(g_, a);
+    if (name == "flight_place") return need(2), Flight(g_, a, true);
+    if (name == "flies") return need(2), Flight(g_, a, false);
     if (name == "delay") {
       need(3);
       const double taps = ConstantOf(a[2], "a whole number of samples, 1 to 64, in delay");

@@ -22,6 +22,8 @@ constexpr double kGravity = 9.81;
 constexpr double kSpeedUp_s = 0.25, kNoiseShare = 0.005, kStandstillShare = 0.005;
 constexpr double kFastest_radps = 100, kFastest_mps = 20;  // a limit above stands for none
 constexpr double kTurn_deg = 180, kTravel_m = 0.5, kSpeed_degps = 90, kSpeed_mps = 0.5;
+// A body is doubtful that is narrower than this and heavier than that, or asks for this many times the torque limit.
+constexpr double kNarrow_m = 0.003, kHeavy_kg = 1, kOverload = 10;
 constexpr double kStrength = 2, kLeastTorque_Nm = 1;  // times what gravity asks for at most
 
 std::string Short(double v) {
@@ -126,18 +128,42 @@ class Writer {
   std::string joint_;
 };
 
+// A line for each body that can exist and hardly does: grams, or a placeholder.
+std::vector<std::string> Doubtful(const UrdfChain& chain) {
+  std::vector<std::string> lines;
+  for (std::size_t j = 0; j < chain.joint.size(); ++j) {
+    const Link& link = chain.joint[j].link;
+    const double second = 0.5 * (link.inertia_kgm2[0] + link.inertia_kgm2[3] + link.inertia_kgm2[5]);
+    const double width = link.mass_kg > 0 ? std::sqrt(second / link.mass_kg) : kNarrow_m;
+    if (width < kNarrow_m && link.mass_kg > kHeavy_kg)
+      lines.push_back("joint \"" + chain.joint[j].name + "\" moves " + Short(link.mass_kg) +
+                      " kg with the inertia of a body of " + Short(1e3 * width) +
+                      " mm: a mass in grams, or a placeholder? Its bodies count as good to 20 %");
+    const double limit = chain.joint[j].torque_limit_Nm, gravity = GravityTorque(chain, j);
+    if (limit > 0 && gravity > kOverload * limit && link.mass_kg > kHeavy_kg)
+      lines.push_back("joint \"" + chain.joint[j].name + "\": gravity can ask for " + Short(gravity) +
+                      " N m of what it moves, its limit is " + Short(limit) +
+                      ": masses in grams, or a placeholder for the limit?");
+    for (std::size_t k = 0; k < j; ++k)
+      if (const Body& a = chain.part[k][0].body, &b = chain.part[j][0].body;
+          a.mass > 0 && a.mass == b.mass && a.center == b.center && a.inertia == b.inertia)
+        lines.push_back("links " + chain.part[k][0].link + " and " + chain.part[j][0].link +
+                        " have the same inertia: equal parts, or a placeholder?");
+  }
+  return lines;
+}
+
 // Without bodies if those of the URDF are no prior; says why.
 UrdfChain ReadWhatCanBeUsed(const UrdfChoice& choice, bool& bodies, std::vector<std::string>& said) {
-  UrdfChain chain;
-  io::Faults faults;
-  bodies = faults.Try([&] { chain = ReadUrdf(choice); });
-  if (!bodies) chain = ReadUrdf(choice, UrdfBodies::kIgnored);  // throws what has nothing to do with bodies
-  for (const std::string& line : faults.lines()) said.push_back(line);
+  const UrdfChain chain = ReadUrdf(choice);
+  bodies = chain.body_faults.empty();
+  said.insert(said.end(), chain.body_faults.begin(), chain.body_faults.end());
   for (const auto& parts : chain.part)
     for (const UrdfPart& part : parts)
       if (HasInertiaOnly(part.body))
         said.push_back("link \"" + part.link + "\" has an inertia but no mass: it counts as a frame");
   if (!bodies) return chain;
+  for (const std::string& line : Doubtful(chain)) said.push_back(line);
   for (const Joint& joint : chain.joint) {
     const Body body = ToBody(joint.link);
     const std::string missing = Impossible(body);
@@ -221,6 +247,7 @@ ImportedRobot ImportUrdf(const UrdfChoice& asked, const std::string& name, const
     out.text +=
         "\n[prior]\nlink_relative_sd = 0.2  # guessed: how far the URDF's masses, centres and inertias may be off\n";
     out.guessed.push_back({"", "prior.link_relative_sd", "0.2", "how far the URDF's bodies may be off"});
+    out.guessed.push_back({"", "friction, rotor inertia", "wide priors", "from each joint's torque and speed limits"});
   } else {
     out.text += "prior = \"none\"  # the URDF's bodies cannot be used: see what armcal import said\n";
     out.guessed.push_back({"", "prior", "\"none\"", "the URDF's bodies cannot be used"});

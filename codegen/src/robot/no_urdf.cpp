@@ -15,7 +15,7 @@ namespace {
 
 std::string UrdfText(const std::filesystem::path& path) { Refuse(path); }
 
-UrdfChain ReadUrdf(const UrdfChoice& choice, UrdfBodies) { Refuse(choice.path); }
+UrdfChain ReadUrdf(const UrdfChoice& choice) { Refuse(choice.path); }
 
 UrdfChoice ChooseChain(const UrdfChoice& asked, std::vector<std::string>&) { Refuse(asked.path); }
 

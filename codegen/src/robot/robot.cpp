@@ -256,13 +256,17 @@ void ReadShapes(const io::TomlReader& in, Robot& r, const UrdfChain* chain, cons
 // The bodies of a URDF as a prior: there, possible, and more than a placeholder.
 void CheckUrdfBodies(const io::TomlReader& in, const UrdfChain& chain, io::Faults& faults) {
   const std::string file = (std::filesystem::path(in.file()).parent_path() / in.Text("urdf")).string();
+  const std::string remedy = "; mend it, or write prior = \"none\" in " + in.file();
+  for (const std::string& line : chain.body_faults) faults.Add(line + remedy);
   for (std::size_t j = 0; j < chain.joint.size(); ++j) {
     const Link& link = chain.joint[j].link;
     const Body body = ToBody(link);
     const std::string who = file + ": joint \"" + chain.joint[j].name + "\": expected ";
-    if (!(link.mass_kg > 0)) faults.Add(who + "a link with mass after it; or write prior = \"none\" in " + in.file());
-    else if (const std::string missing = Impossible(body, kPublished); !missing.empty())
-      faults.Add(who + "to move a body with " + missing + "; or write prior = \"none\" in " + in.file());
+    const bool frames = std::all_of(chain.part[j].begin(), chain.part[j].end(),
+                                    [](const UrdfPart& part) { return part.body.mass == 0; });
+    if (frames) faults.Add(who + "a link with mass after it" + remedy);
+    else if (const std::string missing = Impossible(body, kPublished); !missing.empty() && chain.body_faults.empty())
+      faults.Add(who + "to move a body with " + missing + remedy);
   }
   std::string names;
   for (const std::string& name : chain.same_inertia) names += (names.empty() ? "" : ", ") + name;
@@ -277,7 +281,7 @@ void ReadUrdfRobot(const io::TomlReader& in, Robot& r, UrdfChain& chain, io::Fau
   if (in.Has("dh")) in.Report("dh", "either dh or urdf");
   r.urdf = ReadUrdfChoice(in);
   ReadPackages(in, r.urdf);
-  if (!faults.Try([&] { chain = ReadUrdf(r.urdf, r.has_prior ? UrdfBodies::kChecked : UrdfBodies::kIgnored); })) return;
+  if (!faults.Try([&] { chain = ReadUrdf(r.urdf); })) return;
   if (r.has_prior) CheckUrdfBodies(in, chain, faults);
   r.joint = chain.joint;
   std::vector<std::string> untold;

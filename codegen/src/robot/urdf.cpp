@@ -149,6 +149,11 @@ class Choice {
     const auto it = model_.joints_.find(name);
     if (it != model_.joints_.end()) {
       held_[name] = position;
+      const auto& limits = it->second->limits;
+      const bool limited = limits && it->second->type != urdf::Joint::CONTINUOUS && limits->lower < limits->upper;
+      if (limited && (position < limits->lower || position > limits->upper))
+        Say(name, "to be held within its limits, " + Number(limits->lower) + " to " + Number(limits->upper) +
+                      ", not at " + Number(position));
       return;
     }
     std::vector<std::string> known;
@@ -274,7 +279,8 @@ void CheckLengths(const std::string& file, const urdf::ModelInterface& model, io
 }
 
 // Of the parts that move: centres and inertias in millimetres, and bodies that cannot exist.
-void CheckBodies(const std::string& file, const std::vector<std::vector<UrdfPart>>& parts, io::Faults& faults) {
+std::vector<std::string> FaultsOfBodies(const std::string& file, const std::vector<std::vector<UrdfPart>>& parts) {
+  io::Faults faults;
   for (const auto& of_joint : parts)
     for (const auto& [link, pose, body] : of_joint) {
       if (body.mass == 0) continue;  // a frame
@@ -287,6 +293,7 @@ void CheckBodies(const std::string& file, const std::vector<std::vector<UrdfPart
       if (body.inertia.isZero() && body.mass > 0) continue;  // a mass point; what it is fixed to may have the inertia
       if (const std::string missing = Impossible(body, kPublished); !missing.empty()) faults.Add(who + missing);
     }
+  return faults.lines();
 }
 
 // The axes of one frame at joint positions zero.
@@ -497,7 +504,7 @@ std::string UrdfText(const std::filesystem::path& path) {
                        path.filename().string() + " > " + urdf.filename().string());
 }
 
-UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
+UrdfChain ReadUrdf(const UrdfChoice& asked) {
   const std::string file = asked.path.string();
   const urdf::ModelInterfaceSharedPtr model = Parse(asked.path);
   io::Faults faults;
@@ -505,7 +512,9 @@ UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
   choice.Check();
   CheckLengths(file, *model, faults);
   const Walk walk(asked, *model, choice, faults);
-  if (bodies == UrdfBodies::kChecked) CheckBodies(file, walk.parts, faults);
+  const std::vector<std::string> body_faults = FaultsOfBodies(file, walk.parts);
+  if (!faults.lines().empty())
+    for (const std::string& line : body_faults) faults.Add(line);  // all in one run
   faults.ThrowIfAny();
   std::vector<JointKinematics> kinematics;
   const std::vector<Frame> frames = LayFrames(walk.axes, kinematics);
@@ -513,6 +522,7 @@ UrdfChain ReadUrdf(const UrdfChoice& asked, UrdfBodies bodies) {
   chain.part = walk.parts;
   chain.base_part = walk.base_parts;
   chain.held = choice.held();
+  chain.body_faults = body_faults;
   chain.same_inertia = SameInertia(walk.parts);
   for (std::size_t i = 0; i < walk.axes.size(); ++i) {
     const Axis& axis = walk.axes[i];

@@ -32,6 +32,7 @@ struct UrdfChain {
   std::vector<Shape> shape;
   // Frame 0 seen from the URDF's root link, and the URDF's last link frame seen from the last DH frame.
   Eigen::Isometry3d base = Eigen::Isometry3d::Identity(), flange = base;
+  std::vector<std::string> body_faults;   // a line for each moving body that cannot exist, or is in millimetres
   std::vector<std::string> same_inertia;  // moving links that share mass, centre and inertia: nobody computed these
   std::map<std::string, double> held;     // movable joints that are held, mimic joints among them; rad or m
 };
@@ -45,10 +46,8 @@ std::string UrdfText(const std::filesystem::path& path);
 // as meant exactly. With a tip, all movable joints that do not lead to it are held at `fixed`, or at zero, or at the
 // limit next to zero. A mimic joint is held with the joint that it follows.
 // Throws io::InputError with all faults, a line for each with file and joint or link: unreadable, branching, no movable
-// joint, a floating, planar or mimic joint, lengths in millimetres, a moving body that cannot exist (unless bodies do
-// not count).
-enum class UrdfBodies { kChecked, kIgnored };
-UrdfChain ReadUrdf(const UrdfChoice& choice, UrdfBodies bodies = UrdfBodies::kChecked);
+// joint, a floating, planar or mimic joint, lengths in millimetres.
+UrdfChain ReadUrdf(const UrdfChoice& choice);
 
 // Completes what a user has asked for: holds mimic joints and those that they follow, and ends the chain at the
 // only longest one. `said`: a line for each choice that was made. Throws io::InputError as ReadUrdf does, and where two

@@ -61,15 +61,26 @@ class Collector {
       Stream stream = table->Finish(asked_.recorder_time);
       if (!stream.names.empty() && !stream.stamp_ns.empty()) out_.streams.push_back(std::move(stream));
     }
-    for (const Stream& stream : out_.streams)
-      out_.notes.push_back(OneLine(fmt::format("{}: time is {}", stream.topic,
-                                               !stream.recorder_time  ? "header.stamp"
-                                               : asked_.recorder_time ? "the recorder's, as asked for"
-                                                                      : "the recorder's, there is no header.stamp")));
+    for (const Stream& stream : out_.streams) NoteTime(stream);
     return std::move(out_);
   }
 
  private:
+  void NoteTime(const Stream& stream) {
+    const auto note = [&](const std::string& text) { out_.notes.push_back(OneLine(stream.topic + ": " + text)); };
+    note(!stream.recorder_time  ? "time is header.stamp"
+         : asked_.recorder_time ? "time is the recorder's, as asked for"
+                                : "time is the recorder's, for most messages have no header.stamp of their own");
+    const std::size_t read = stream.stamp_ns.size() + stream.unstamped;
+    if (stream.unstamped > 0)
+      note(fmt::format("{} of {} messages have no header.stamp and are left out; the recorder's time keeps them",
+                       stream.unstamped, read));
+    if (stream.backward > 0)
+      note(
+          fmt::format("{} of {} messages have a time before that of the message in front of them; all are put in order",
+                      stream.backward, read));
+  }
+
   void ReadContent(const std::string& path, Bytes content) {
     if (IsMcap(content)) ReadMcap(content, taker_);
     else if (IsDatabase(content)) ReadDatabase(path, content, taker_);

@@ -17,6 +17,8 @@ struct Stream {
   std::vector<std::int64_t> stamp_ns;  // never falling
   std::vector<std::string> names;      // as flat.hpp makes them, with the topic before them
   Eigen::MatrixXd values;              // [messages x names]; NaN where a message does not have the column
+  std::size_t unstamped = 0;           // messages without header.stamp, which are left out
+  std::size_t backward = 0;            // messages whose stamp is before that of the message in front of them
 };
 
 struct Recording {

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <unordered_set>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/data/bags/cdr.hpp"
 #include "host_sim/data/bags/json_message.hpp"
 #include "host_sim/data/bags/unpack.hpp"
@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMostColumnsOfTopic = 4096;
 constexpr std::size_t kMostNumbers = std::size_t{1} << 27;
-constexpr double kStamped = 0.99;  // of the messages, whose header must have a stamp
+constexpr double kStamped = 0.5;  // of the messages: with fewer stamps in their headers, the recorder's time counts
 
 }  // namespace
 
@@ -77,6 +77,7 @@ const std::vector<int>& TopicTable::Places(Bytes message) {
 }
 
 void TopicTable::Add(const Message& message, std::size_t& numbers) {
+  io::CancellationPoint();
   try {
     Bytes data = message.data;
     if (!json_ && IsZstd(data)) {  // rosbag2 can compress each message
@@ -110,8 +111,15 @@ bool TopicTable::StampsServe() const {
 Stream TopicTable::Finish(bool recorder_time) {
   Stream out{topic_.name, topic_.type, recorder_time || !StampsServe(), {}, std::move(names_), {}};
   const std::vector<std::int64_t>& stamp = out.recorder_time ? recorded_ns_ : header_ns_;
-  std::vector<std::size_t> order(stamp.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < stamp.size(); ++k) {
+    if (!out.recorder_time && stamp[k] == 0) {
+      ++out.unstamped;
+      continue;
+    }
+    out.backward += !order.empty() && stamp[k] < stamp[order.back()];
+    order.push_back(k);
+  }
   std::stable_sort(order.begin(), order.end(), [&stamp](std::size_t a, std::size_t b) { return stamp[a] < stamp[b]; });
   const auto rows = static_cast<Eigen::Index>(order.size());
   out.values.resize(rows, static_cast<Eigen::Index>(values_.size()));

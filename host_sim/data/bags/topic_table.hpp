@@ -19,7 +19,7 @@ class TopicTable {
   // `numbers` is the count of all tables together, which must stay bounded.
   void Add(const Message& message, std::size_t& numbers);
 
-  // All rows in the order of their stamps.
+  // All rows in the order of their stamps. Messages without a stamp are left out if most of the others have one.
   Stream Finish(bool recorder_time);
 
   const std::string& type() const { return topic_.type; }

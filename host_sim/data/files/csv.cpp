@@ -11,6 +11,7 @@
 #include <unordered_set>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/watch.hpp"
 #include "host_sim/data/files/files.hpp"
 
 namespace armcal::files {
@@ -32,6 +33,7 @@ class Scanner {
   }
 
   bool NextLine() {
+    io::CancellationPoint();
     if (rest_.empty()) return false;
     const auto end = rest_.find('\n');
     line_ = rest_.substr(0, end);
@@ -224,7 +226,7 @@ void WriteCsv(const std::filesystem::path& path, const NumericTable& table, cons
       const double value = table.values(r, c);
       char* const room = number + sizeof number;
       const auto end = std::isnan(value) ? number
-                       : precision == 0 ? std::to_chars(number, room, value).ptr
+                       : precision == 0  ? std::to_chars(number, room, value).ptr
                                         : std::to_chars(number, room, value, std::chars_format::general, precision).ptr;
       text.append(number, end) += ',';
     }

@@ -226,7 +226,8 @@ Proposal Recognise(const Look& look, const std::string& source, const std::vecto
   const Set* const main = ChooseMain(sets);
   Proposal out;
   out.map = "# From " + Quoted(source) + " by armcal channels. Check the lines that are marked with \"guess\".\n";
-  out.map += fmt::format("joints = {}\n", main == nullptr ? 6 : main->joints());
+  out.map += main == nullptr ? std::string("joints = 6  # guess: no positions were recognised\n")
+                             : fmt::format("joints = {}\n", main->joints());
   if (main != nullptr && !main->names.empty())
     out.map += "names = " + List(main->names) + "  # guess: the order from the base to the tool\n";
   if (!definitions.empty()) out.map += "messages = " + List(definitions) + "\n";

@@ -20,13 +20,16 @@ bool Holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+bool HoldsAnyOf(const Series& series, const std::vector<std::string>& main) {
+  const auto& names = series.numbers.names;
+  return std::any_of(names.begin(), names.end(), [&main](const std::string& name) { return Holds(main, name); });
+}
+
 std::size_t ChooseGrid(const std::vector<Series>& series, const std::vector<std::string>& main) {
   std::size_t grid = series.size();
   double slowest = 0;
   for (std::size_t s = 0; s < series.size(); ++s) {
-    const auto& names = series[s].numbers.names;
-    if (std::none_of(names.begin(), names.end(), [&main](const std::string& name) { return Holds(main, name); }))
-      continue;
+    if (!HoldsAnyOf(series[s], main)) continue;
     const double step = MedianStep(series[s].t);
     if (grid == series.size() || step > kAsSlow * slowest) grid = s, slowest = step;
   }
@@ -122,11 +125,17 @@ Common OnCommonTimes(const std::vector<Series>& series, const std::vector<std::s
     auto block = out.numbers.values.middleCols(at, one.numbers.values.cols());
     at += one.numbers.values.cols();
     const bool own = &one == &grid;
-    if (own) block = one.numbers.values;
-    else if (Interpolate(one, step_s, grid.t, held, block)) continue;
-    else
+    if (own) {
+      block = one.numbers.values;
+    } else if (Interpolate(one, step_s, grid.t, held, block)) {
+      if (HoldsAnyOf(one, main) && static_cast<double>(one.t.size()) > kAsSlow * static_cast<double>(grid.t.size()))
+        out.notes.push_back(fmt::format("{}: of its {} times the {} count at which {} has numbers, too", one.name,
+                                        one.t.size(), grid.t.size(), grid.name));
+      continue;
+    } else {
       out.notes.push_back(fmt::format("{} ({}): interpolated at the times of {} ({})", one.name, Rate(step_s),
                                       grid.name, Rate(MedianStep(grid.t))));
+    }
     NoteGaps(one, step_s, out.notes);
   }
   return out;

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kTrainPeriods = 4, kTestPeriods = 2, kTrainSpeeds = 6, kTestSpeeds = 2;
 constexpr double kSearchShare = 0.9;  // of the time that all takes, about
+constexpr double kNearest_m = 0.005;  // the smallest distance that is tried where none was asked for
 
 excitation::Target MakeTarget(const codegen::Robot& robot, const ExciteOptions& o) {
   using Kind = excitation::Criterion::Kind;
@@ -96,6 +97,19 @@ Excited::Excited(const codegen::Model& model, const ExciteOptions& given, const 
       without_rotors(model, excitation::Observation::Rotors::kLeftOut),
       target(MakeTarget(model.robot(), given)),
       clearance(MakeClearance(model.robot(), given, unchecked)) {
+  while (!FindMotion(stop, tell)) {
+    too_far_m.push_back(clearance->margin_m());
+    clearance.emplace(model.robot(), collision::Cell(), clearance->margin_m() / 2);
+  }
+  condition = PeriodCondition(observation, best.series);
+  const double sample_s = model.robot().sample_ticks / model.robot().tick_rate_Hz;
+  whole = observation.ConditionNumber(excitation::Sampled(trajectory::TrajectorySpline(composed.trajectory), sample_s));
+  rigid_only = PeriodCondition(without_rotors, best.series);
+  accuracy = AccuracyOf(target, best.series);
+  interrupted = stop && *stop;
+}
+
+bool Excited::FindMotion(const std::atomic<bool>* stop, const Tell& tell) {
   excitation::OptimiseSettings search = SearchSettings(target, options);
   search.clearance = clearance ? &*clearance : nullptr;
   search.stop = stop;
@@ -103,24 +117,24 @@ Excited::Excited(const codegen::Model& model, const ExciteOptions& given, const 
     search.progress = [&](int searches, double figure) {
       tell(searches, excitation::Name(target.criterion().kind), figure);
     };
-  {
-    const io::Stage stage(0, kSearchShare);
-    best = Optimise(target.observation(), search);
-  }
-  condition = PeriodCondition(observation, best.series);
-
   const bool test = options.purpose == "test";
   excitation::ComposeSettings compose;
   compose.periods = options.periods > 0 ? options.periods : test ? kTestPeriods : kTrainPeriods;
   compose.slow_speeds = options.no_slow ? 0 : test ? kTestSpeeds : kTrainSpeeds;
   compose.step_s = options.step_s, compose.margin = options.margin;
   compose.clearance = search.clearance;
-  composed = Compose(observation, best.series, compose);
-  const double sample_s = model.robot().sample_ticks / model.robot().tick_rate_Hz;
-  whole = observation.ConditionNumber(excitation::Sampled(trajectory::TrajectorySpline(composed.trajectory), sample_s));
-  rigid_only = PeriodCondition(without_rotors, best.series);
-  accuracy = AccuracyOf(target, best.series);
-  interrupted = stop && *stop;
+  try {
+    {
+      const io::Stage stage(0, kSearchShare);
+      best = Optimise(target.observation(), search);
+    }
+    composed = Compose(observation, best.series, compose);
+    return true;
+  } catch (const io::InputError&) {
+    const bool may_be_nearer = clearance && !options.clearance_asked && options.cell.empty();
+    if (!may_be_nearer || clearance->margin_m() < 2 * kNearest_m) throw;
+    return false;
+  }
 }
 
 codegen::Signals Excited::Motion() const {
@@ -139,7 +153,8 @@ codegen::Signals Excited::Motion() const {
 nlohmann::ordered_json Excited::ClearanceJson() const {
   if (!clearance) return {{"why_not", unchecked}};
   const collision::Nearest& nearest = composed.nearest;
-  nlohmann::ordered_json json{{"margin_m", clearance->margin_m()}, {"pairs", clearance->pairs()}};
+  nlohmann::ordered_json json{
+      {"margin_m", clearance->margin_m()}, {"no_motion_at_m", too_far_m}, {"pairs", clearance->pairs()}};
   if (clearance->pairs() > 0)
     json["nearest"] = {{"distance_m", nearest.distance_m},
                        {"t_s", excitation::kCheckStep_s * static_cast<double>(nearest.sample)},

@@ -63,6 +63,9 @@ struct Excited {
   excitation::Target target;
   std::string unchecked;  // why collisions are not checked
   std::optional<collision::Clearance> clearance;
+  // Distances that left no room for a motion; each of the next ones is half as large. Empty if a distance was asked
+  // for, or if there is a cell.
+  std::vector<double> too_far_m;
   excitation::Optimum best;
   bool interrupted = false;
   excitation::Composed composed;
@@ -70,6 +73,8 @@ struct Excited {
   std::vector<Accuracy> accuracy;
 
  private:
+  // False: there is none at this distance, and a smaller one may be tried.
+  bool FindMotion(const std::atomic<bool>* stop, const Tell& tell);
   nlohmann::ordered_json ClearanceJson() const;
 };
 

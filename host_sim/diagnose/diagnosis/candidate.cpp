@@ -61,9 +61,8 @@ std::vector<double> Candidate::Initial() const {
 namespace {
 
 // Each column as it was a time before, linear between samples: friction's jumps stay jumps.
-Eigen::MatrixXd Earlier(const VectorXd& t, Eigen::MatrixXd y, double delay_s) {
-  for (auto column : y.colwise()) column = calibration::ThroughChannel(t, column, {0, delay_s, 1});
-  return y;
+Eigen::MatrixXd Earlier(const VectorXd& t, const Eigen::MatrixXd& y, double delay_s) {
+  return calibration::ChannelAt(t, {0, delay_s, 1}).Through(y);
 }
 
 // The log's column that a graph input stands for; null where the log does not have it, which reads as zero.

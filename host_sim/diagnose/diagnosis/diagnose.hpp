@@ -1,6 +1,7 @@
 // diagnosis - finds the causes of what a model leaves. The training logs alone decide; a held-out log judges.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -131,6 +132,7 @@ class Diagnosis {
 
 // The robot file with the confirmed terms added: each with its record, parameters and standard deviations, `provenance`
 // and score as comments. What a model can hold is an [[effect]] table; of the rest a comment says what to do about it.
+// folder: where the file will lie; the URDF and packages are named from there, or, if it is empty, from the root.
 struct NewModel {
   std::string text;
   // Joints, from 0, on which the friction found would push at speeds or temperatures beyond the logs, so that a drive
@@ -138,6 +140,6 @@ struct NewModel {
   std::vector<int> from_zero;
 };
 NewModel ModelFile(const codegen::Model& model, const codegen::Catalogue& catalogue, const Finding& finding,
-                   const std::string& provenance);
+                   const std::string& provenance, const std::filesystem::path& folder = {});
 
 }  // namespace armcal::diagnosis

@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kTried = 10;     // members of a usual grid
+constexpr double kTried = 10;       // members of a usual grid
 constexpr double kRounding = 1e-4;  // of a column's own square: so little beside the declared model is rounding
 
 // What a term must gain to be accepted.

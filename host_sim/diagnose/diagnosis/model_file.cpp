@@ -15,24 +15,28 @@ namespace armcal::diagnosis {
 
 namespace {
 
-// The line with each quoted value as a path that holds from anywhere.
-std::string WithAbsolutePaths(const std::string& line, const std::filesystem::path& folder) {
+// The line with each quoted value, a path seen from `folder`, as it is seen from `other`; empty: from anywhere.
+std::string WithPaths(const std::string& line, const std::filesystem::path& folder,
+                      const std::filesystem::path& other) {
   static const std::regex value("=\\s*[\"']([^\"']+)[\"']");
   std::string out, rest = line;
-  for (std::smatch found; std::regex_search(rest, found, value); rest = found.suffix().str())
-    out += found.prefix().str() + "= \"" + std::filesystem::absolute(folder / found[1].str()).string() + "\"";
+  for (std::smatch found; std::regex_search(rest, found, value); rest = found.suffix().str()) {
+    const std::filesystem::path path = std::filesystem::absolute(folder / found[1].str());
+    const auto near = other.empty() ? path : path.lexically_proximate(std::filesystem::absolute(other));
+    out += found.prefix().str() + "= \"" + near.string() + "\"";
+  }
   return out + rest;
 }
 
-// The declared file. What it names beside itself is named from anywhere, for the new file may lie elsewhere.
-std::string Declared(const std::filesystem::path& path) {
+// The declared file as it is in `folder`: what it names beside itself is named from there.
+std::string Declared(const std::filesystem::path& path, const std::filesystem::path& folder) {
   std::ifstream in(path);
   std::string text;
   const std::regex paths("^\\s*(urdf|packages)\\s*=.*"), table("^\\s*\\[.*"), packages("^\\s*\\[\\s*packages\\s*\\].*");
   bool in_packages = false;
   for (std::string line; std::getline(in, line);) {
     if (std::regex_match(line, table)) in_packages = std::regex_match(line, packages);
-    if (in_packages || std::regex_match(line, paths)) line = WithAbsolutePaths(line, path.parent_path());
+    if (in_packages || std::regex_match(line, paths)) line = WithPaths(line, path.parent_path(), folder);
     text += line + "\n";
   }
   return text;
@@ -146,9 +150,9 @@ Joints Pushing(const codegen::Model& model, const codegen::Catalogue& catalogue,
 }  // namespace
 
 NewModel ModelFile(const codegen::Model& model, const codegen::Catalogue& catalogue, const Finding& finding,
-                   const std::string& provenance) {
+                   const std::string& provenance, const std::filesystem::path& folder) {
   const std::vector<codegen::EffectUse> beside = FrictionBeside(model, finding);
-  NewModel out{Declared(model.robot().path), Pushing(model, catalogue, finding, beside)};
+  NewModel out{Declared(model.robot().path, folder), Pushing(model, catalogue, finding, beside)};
   for (const Term& t : finding.terms) {
     if (!t.confirmed) continue;
     out.text += Comments(t, provenance);

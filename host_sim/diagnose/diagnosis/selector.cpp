@@ -386,8 +386,8 @@ bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& t
 // The derivation of speed and acceleration leaves errors that look like delay, elasticity or backlash. A real term
 // gains about as much when they are derived with a lower bandwidth. A term of high frequencies loses more: it must then
 // be acceptable there, too, and as large as before.
-bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
-                                     const Metric& wide) {
+bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Columns& columns,
+                                     const Gain& gain, const Metric& wide) {
   if (!w_.narrow) return true;
   Diagnosis::Work& narrow = *w_.narrow;
   narrow.PrepareAsIn(w_, terms, *f.candidate);
@@ -396,13 +396,29 @@ bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Cho
   const double left = metric.Try(c).gain;
   if (left > kStays * gain.gain) return true;
   return LogChance(f, left) < kLogSurely && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second &&
-         IsOfTheMotion(f, wide);
+         IsOfTheMotion(f, columns, gain.amplitude, wide);
+}
+
+// The training logs minus the torque of a term, where a row is a sample.
+std::vector<calibration::Dataset> Selector::Without(const Columns& columns, const VectorXd& amplitude) const {
+  std::vector<calibration::Dataset> out;
+  for (const calibration::Dataset* log : w_.train) out.push_back(*log);
+  for (std::size_t r = 0; r < columns.joints.size(); ++r) {
+    const RowIndex& index = w_.evidence.index[static_cast<std::size_t>(columns.joints[r])];
+    if (index.averaged()) continue;
+    const VectorXd torque = columns.block[r] * amplitude;
+    for (int i = 0; i < index.size(); ++i)
+      out[static_cast<std::size_t>(index.dataset[static_cast<std::size_t>(i)])].tau(
+          index.sample[static_cast<std::size_t>(i)], columns.joints[r]) -= torque[i];
+  }
+  return out;
 }
 
 // The noise of the derivation is in the logs at every bandwidth, and what smooths it looks like elasticity. Far below
 // the bandwidth hardly any of it is left: a term must show along that motion, too. And if the noise biases the rows of
-// these joints, a term cannot be told from it.
-bool Selector::IsOfTheMotion(const Found& f, const Metric& wide) const {
+// these joints, a term cannot be told from it. What the term itself explains is not held against it.
+bool Selector::IsOfTheMotion(const Found& f, const Columns& columns, const VectorXd& amplitude,
+                             const Metric& wide) const {
   const std::vector<calibration::Dataset> smooth = calibration::SmoothedInstruments(w_.train);
   Evidence along{&w_.model, {}, w_.evidence.index};
   const std::set<codegen::InputId> reads = w_.Reads({}, f.candidate);
@@ -413,7 +429,10 @@ bool Selector::IsOfTheMotion(const Found& f, const Metric& wide) const {
   if (LogChance(f, wide.Try(GatherColumns(*f.candidate, along, f.eta)).gain) > kLogSurely) return false;
   VectorXd z(w_.model.columns() + w_.model.nonlinear());
   z << w_.estimate.x.head(w_.model.columns()), VectorXd::Map(w_.declared.eta.data(), w_.model.nonlinear());
-  const calibration::Exogeneity e = calibration::TestExogeneity(w_.model, w_.train, smooth, z);
+  const std::vector<calibration::Dataset> left = Without(columns, amplitude);
+  std::vector<const calibration::Dataset*> logs;
+  for (const calibration::Dataset& log : left) logs.push_back(&log);
+  const calibration::Exogeneity e = calibration::TestExogeneity(w_.model, logs, smooth, z);
   const std::vector<int>& joints = f.candidate->rows();
   return std::all_of(joints.begin(), joints.end(),
                      [&](int j) { return e.joint[static_cast<std::size_t>(j)].exogenous; });
@@ -547,7 +566,7 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     refused_[f.candidate] = why;
     return false;
   }
-  if (!StaysAtLowerBandwidth(f, terms, gain, metric)) {
+  if (!StaysAtLowerBandwidth(f, terms, c, gain, metric)) {
     refused_[f.candidate] = "it does not keep its gain where speed and acceleration are derived with a lower bandwidth";
     return false;
   }

@@ -38,9 +38,11 @@ class Selector {
   bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   // Best first: by score, but a named cause before a curve that explains little more.
   void Sort(std::vector<Found>& ranked);
-  bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Gain& gain,
-                             const Metric& wide);
-  bool IsOfTheMotion(const Found& f, const Metric& wide) const;
+  bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Columns& columns,
+                             const Gain& gain, const Metric& wide);
+  bool IsOfTheMotion(const Found& f, const Columns& columns, const Eigen::VectorXd& amplitude,
+                     const Metric& wide) const;
+  std::vector<calibration::Dataset> Without(const Columns& columns, const Eigen::VectorXd& amplitude) const;
   bool ShowsBesideChannel(const Found& f, const Columns& columns, const Metric& metric) const;
   bool ShowsInSliding(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const;
   bool ShowsWhereSignIsSteady(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const;

@@ -163,7 +163,12 @@ JointHealth Judge(const client::JointResiduals& joint) {
   health.rows = then.rows + now.rows;
   health.rms_then_Nm = std::sqrt(then.mean_square);
   health.rms_now_Nm = std::sqrt(now.mean_square);
-  if (now.rows < kFewestLatestRows) return health;
+  if (now.rows < kFewestLatestRows) {
+    // The latest rows are forgotten: of n of them, kMemory (1 - exp(-n / kMemory)) are left.
+    const double latest = kMemory * std::log((1 - now.rows / kMemory) / (1 - kFewestLatestRows / kMemory));
+    health.missing_rows = std::max(0.0, kReferenceRows - then.rows) + latest;
+    return health;
+  }
 
   const double smallest = kSmallestInSigma * joint.sigma_Nm;
   const Explanation change = Explain(ChangeEvidence(joint), smallest);

@@ -29,7 +29,8 @@ struct JointHealth {
   std::optional<Onset> onset;  // of kNoLongerFits, if the history shows it
   double elapsed_s = 0;        // since the adoption
   double rms_then_Nm = 0, rms_now_Nm = 0, sigma_Nm = 0;
-  double rows = 0;  // judged: first and latest
+  double rows = 0;          // judged: first and latest
+  double missing_rows = 0;  // of kTooEarly: until there is an answer
 };
 
 // A change whose torque has an RMS below this share of one row's torque noise is not reported.
@@ -38,6 +39,8 @@ inline constexpr double kSmallestInSigma = 0.4;
 inline constexpr double kNeverInSigma = 2.0;
 // Latest rows below which nothing is said: 16 s of motion at 125 Hz.
 inline constexpr double kFewestLatestRows = 2048;
+// The firmware keeps so many rows after an adoption as the reference, and about so many latest ones.
+inline constexpr double kReferenceRows = 16384, kMemory = 16384;
 
 // The step of the mean square that is most likely under Gaussian residuals. Nothing: no slice, or the residual did not
 // grow.

@@ -103,7 +103,8 @@ class LoadOfRun {
         if (c < model.columns()) A.col(a) = columns[at].col(c);
         else if (c == model.columns() + j) A.col(a) = model_torque;
       }
-      A.col(active + j) = run.tau.col(j);
+      // Not the measured torque: its noise is that of the residual, so a gain of one would cancel it.
+      A.col(active + j) = run.tau.col(j) - residual.col(j);
       A.rightCols(kLoadParameters) = (1 + fit.x[model.columns() + j]) * (body[at] * to_link);
       for (Index c = 0; c < size_; ++c)
         if (c < active || c >= differ_) A.col(c) = ThroughChannel(run, j, AsSaved(run, j, A.col(c)));

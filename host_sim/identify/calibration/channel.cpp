@@ -65,7 +65,7 @@ double Row::Left(const JointChannel& channel, Index& rows, VectorXd* best, const
     const Dataset& log = *logs[l];
     const bool averaged = log.averaged(joint);
     MatrixXd A(log.samples(), size);
-    for (Index c = 0; c < own; ++c) A.col(c) = ThroughChannel(log.s.t, columns[l].col(c), channel);
+    A.leftCols(own) = ChannelAt(log.s.t, channel).Through(columns[l]);
     if (extra) A.col(own) = (*extra)[l];
     VectorXd y = log.tau.col(joint);
     if (averaged) {
@@ -165,38 +165,78 @@ Late Search(const Row& row) {
 
 }  // namespace
 
-VectorXd ThroughChannel(const VectorXd& t, const VectorXd& torque, const JointChannel& channel) {
-  const double lag_s = channel.lag_s, late_s = channel.late_s;
+ChannelAt::ChannelAt(const VectorXd& t, const JointChannel& channel)
+    : passes_(channel.lag_s > 0 ? channel.lags : 0), is_late_(channel.late_s != 0 && t.size() > 1) {
   const Index samples = t.size(), last = samples - 1;
-  VectorXd out = torque;
-  if (late_s != 0) {
+  if (is_late_) {
+    before_.resize(static_cast<std::size_t>(samples));
+    share_.resize(samples);
     Index k = 0;  // t[k] <= time < t[k + 1]
     for (Index i = 0; i < samples; ++i) {
-      const double time = std::clamp(t[i] - late_s, t[0], t[last]);
+      const double time = std::clamp(t[i] - channel.late_s, t[0], t[last]);
       k = std::min(k, std::max<Index>(0, last - 1));
       while (k + 1 < last && t[k + 1] <= time) ++k;
       while (k > 0 && t[k] > time) --k;
-      const double share = last > 0 ? (time - t[k]) / (t[k + 1] - t[k]) : 0;
-      out[i] = last > 0 ? (1 - share) * torque[k] + share * torque[k + 1] : torque[k];
+      before_[static_cast<std::size_t>(i)] = k;
+      share_[i] = (time - t[k]) / (t[k + 1] - t[k]);
     }
   }
-  if (lag_s <= 0) return out;
-  for (int pass = 0; pass < channel.lags; ++pass) {
-    double z = out[0], before = out[0], step = 0, rest = 1, ramp = 0;
-    for (Index i = 1; i < samples; ++i) {
-      const double dt = t[i] - t[i - 1];
-      if (std::abs(dt - step) > kSameStep * dt) step = dt, rest = std::exp(-dt / lag_s), ramp = lag_s / dt * (1 - rest);
-      z = rest * z + (ramp - rest) * before + (1 - ramp) * out[i];
-      before = out[i];
-      out[i] = z;
+  if (passes_ == 0) return;
+  rest_.resize(samples), ramp_.resize(samples);
+  double step = 0, rest = 1, ramp = 0;
+  for (Index i = 1; i < samples; ++i) {
+    const double dt = t[i] - t[i - 1];
+    if (std::abs(dt - step) > kSameStep * dt)
+      step = dt, rest = std::exp(-dt / channel.lag_s), ramp = channel.lag_s / dt * (1 - rest);
+    rest_[i] = rest, ramp_[i] = ramp;
+  }
+}
+
+// A column's next value waits for its last one. So some columns go side by side.
+template <Index kColumns>
+void ChannelAt::LowPass(double* first) const {
+  const Index samples = rest_.size();
+  double z[kColumns], before[kColumns];
+  for (Index c = 0; c < kColumns; ++c) z[c] = before[c] = first[c * samples];
+  for (Index i = 1; i < samples; ++i) {
+    const double rest = rest_[i], ramp = ramp_[i];
+    for (Index c = 0; c < kColumns; ++c) {
+      double& value = first[c * samples + i];
+      z[c] = rest * z[c] + (ramp - rest) * before[c] + (1 - ramp) * value;
+      before[c] = value;
+      value = z[c];
     }
+  }
+}
+
+MatrixXd ChannelAt::Through(const MatrixXd& torque) const {
+  const Index samples = torque.rows();
+  MatrixXd out = torque;
+  for (Index c = 0; c < out.cols() && is_late_; ++c)
+    for (Index i = 0; i < samples; ++i) {
+      const Index k = before_[static_cast<std::size_t>(i)];
+      out(i, c) = (1 - share_[i]) * torque(k, c) + share_[i] * torque(k + 1, c);
+    }
+  constexpr Index kTogether = 4;
+  for (int pass = 0; pass < passes_; ++pass) {
+    Index c = 0;
+    for (; c + kTogether <= out.cols(); c += kTogether) LowPass<kTogether>(out.col(c).data());
+    for (; c < out.cols(); ++c) LowPass<1>(out.col(c).data());
   }
   return out;
 }
 
+VectorXd ThroughChannel(const VectorXd& t, const VectorXd& torque, const JointChannel& channel) {
+  return ChannelAt(t, channel).Through(torque);
+}
+
+JointChannel ChannelOf(const Dataset& data, int joint) {
+  return data.channel.empty() ? JointChannel{} : data.channel[static_cast<std::size_t>(joint)];
+}
+
 VectorXd ThroughChannel(const Dataset& data, int joint, VectorXd torque) {
-  if (data.channel.empty() || data.channel[static_cast<std::size_t>(joint)].empty()) return torque;
-  return ThroughChannel(data.s.t, torque, data.channel[static_cast<std::size_t>(joint)]);
+  const JointChannel channel = ChannelOf(data, joint);
+  return channel.empty() ? torque : ThroughChannel(data.s.t, torque, channel);
 }
 
 MatrixXd ThroughChannel(const Dataset& data, MatrixXd torque) {
@@ -206,8 +246,10 @@ MatrixXd ThroughChannel(const Dataset& data, MatrixXd torque) {
 }
 
 void PassThroughChannel(const Dataset& data, std::vector<MatrixXd>& regressor) {
-  for (std::size_t j = 0; j < regressor.size() && !data.channel.empty(); ++j)
-    for (auto column : regressor[j].colwise()) column = ThroughChannel(data, static_cast<int>(j), column);
+  for (std::size_t j = 0; j < regressor.size() && !data.channel.empty(); ++j) {
+    if (data.channel[j].empty()) continue;
+    regressor[j] = ChannelAt(data.s.t, data.channel[j]).Through(regressor[j]);
+  }
 }
 
 void UseWhatMoved(Dataset& data) {

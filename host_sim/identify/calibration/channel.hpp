@@ -9,10 +9,28 @@
 
 namespace armcal::calibration {
 
-// The torque [N] of one joint as its channel shows it. Exact with one low-pass, for a torque that is linear between
-// samples.
+// A channel at the times of a log: all that does not depend on the torque. Exact with one low-pass, for a torque that
+// is linear between samples.
+class ChannelAt {
+ public:
+  ChannelAt(const Eigen::VectorXd& t, const JointChannel& channel);
+  // Torques [N x columns] as the channel shows them.
+  Eigen::MatrixXd Through(const Eigen::MatrixXd& torque) const;
+
+ private:
+  template <Eigen::Index kColumns>
+  void LowPass(double* first) const;
+
+  int passes_;  // of the low-pass
+  bool is_late_;
+  std::vector<Eigen::Index> before_;  // [N] the last sample before what a row shows
+  Eigen::VectorXd share_;             // [N] how far that is on the way to the next sample
+  Eigen::VectorXd rest_, ramp_;       // [N] of the step to this sample
+};
 Eigen::VectorXd ThroughChannel(const Eigen::VectorXd& t, const Eigen::VectorXd& torque, const JointChannel& channel);
 
+// The channel of a joint of the log.
+JointChannel ChannelOf(const Dataset& data, int joint);
 // The same for a joint of a log, with the log's own channel; for all joints [N x n].
 Eigen::VectorXd ThroughChannel(const Dataset& data, int joint, Eigen::VectorXd torque);
 Eigen::MatrixXd ThroughChannel(const Dataset& data, Eigen::MatrixXd torque);

@@ -99,9 +99,10 @@ void SumFiltered(const codegen::Model& model, const Dataset& data, const Eigen::
     if (!IsFiltered(data, j)) continue;
     const Eigen::MatrixXd tau = RowsOf(data, j, data.tau.col(j));
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(tau.rows(), columns + model.joints());
+    const ChannelAt samples(data.s.t, ChannelOf(data, j));
     for (int c = 0; c < columns; ++c)
       if (!model.rows()[j][c].IsZero())
-        A.col(c) = RowsOf(data, j, ThroughChannel(data, j, regressor[static_cast<std::size_t>(j)].col(c)));
+        A.col(c) = RowsOf(data, j, samples.Through(regressor[static_cast<std::size_t>(j)].col(c)));
     A.col(columns + j) = A.leftCols(columns) * p;
     info.gram[j] = A.transpose() * A;
     info.right[j] = A.transpose() * tau.col(0);

@@ -72,6 +72,7 @@ std::pair<Vector3d, double> Ball(const std::vector<Vector3d>& points) {
 
 std::vector<std::string> MeshFaults(const codegen::Robot& robot) {
   std::vector<std::string> faults;
+  if (!CanMeasure()) return faults;
   for (const Shape& shape : robot.shape) {
     if (shape.kind != Shape::Kind::kMesh || shape.file.empty()) continue;
     try {
@@ -84,7 +85,8 @@ std::vector<std::string> MeshFaults(const codegen::Robot& robot) {
 }
 
 std::string WhyUncheckable(const codegen::Robot& robot) {
-  if (!CanMeasure()) return "this program was built without FCL; install libfcl-dev, then build it again";
+  if (!CanMeasure())
+    return "this program was built without FCL or Assimp; install libfcl-dev and libassimp-dev, then build it again";
   if (robot.shape.empty()) return "the robot has no collision shapes; the URDF's, or [[capsule]] in " + robot.path;
   for (const Shape& shape : robot.shape)
     if (shape.kind == Shape::Kind::kMesh && shape.file.empty())

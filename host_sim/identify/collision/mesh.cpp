@@ -1,13 +1,11 @@
-// collision - reads STL and OBJ. Faces do not count, for only the hull is used.
+// collision - reads meshes by Assimp. Faces do not count, for only the hull is used.
 #include "host_sim/identify/collision/mesh.hpp"
 
+#include <assimp/config.h>
+#include <assimp/scene.h>
+
 #include <algorithm>
-#include <cctype>
-#include <cstdint>
-#include <cstring>
-#include <fstream>
-#include <iterator>
-#include <sstream>
+#include <assimp/Importer.hpp>
 #include <string>
 
 #include "codegen/src/io/require_file.hpp"
@@ -15,63 +13,45 @@
 namespace armcal::collision {
 namespace {
 
-constexpr std::size_t kStlHead = 84, kStlTriangle = 50;
-
-// A binary STL says in its head how many triangles it has. A text that begins with "solid" may be either.
-bool IsBinaryStl(const std::string& bytes) {
-  if (bytes.size() < kStlHead) return false;
-  std::uint32_t triangles = 0;
-  std::memcpy(&triangles, bytes.data() + kStlHead - 4, 4);
-  return bytes.size() == kStlHead + kStlTriangle * std::size_t{triangles};
+std::string OneLine(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
+  return text;
 }
 
-std::vector<Eigen::Vector3d> BinaryStl(const std::string& bytes) {
+// A node has a pose in its parent, and names meshes; nodes without parents are the file's.
+std::vector<Eigen::Vector3d> CornersOf(const aiScene& scene) {
   std::vector<Eigen::Vector3d> corners;
-  for (std::size_t at = kStlHead; at < bytes.size(); at += kStlTriangle)
-    for (int corner = 1; corner <= 3; ++corner) {  // 0 is the normal
-      float xyz[3];
-      std::memcpy(xyz, bytes.data() + at + 12 * static_cast<std::size_t>(corner), sizeof xyz);
-      corners.emplace_back(xyz[0], xyz[1], xyz[2]);
+  std::vector<std::pair<const aiNode*, aiMatrix4x4>> open{{scene.mRootNode, scene.mRootNode->mTransformation}};
+  while (!open.empty()) {
+    const auto [node, pose] = open.back();
+    open.pop_back();
+    for (unsigned k = 0; k < node->mNumMeshes; ++k) {
+      const aiMesh& mesh = *scene.mMeshes[node->mMeshes[k]];
+      for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+        const aiVector3D p = pose * mesh.mVertices[i];
+        corners.emplace_back(p.x, p.y, p.z);
+      }
     }
-  return corners;
-}
-
-// Lines that begin with this word and three numbers.
-std::vector<Eigen::Vector3d> TextCorners(const std::string& text, const std::string& word) {
-  std::vector<Eigen::Vector3d> corners;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    std::istringstream words(line);
-    std::string first;
-    if (!(words >> first) || first != word) continue;
-    Eigen::Vector3d corner = Eigen::Vector3d::Constant(NAN);
-    words >> corner[0] >> corner[1] >> corner[2];
-    if (!words) corner.setConstant(NAN);
-    corners.push_back(corner);
+    for (unsigned k = 0; k < node->mNumChildren; ++k)
+      open.emplace_back(node->mChildren[k], pose * node->mChildren[k]->mTransformation);
   }
   return corners;
-}
-
-std::string LowerExtension(const std::filesystem::path& path) {
-  std::string out = path.extension().string();
-  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
 }
 
 }  // namespace
 
 std::vector<Eigen::Vector3d> ReadMesh(const std::filesystem::path& path) {
   io::RequireFile(path);
-  const std::string kind = LowerExtension(path);
-  if (kind != ".stl" && kind != ".obj")
-    throw io::InputError(
-        path.string() +
-        ": expected a mesh as STL or OBJ; convert it, or give the link a [[capsule]] in the robot file");
-  std::ifstream file(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  std::vector<Eigen::Vector3d> corners = kind == ".obj"       ? TextCorners(bytes, "v")
-                                         : IsBinaryStl(bytes) ? BinaryStl(bytes)
-                                                              : TextCorners(bytes, "vertex");
+  Assimp::Importer importer;
+  // A URDF takes a COLLADA file's axes as they are; its unit counts.
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
+  const aiScene* const scene = importer.ReadFile(path.string(), 0);
+  if (!scene || !scene->mRootNode)
+    throw io::InputError(path.string() + ": expected a mesh as STL, OBJ or COLLADA (" +
+                         OneLine(importer.GetErrorString()) +
+                         "); convert it, or give the link a [[capsule]] in the robot file");
+  std::vector<Eigen::Vector3d> corners = CornersOf(*scene);
   if (corners.empty()) throw io::InputError(path.string() + ": expected a mesh with corners, this one has none");
   for (const Eigen::Vector3d& corner : corners)
     if (!corner.allFinite()) throw io::InputError(path.string() + ": expected three finite numbers a corner");

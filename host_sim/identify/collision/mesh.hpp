@@ -7,8 +7,8 @@
 
 namespace armcal::collision {
 
-// STL, binary or text, and Wavefront OBJ; each corner once. Throws io::InputError: another kind of file, a mesh without
-// corners, a number that is none.
+// STL, OBJ, COLLADA, and what else Assimp reads; each corner once. A COLLADA file's unit counts, its up axis does not.
+// Throws io::InputError: another kind of file, a mesh without corners, a number that is none. CanMeasure() must hold.
 std::vector<Eigen::Vector3d> ReadMesh(const std::filesystem::path& path);
 
 }  // namespace armcal::collision

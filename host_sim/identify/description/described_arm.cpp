@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
 #include "codegen/src/robot/body.hpp"
@@ -29,15 +27,6 @@ int FrictionOf(const codegen::Model& model, const std::string& name, std::string
 }
 
 }  // namespace
-
-std::string Exact(double v) { return fmt::format("{}", v == 0 ? 0.0 : v); }
-std::string Exact(const Eigen::Vector3d& v) { return Exact(v[0]) + " " + Exact(v[1]) + " " + Exact(v[2]); }
-
-Eigen::Vector3d ToRollPitchYaw(const Eigen::Matrix3d& R) {
-  const double level = std::hypot(R(0, 0), R(1, 0));
-  if (level < 1e-12) return {std::atan2(-R(1, 2), R(1, 1)), std::atan2(-R(2, 0), level), 0};
-  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), level), std::atan2(R(1, 0), R(0, 0))};
-}
 
 DescribedArm Describe(const codegen::Model& model, const calibration::Given& given, const std::string& source) {
   if (given.bodies.size() == 0)

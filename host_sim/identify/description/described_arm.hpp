@@ -43,19 +43,15 @@ Description ToMjcf(const DescribedArm& arm);
 Description ToYaml(const DescribedArm& arm);
 Description ToHeader(const DescribedArm& arm);
 
-// The URDF that the robot file names, or `urdf`, with inertials, damping and friction of the moving links replaced and
-// every other byte as it was. Links that are fixed to a moving link keep their inertials, and the moving link gets what
-// is left of the identified body; merge: the moving link gets all of it, and the fixed links lose their inertials.
-// Throws io::InputError: no URDF, another chain, a rest that cannot exist.
-Description ToUrdf(const DescribedArm& arm, const std::string& urdf, bool merge);
-
-// What neither URDF nor SDF has a place for: rotor inertia, effects, torque scales, coupled motors.
-std::vector<std::string> NotInUrdf(const DescribedArm& arm);
-
-// Shortest text that reads back as the same number.
-std::string Exact(double v);
-std::string Exact(const Eigen::Vector3d& v);
-// Fixed-axis roll, pitch and yaw.
-Eigen::Vector3d ToRollPitchYaw(const Eigen::Matrix3d& R);
+// The same values written into a file that is given: inertials, friction and rotor inertia of the moving links and
+// joints are replaced, and every other byte stays as it was. Joints are found by their names. Links that are fixed to a
+// moving link keep their inertials, and the moving link gets what is left of the identified body; merge: the moving
+// link gets all of it, and the fixed links lose their inertials. Joints that are not the arm's are held. Throws
+// io::InputError: another kind of file, another arm, a rest that cannot exist. urdf: empty: the one that the robot file
+// names.
+Description ToGivenUrdf(const DescribedArm& arm, const std::string& urdf, bool merge);
+// file: the name for errors. Link frames are the file's own: the arm is found by the axes of its joints.
+Description ToGivenSdf(const DescribedArm& arm, const std::string& file, const std::string& text);
+Description ToGivenMjcf(const DescribedArm& arm, const std::string& file, const std::string& text, bool merge);
 
 }  // namespace armcal::description

@@ -20,6 +20,9 @@ class Scan {
       if (text_[begin + 1] == '/') {
         if (open.size() < 2) throw io::InputError(file_ + ": XML: an end tag without its start");
         XmlElement done = std::move(open.back());
+        if (text_.compare(begin + 2, done.name.size(), done.name) != 0 ||
+            std::string_view(" \t\r\n>").find(text_[begin + 2 + done.name.size()]) == std::string_view::npos)
+          throw io::InputError(file_ + ": XML: <" + done.name + "> without its end tag");
         open.pop_back();
         done.close = begin, done.end = end;
         open.back().child.push_back(std::move(done));
@@ -86,6 +89,12 @@ class Scan {
 const XmlElement* XmlElement::Find(const std::string& element) const {
   for (const XmlElement& e : child)
     if (e.name == element) return &e;
+  return nullptr;
+}
+
+const XmlAttribute* XmlElement::Attribute(const std::string& of) const {
+  for (const XmlAttribute& a : attribute)
+    if (a.name == of) return &a;
   return nullptr;
 }
 

@@ -23,10 +23,11 @@ struct XmlElement {
   std::vector<XmlAttribute> attribute;
   std::vector<XmlElement> child;
 
-  const XmlElement* Find(const std::string& element) const;  // the first child of this name
+  const XmlElement* Find(const std::string& element) const;      // the first child of this name, or none
+  const XmlAttribute* Attribute(const std::string& name) const;  // or none
 };
 
-// The document's element. The text has passed a parser before: this one only finds places.
+// The document's element. This is no parser: it finds places, and does not expand entities.
 // file: for an error. Throws io::InputError: tags that do not match.
 XmlElement PlacesOf(const std::string& file, const std::string& text);
 

@@ -104,6 +104,7 @@ def evaluate(
     table: Path | None = None,
     cutoff_Hz: float = 0.0,
     band_Hz: float = 0.0,
+    progress: Progress = None,
 ) -> dict[str, Any]:
     """What armcal evaluate --json writes. See docs/python.md."""
 

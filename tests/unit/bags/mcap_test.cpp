@@ -1,5 +1,6 @@
 // bags tests - MCAP files made by hand from the specification: cut, damaged, hostile, and encoded as armcal does not
 // read.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "host_sim/data/bags/recording.hpp"
@@ -46,13 +47,45 @@ TEST_F(Mcap, WithoutChunks_IsRead) {
   ASSERT_EQ(rows(), 3);
   EXPECT_EQ(last_.streams[0].values(2, 0), 2);
   EXPECT_EQ(last_.streams[0].stamp_ns[2], 2000000);
-  EXPECT_EQ(last_.notes, std::vector<std::string>{"/a: time is the recorder's, there is no header.stamp"});
+  EXPECT_EQ(last_.notes, std::vector<std::string>{
+                             "/a: time is the recorder's, for most messages have no header.stamp of their own"});
 }
 
 TEST_F(Mcap, MessagesInAnyOrder_AreSortedByTime) {
   ASSERT_EQ(ErrorFor(File(Schema() + Channel() + MessageOf(2, X(2)) + MessageOf(0, X(0)) + MessageOf(1, X(1)))), "");
   EXPECT_EQ(last_.streams[0].values(0, 0), 0);
   EXPECT_EQ(last_.streams[0].values(2, 0), 2);
+}
+
+// The content of a message that begins with a header.
+std::string Stamped(std::int32_t sec, double x) {
+  return std::string("\0\1\0\0", 4) + Int(sec) + Int<std::uint32_t>(0) + Int<std::uint32_t>(1) + std::string(4, '\0') +
+         Int(x);
+}
+
+// Ten messages; without_stamp of them have none. Two others come in the wrong order.
+TEST_F(Mcap, MessagesWithoutAStamp_AreLeftOut_UnlessTheyAreMost) {
+  for (const int without_stamp : {1, 6}) {
+    std::string messages;
+    for (int k = 0; k < 10; ++k) {
+      const int turned = k == 8 ? 9 : k == 9 ? 8 : k;
+      messages += MessageOf(turned, Stamped(k < without_stamp ? 0 : 100 + turned, turned));
+    }
+    ASSERT_EQ(ErrorFor(File(Schema("ros2msg", "std_msgs/Header header\nfloat64 x") + Channel() + messages)), "");
+    const std::string notes = fmt::format("{}", fmt::join(last_.notes, "|"));
+    EXPECT_NE(notes.find("/a: 1 of 10 messages have "), std::string::npos) << notes;
+    EXPECT_NE(notes.find("a time before that of the message in front of them"), std::string::npos) << notes;
+    if (without_stamp == 1) {
+      ASSERT_EQ(rows(), 9);
+      EXPECT_EQ(last_.streams[0].stamp_ns[0], 101000000000);
+      EXPECT_EQ(last_.streams[0].values(8, 0), 9);
+      EXPECT_NE(notes.find("1 of 10 messages have no header.stamp and are left out"), std::string::npos) << notes;
+    } else {
+      ASSERT_EQ(rows(), 10);
+      EXPECT_EQ(last_.streams[0].stamp_ns[1], 1000000);
+      EXPECT_EQ(notes.find("left out"), std::string::npos) << notes;
+    }
+  }
 }
 
 TEST_F(Mcap, CutAtAnyLength_IsReadUpToTheLastWholeChunk_OrRefused) {

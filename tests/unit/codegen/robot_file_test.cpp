@@ -182,7 +182,7 @@ TEST_F(RobotFile, ThatNamesAUrdf_SaysAllFaultsOfBoth) {
   const std::vector<Case> cases = {
       {{{UrdfBody(3), ""}, {UrdfBody(1), ""}},
        {},
-       {"joint \"r1\": expected a link with mass after it; or write prior = \"none\" in",
+       {"joint \"r1\": expected a link with mass after it; mend it, or write prior = \"none\" in",
         "joint \"r3\": expected a link with mass after it"}},
       {{{UrdfBody(3), box}, {UrdfBody(1), box}},
        {},

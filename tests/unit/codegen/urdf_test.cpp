@@ -226,6 +226,19 @@ TEST_F(Urdf, RoundedRightAngles_AreTakenAsExact) {
   EXPECT_EQ(robot.joint[1].kinematics.a_m, 0);
 }
 
+TEST_F(Urdf, FaultsOfItsBodiesAndOfTheRobotFile_AreSaidInOneRun) {
+  const char* const flat = "ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.2\" iyz=\"0\" izz=\"9\"";
+  const std::string error = Refusal(RobotText(Link("base") + Link("l1", Inertial(1, "xyz=\"0 0 0\"", flat)) +
+                                              JointText("r1", "revolute", "base", "l1", "xyz=\"0 0 0\"", "0 0 1") +
+                                              Link("l2", Inertial(1, "xyz=\"0 0 0\"", kSkewed)) +
+                                              JointText("r2", "revolute", "l1", "l2", "xyz=\"0 0 0\"", "0 0 1")),
+                                    {"r1"});
+  EXPECT_NE(error.find("link \"l1\": expected principal moments of inertia"), std::string::npos) << error;
+  EXPECT_NE(error.find("; mend it, or write prior = \"none\" in "), std::string::npos) << error;
+  EXPECT_NE(error.find("joint: expected a [[joint]] table with name = \"r2\""), std::string::npos) << error;
+  EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << error;
+}
+
 TEST_F(Urdf, ThatIsNoSerialArm_IsRefusedInOneLine) {
   const std::string body = Inertial(1, "xyz=\"0 0 0\"", kSkewed);
   const std::string start =

@@ -9,6 +9,7 @@
 
 #include <Eigen/Geometry>
 
+#include "host_sim/identify/collision/distance.hpp"
 #include "host_sim/identify/collision/mesh.hpp"
 #include "tests/unit/files/temporary_folder.hpp"
 
@@ -84,7 +85,30 @@ std::string BinaryStl(const std::vector<std::array<Vector3d, 3>>& triangles) {
   return bytes;
 }
 
+// The corners of the other files in millimetres, in a node that is turned and moved, and back in the node around it.
+std::string Collada(const std::string& up_axis) {
+  return R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+ <asset><unit name="millimeter" meter="0.001"/><up_axis>)" +
+         up_axis + R"(</up_axis></asset>
+ <library_geometries><geometry id="g"><mesh>
+  <source id="p"><float_array id="a" count="12">0 0 0 500 0 0 0 250 0 0 0 -2000</float_array>
+   <technique_common><accessor source="#a" count="4" stride="3"><param name="X" type="float"/>
+    <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+  <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+  <triangles count="2"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2 0 1 3</p></triangles>
+ </mesh></geometry></library_geometries>
+ <library_visual_scenes><visual_scene id="s">
+  <node id="outer"><translate>0 0 -70</translate>
+   <node id="inner"><translate>0 0 70</translate><instance_geometry url="#g"/></node></node>
+ </visual_scene></library_visual_scenes>
+ <scene><instance_visual_scene url="#s"/></scene>
+</COLLADA>
+)";
+}
+
 TEST(ReadMesh, EveryKindOfFile_HasTheSameCorners) {
+  if (!CanMeasure()) GTEST_SKIP() << "built without Assimp";
   const TemporaryFolder folder;
   const Vector3d a(0, 0, 0), b(0.5, 0, 0), c(0, 0.25, 0), d(0, 0, -2);
   const std::string vertex = "  vertex 0 0 0\n  vertex 0.5 0 0\n  vertex 0 0.25 0\n",
@@ -93,20 +117,29 @@ TEST(ReadMesh, EveryKindOfFile_HasTheSameCorners) {
                            "  vertex 0 0 0\n  vertex 0.5 0 0\n  vertex 0 0 -2e0\n endloop\n endfacet\nendsolid\n";
   const std::vector<std::vector<Vector3d>> read = {
       ReadMesh(folder.Write("m.STL", BinaryStl({{a, b, c}, {a, b, d}}))), ReadMesh(folder.Write("t.stl", text)),
-      ReadMesh(folder.Write("m.obj", "# w\nv 0 0 0\nv 0.5 0 0\nvn 9 9 9\nv 0 0.25 0\nv 0 0 -2 1.0\nf 1 2 3\n"))};
-  for (const auto& corners : read) EXPECT_EQ(corners, (std::vector<Vector3d>{d, a, c, b}));
+      ReadMesh(
+          folder.Write("m.obj", "# w\nv 0 0 0\nv 0.5 0 0\nvn 9 9 9\nv 0 0.25 0\nv 0 0 -2 1.0\nf 1 2 3\nf 1 2 4\n")),
+      ReadMesh(folder.Write("m.dae", Collada("Z_UP"))), ReadMesh(folder.Write("y.dae", Collada("Y_UP")))};
+  const std::vector<Vector3d> expected{d, a, c, b};
+  for (const auto& corners : read) {
+    ASSERT_EQ(corners.size(), expected.size());
+    for (std::size_t k = 0; k < corners.size(); ++k) EXPECT_LT((corners[k] - expected[k]).norm(), 1e-7);
+  }
 }
 
 TEST(ReadMesh, FaultyFiles_AreRefusedInOneLine) {
+  if (!CanMeasure()) GTEST_SKIP() << "built without Assimp";
   const TemporaryFolder folder;
   const std::pair<std::filesystem::path, const char*> cases[] = {
       {folder / "none.stl", "no such file"},
-      {folder.Write("m.dae", "<COLLADA/>"), "STL or OBJ"},
+      {folder.Write("m.dae", "<COLLADA/>"), "empty"},
+      {folder.Write("cut.dae", Collada("Z_UP").substr(0, 700)), "malformed"},
+      {folder.Write("m.step", "ISO-10303-21;"), "STL, OBJ or COLLADA"},
       {folder.Write("cut.stl", BinaryStl({{Vector3d::Zero(), Vector3d::Ones(), Vector3d::UnitX()}}).substr(0, 100)),
-       "none"},
-      {folder.Write("empty.obj", ""), "none"},
-      {folder.Write("word.obj", "v 1 2 three\n"), "finite"},
-      {folder.Write("short.obj", "v 1 2\n"), "finite"}};
+       "expected a mesh"},
+      {folder.Write("word.stl", "solid s\nfacet normal 0 0 1\nouter loop\nvertex 1 two 3\nendloop\nendfacet\n"), "two"},
+      {folder.Write("empty.obj", ""), "expected a mesh"},
+      {folder.Write("short.obj", "v 1 2\nv 0 0 1\nv 0 1 0\nf 1 2 3\n"), "expected a mesh"}};
   for (const auto& [path, expected] : cases) {
     const std::string error = ErrorOf([&] { ReadMesh(path); });
     EXPECT_NE(error.find(path.string()), std::string::npos) << error;

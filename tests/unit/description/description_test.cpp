@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <kdl/tree.hpp>
 #include <kdl/treeidsolver_recursive_newton_euler.hpp>
 #include <kdl_parser/kdl_parser.hpp>
@@ -164,10 +165,10 @@ KDL::Tree Tree(const std::string& urdf) {
   return tree;
 }
 
-TEST_F(Export, ToUrdf_HasTheTorqueOfTheIdentifiedBodies_ReadByOthersAndByUs) {
+TEST_F(Export, ToGivenUrdf_HasTheTorqueOfTheIdentifiedBodies_ReadByOthersAndByUs) {
   for (const bool merge : {false, true}) {
     SCOPED_TRACE(merge);
-    const Description d = ToUrdf(arm_, "", merge);
+    const Description d = ToGivenUrdf(arm_, "", merge);
     EXPECT_LT(Relative(Torques(Tree(d.text), {{"grip", 0.03}}, true), Expected(true)), 1e-9);
     Write("arm.urdf", d.text);
     const codegen::Robot again = codegen::ReadRobot(folder_ / "arm.toml");
@@ -185,7 +186,7 @@ TEST_F(Export, ToUrdf_HasTheTorqueOfTheIdentifiedBodies_ReadByOthersAndByUs) {
 }
 
 // The hand's and the finger's inertials are what they were, and so is every byte but those of three links and joints.
-TEST_F(Export, ToUrdf_ChangesNothingElse) {
+TEST_F(Export, ToGivenUrdf_ChangesNothingElse) {
   const auto without = [](std::string text) {
     for (const char* link : {"up", "arm", "quill"}) {
       text = std::regex_replace(text, std::regex(std::string("(<link name=['\"]") + link + "['\"] *)/>"), "$1></link>");
@@ -198,7 +199,7 @@ TEST_F(Export, ToUrdf_ChangesNothingElse) {
     }
     return std::regex_replace(text, std::regex("\\s*<dynamics[^>]*>"), "");
   };
-  const std::string now = ToUrdf(arm_, "", false).text;
+  const std::string now = ToGivenUrdf(arm_, "", false).text;
   EXPECT_EQ(without(now), without(kUrdf));
   const auto parsed = [](const std::string& text) {
     const KDL::Tree tree = Tree(text);
@@ -209,7 +210,7 @@ TEST_F(Export, ToUrdf_ChangesNothingElse) {
 }
 
 // Within the elements that change, too: comments, other elements and other attributes stay.
-TEST_F(Export, ToUrdf_ChangesOnlyTheValuesOfTheElementsItKnows) {
+TEST_F(Export, ToGivenUrdf_ChangesOnlyTheValuesOfTheElementsItKnows) {
   std::string text = kUrdf;
   const auto put = [&text](const std::string& old, const std::string& with) {
     ASSERT_NE(text.find(old), text.npos) << old;
@@ -220,7 +221,7 @@ TEST_F(Export, ToUrdf_ChangesOnlyTheValuesOfTheElementsItKnows) {
   put("<mass value=\"4.2\"/>",
       "<!-- <mass value=\"9\"/> weighed -->  <mass unit=\"kg\" value='4.2'/><vendor x=\"1\"/>");
   Write("arm.urdf", text);
-  const Description d = ToUrdf(arm_, "", false);
+  const Description d = ToGivenUrdf(arm_, "", false);
   for (const char* kept : {"mu='16' damping = '", "stiffness=\"7\" ><!-- of a bench --><own/></dynamics>",
                            "<!-- <mass value=\"9\"/> weighed -->  <mass unit=\"kg\" value='", "'/><vendor x=\"1\"/>"})
     EXPECT_NE(d.text.find(kept), d.text.npos) << kept;
@@ -232,14 +233,14 @@ TEST_F(Export, ToUrdf_ChangesOnlyTheValuesOfTheElementsItKnows) {
   EXPECT_LT(Relative(Torques(Tree(d.text), {{"grip", 0.03}}, true), Expected(true)), 1e-9);
 }
 
-TEST_F(Export, ToUrdf_WhereTheRestCannotExist_AsksForMerge) {
+TEST_F(Export, ToGivenUrdf_WhereTheRestCannotExist_AsksForMerge) {
   given_.bodies[22] = 0.5;  // lighter than hand and finger
   Eigen::VectorXd c = calibration::ToCentre(given_.bodies.segment(22, 10));
   c << 0.5, 0, 0, 0.1, 0.01, 0, 0, 0.01, 0, 0.01;
   given_.bodies.segment(22, 10) = calibration::ToOrigin(c);
   arm_ = Describe(*model_, given_, "table.toml");
   try {
-    ToUrdf(arm_, "", false);
+    ToGivenUrdf(arm_, "", false);
     FAIL() << "accepted";
   } catch (const io::InputError& e) {
     const std::string line = e.what();
@@ -249,16 +250,16 @@ TEST_F(Export, ToUrdf_WhereTheRestCannotExist_AsksForMerge) {
   std::string bare = kUrdf;  // a link without anything in it
   const auto begin = bare.find("<link name=\"quill\">"), end = bare.find("</link>", begin) + 7;
   Write("arm.urdf", bare.replace(begin, end - begin, "<link name=\"quill\"/>"));
-  EXPECT_LT(Relative(Torques(Tree(ToUrdf(arm_, "", true).text), {{"grip", 0.03}}, true), Expected(true)), 1e-9);
+  EXPECT_LT(Relative(Torques(Tree(ToGivenUrdf(arm_, "", true).text), {{"grip", 0.03}}, true), Expected(true)), 1e-9);
 }
 
 TEST_F(Export, OfAnotherArmsUrdf_IsRefused) {
   std::string other = kUrdf;
   other.replace(other.find("0.4 0 0\" rpy"), 3, "0.5");
   Write("other.urdf", other);
-  EXPECT_THROW(ToUrdf(arm_, (folder_ / "other.urdf").string(), false), io::InputError);
+  EXPECT_THROW(ToGivenUrdf(arm_, (folder_ / "other.urdf").string(), false), io::InputError);
   arm_.robot.urdf.path.clear();
-  EXPECT_THROW(ToUrdf(arm_, "", false), io::InputError);
+  EXPECT_THROW(ToGivenUrdf(arm_, "", false), io::InputError);
 }
 
 TEST_F(Export, SaysWhatAFormatCannotHold) {
@@ -266,7 +267,7 @@ TEST_F(Export, SaysWhatAFormatCannotHold) {
     return std::any_of(d.left_out.begin(), d.left_out.end(),
                        [&](const std::string& line) { return line.find(what) != line.npos; });
   };
-  for (const Description& d : {ToUrdf(arm_, "", false), ToSdf(arm_)}) {
+  for (const Description& d : {ToGivenUrdf(arm_, "", false), ToSdf(arm_)}) {
     EXPECT_TRUE(holds(d, "rotor inertia of lift = 0.4 kg*m^2"));
     EXPECT_TRUE(holds(d, "stribeck.dFs2 = 0.7"));
   }
@@ -285,25 +286,66 @@ KDL::Joint AxisZ(const std::string& name, bool slide) {
   return KDL::Joint(name, slide ? KDL::Joint::TransZ : KDL::Joint::RotZ);
 }
 
-// Reads what the test needs of MJCF, by itself: nested bodies, joint at the body's frame along z.
+KDL::Frame FrameOf(const tinyxml2::XMLElement* e) {
+  const auto of = [e](const char* name, const char* none) {
+    return Numbers(e->Attribute(name) ? e->Attribute(name) : none);
+  };
+  const auto quat = of("quat", "1 0 0 0");
+  return {KDL::Rotation::Quaternion(quat[1], quat[2], quat[3], quat[0]), Vector(of("pos", "0 0 0"))};
+}
+
+// Reads what the test needs of MJCF, by itself: nested bodies with one joint or none, all attributes written out.
 void AddBody(const tinyxml2::XMLElement* body, const std::string& parent, KDL::Tree& tree) {
   const std::string name = body->Attribute("name");
-  const auto pos = Numbers(body->Attribute("pos")), quat = Numbers(body->Attribute("quat"));
-  const KDL::Frame frame(KDL::Rotation::Quaternion(quat[1], quat[2], quat[3], quat[0]), Vector(pos));
-  tree.addSegment(KDL::Segment(name + "_place", KDL::Joint(KDL::Joint::None), frame), parent);
-  const auto* inertial = body->FirstChildElement("inertial");
-  const auto moments = Numbers(inertial->Attribute("diaginertia")), tilt = Numbers(inertial->Attribute("quat"));
-  const KDL::RigidBodyInertia own = KDL::Frame(KDL::Rotation::Quaternion(tilt[1], tilt[2], tilt[3], tilt[0]),
-                                               Vector(Numbers(inertial->Attribute("pos")))) *
-                                    KDL::RigidBodyInertia(inertial->DoubleAttribute("mass"), KDL::Vector::Zero(),
-                                                          KDL::RotationalInertia(moments[0], moments[1], moments[2]));
-  const auto* joint = body->FirstChildElement("joint");
-  EXPECT_STREQ(joint->Attribute("axis"), "0 0 1");
-  tree.addSegment(KDL::Segment(name, AxisZ(joint->Attribute("name"), std::string(joint->Attribute("type")) == "slide"),
-                               KDL::Frame::Identity(), own),
-                  name + "_place");
+  tree.addSegment(KDL::Segment(name + "_place", KDL::Joint(KDL::Joint::None), FrameOf(body)), parent);
+  KDL::RigidBodyInertia own = KDL::RigidBodyInertia::Zero();
+  if (const auto* inertial = body->FirstChildElement("inertial")) {
+    const auto d = Numbers(inertial->Attribute("diaginertia"));
+    own = FrameOf(inertial) * KDL::RigidBodyInertia(inertial->DoubleAttribute("mass"), KDL::Vector::Zero(),
+                                                    KDL::RotationalInertia(d[0], d[1], d[2]));
+  }
+  KDL::Joint joint(KDL::Joint::None);
+  if (const auto* j = body->FirstChildElement("joint"))
+    joint = KDL::Joint(j->Attribute("name"), Vector(Numbers(j->Attribute("pos") ? j->Attribute("pos") : "0 0 0")),
+                       Vector(Numbers(j->Attribute("axis"))),
+                       std::string(j->Attribute("type")) == "slide" ? KDL::Joint::TransAxis : KDL::Joint::RotAxis);
+  tree.addSegment(KDL::Segment(name, joint, KDL::Frame::Identity(), own), name + "_place");
   for (const auto* b = body->FirstChildElement("body"); b; b = b->NextSiblingElement("body")) AddBody(b, name, tree);
 }
+
+// The same arm as the URDF's in another one's hands: elsewhere, turned, with other link frames and zeros, and with all
+// that a simulation has beside.
+const char* const kMjcf = R"(<?xml version="1.0"?>
+<!-- <joint name="turn"/> of our own -->
+<mujoco model="odd">
+  <compiler angle="degree" eulerseq="XYZ" meshdir="m"/>
+  <default><joint axis="0 1 0" damping="9"/><geom mass="3"/>
+    <default class="tool"><joint axis="0 0 1"/><geom mass="0"/></default>
+  </default>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <body name="pedestal" pos="1 2 0.5" quat="0.70710678118654752 0 0 0.70710678118654752">
+      <geom type="box" size="1 1 1"/>
+      <body name="up" pos="0.1 0 0" quat="1 0 0 0"><joint name='turn' type="hinge" axis='0 0 2' stiffness="2"/>
+        <inertial pos="1 1 1" mass="99" fullinertia="1 1 1 0 0 0"/>
+        <geom type="capsule" size="0.1 0.2"/>
+        <body name="arm" pos="0 0.3 0.7"><joint name="lift" type="hinge" pos="0 -0.2 0"/>
+          <body name="quill" pos="0.4 -0.2 0" quat="0.5 0.5 0.5 0.5" childclass="tool">
+            <!-- the tool --><joint name="push" type="slide"/>
+            <body name="hand" pos="0 0 0.1" euler="17.188733853924695 11.459155902616466 220.107045659157624">
+              <geom type="sphere" size="1"/>
+              <inertial pos="0.01 0.02 0.1" quat="0.98006657784124163 0 0 0.19866933079506122" mass="0.8" diaginertia="0.002 0.0022 0.001"/>
+              <body name="finger" pos="0 0.05 0.1"><joint name="grip" type="slide" axis="0 1 0" ref="0.05"/>
+                <inertial mass="0.2" pos="0.01 0 0.02" fullinertia="0.0002 0.0002 0.0001 0 0 0"/></body>
+            </body>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="turn"/></actuator>
+</mujoco>
+)";
 
 TEST_F(Export, ToMjcf_HasTheTorqueArmatureAndFriction) {
   tinyxml2::XMLDocument doc;
@@ -320,6 +362,123 @@ TEST_F(Export, ToMjcf_HasTheTorqueArmatureAndFriction) {
     EXPECT_EQ(joint->DoubleAttribute("damping"), arm_.joint[j].viscous_Nmsprad);
     EXPECT_EQ(joint->DoubleAttribute("frictionloss"), arm_.joint[j].coulomb_Nm);
     EXPECT_GT(arm_.joint[j].coulomb_Nm, 1);
+  }
+}
+
+// The tree of kMjcf. What its classes and its units say is written out, for the reader of the test.
+KDL::Tree GivenTree(std::string text) {
+  const std::pair<const char*, const char*> written_out[] = {
+      {"name=\"lift\"", "name=\"lift\" axis=\"0 1 0\""},
+      {"name=\"push\"", "name=\"push\" axis=\"0 0 1\""},
+      {"euler=\"[^\"]*\"", ""},
+      {"fullinertia=\"0.0002[^\"]*\"", "diaginertia=\"0.0002 0.0002 0.0001\""}};
+  double x = 0, y = 0, z = 0, w = 1;
+  KDL::Rotation::RPY(0.3, 0.2, 0.7 + M_PI).GetQuaternion(x, y, z, w);
+  for (const auto& [old, with] : written_out) {
+    const bool turned = std::string(old).starts_with("euler");
+    std::ostringstream quat;
+    quat << std::setprecision(17) << "quat=\"" << w << " " << x << " " << y << " " << z << "\"";
+    text = std::regex_replace(text, std::regex(old), turned ? quat.str() : with);
+  }
+  tinyxml2::XMLDocument doc;
+  EXPECT_EQ(doc.Parse(text.c_str()), tinyxml2::XML_SUCCESS);
+  KDL::Tree tree("world");
+  AddBody(doc.RootElement()->FirstChildElement("worldbody")->FirstChildElement("body"), "world", tree);
+  return tree;
+}
+
+TEST_F(Export, ToGivenMjcf_HasTheTorqueOfTheIdentifiedBodies_InTheFilesOwnFrames) {
+  for (const bool merge : {false, true}) {
+    SCOPED_TRACE(merge);
+    const KDL::Tree tree = GivenTree(ToGivenMjcf(arm_, "m.xml", kMjcf, merge).text);
+    EXPECT_LT(Relative(Torques(tree, {}, true), Expected(true)), 1e-9);
+    const double hand = tree.getSegment("hand")->second.segment.getInertia().getMass();
+    EXPECT_EQ(hand, merge ? 0.0 : 0.8);
+  }
+}
+
+TEST_F(Export, ToGivenMjcf_ChangesNothingElse) {
+  const auto without = [](std::string text) {
+    text = std::regex_replace(text, std::regex("<inertial[^>]*>"), "<inertial/>");
+    text = std::regex_replace(text, std::regex("\\s*<inertial/>(?!</body>\\s*</body>)"), "");  // but the finger's
+    for (const char* attribute : {"armature", "damping", "frictionloss"})
+      text = std::regex_replace(text, std::regex(std::string(" ") + attribute + "=\"(?!9\")[^\"]*\""), "");
+    return text;
+  };
+  const Description d = ToGivenMjcf(arm_, "m.xml", kMjcf, false);
+  EXPECT_EQ(without(d.text), without(kMjcf));
+  EXPECT_NE(d.text.find("<inertial mass=\"0.2\" pos=\"0.01 0 0.02\" fullinertia"), d.text.npos);
+  tinyxml2::XMLDocument doc;
+  ASSERT_EQ(doc.Parse(d.text.c_str()), tinyxml2::XML_SUCCESS);
+  const auto* body = doc.RootElement()->FirstChildElement("worldbody")->FirstChildElement("body");
+  for (std::size_t j = 0; j < 3; ++j) {
+    body = body->FirstChildElement("body");
+    const auto* joint = body->FirstChildElement("joint");
+    EXPECT_EQ(joint->DoubleAttribute("armature"), arm_.joint[j].rotor_kgm2);
+    EXPECT_EQ(joint->DoubleAttribute("damping"), arm_.joint[j].viscous_Nmsprad);
+    EXPECT_EQ(joint->DoubleAttribute("frictionloss"), arm_.joint[j].coulomb_Nm);
+  }
+  EXPECT_EQ(std::count(d.left_out.begin(), d.left_out.end(), "stiffness: the file's own value stays in turn"), 1);
+}
+
+TEST_F(Export, ToGivenMjcf_RefusesWhatItCannotWriteInto) {
+  const auto changed = [](const std::string& old, const std::string& with) {
+    std::string text = kMjcf;
+    EXPECT_NE(text.find(old), text.npos) << old;
+    return text.replace(text.find(old), old.size(), with);
+  };
+  const std::pair<std::string, const char*> cases[] = {
+      {changed("name=\"lift\"", "name=\"elbow\""), "no joint \"lift\""},
+      {changed("pos=\"0 -0.2 0\"/>", "pos=\"0.1 -0.2 0\"/>"), "m away from the arm's"},
+      {changed("axis='0 0 2'", "axis='0 0 -2'"), "3.14 rad away"},
+      {changed("name=\"push\" type=\"slide\"", "name=\"push\" type=\"hinge\""), "joint \"push\": turns"},
+      {changed("<geom type=\"sphere\" size=\"1\"/>\n              <inertial",
+               "<geom type=\"sphere\" mass=\"1\"/><other"),
+       "its mass follows from its geoms"},
+      {changed("meshdir=\"m\"", "inertiafromgeom=\"true\""), "inertiafromgeom"},
+      {changed("meshdir=\"m\"", "settotalmass=\"4\""), "settotalmass"},
+      {changed("\"XYZ\"", "\"XY\""), "eulerseq"},
+      {changed("<light pos=\"0 0 3\"/>", "<light>"), "<light> without its end tag"},
+      {changed("<actuator>", "<include file=\"x.xml\"/><actuator>"), "one whole file"},
+      {changed("mass=\"0.8\"", "mass=\"heavy\""), "expected 1 numbers"},
+      {changed("mass=\"0.8\"", "mass=\"80\""), "link \"quill\" without hand, finger: expected a mass above zero"},
+      {"<robot/>", "expected MJCF"}};
+  for (const auto& [text, expected] : cases) {
+    try {
+      ToGivenMjcf(arm_, "m.xml", text, false);
+      ADD_FAILURE() << "accepted: " << expected;
+    } catch (const io::InputError& e) {
+      EXPECT_NE(std::string(e.what()).find(expected), std::string::npos) << e.what();
+      EXPECT_EQ(std::string(e.what()).rfind("m.xml: ", 0), 0u) << e.what();
+    }
+  }
+  EXPECT_NO_THROW(
+      ToGivenMjcf(arm_, "m.xml", changed("size=\"1\"/>\n              <inertial", "size=\"1\"/><other"), false));
+}
+
+TEST_F(Export, ToGivenSdf_WritesTheValuesOfAFileThatHadOthers) {
+  const std::string whole = ToSdf(arm_).text;
+  std::string given = std::regex_replace(whole, std::regex("<mass>[^1][^<]*</mass>"), "<mass>\n  99 </mass>");
+  given = std::regex_replace(given, std::regex("<ixx>[^<]*</ixx>"), "<!-- of the maker --><ixx>7</ixx>");
+  given = std::regex_replace(given, std::regex("<damping>[^<]*</damping>"), "<damping/>");
+  const std::string now = ToGivenSdf(arm_, "m.sdf", given).text;
+  EXPECT_EQ(now, whole);
+  for (const auto& [old, with, expected] : std::vector<std::array<const char*, 3>>{
+           {"<joint name=\"lift\"", "<joint name=\"elbow\"", "no joint \"lift\""},
+           {"<xyz>0 0 1</xyz>", "<xyz>0 1 1</xyz>", "rad away"},
+           {"relative_to=\"turn_link\"", "relative_to=\"lift_link\"", "leads to itself"},
+           {"relative_to=\"turn_link\"", "relative_to=\"other\"", "no link or frame \"other\""},
+           {"<mass>1</mass>", "<mass>1</wrong>", "end tag"},
+           {"type=\"prismatic\"", "type=\"screw\"", "not \"screw\""}}) {
+    std::string text = whole;
+    ASSERT_NE(text.find(old), text.npos) << old;
+    text.replace(text.find(old), std::string(old).size(), with);
+    try {
+      ToGivenSdf(arm_, "m.sdf", text);
+      ADD_FAILURE() << "accepted: " << expected;
+    } catch (const io::InputError& e) {
+      EXPECT_NE(std::string(e.what()).find(expected), std::string::npos) << e.what();
+    }
   }
 }
 

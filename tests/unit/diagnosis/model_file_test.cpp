@@ -259,6 +259,11 @@ viscous_Nmsprad = 1.0
     ASSERT_EQ(next.robot().shape.size(), 2U);
     EXPECT_EQ(next.robot().shape[0].file, folder_ / "a/l1.stl") << packages;
     EXPECT_EQ(next.robot().shape[1].file, folder_ / "b/l1.stl") << packages;
+    // Where the folder is known, the files may move together.
+    const std::string near =
+        ModelFile(declared, Records(), Of({Found("stribeck", declared)}, declared), "", folder_ / "new").text;
+    EXPECT_NE(near.find("urdf = \"../arm.urdf\"  # beside this file"), near.npos) << near;
+    EXPECT_NE(near.find("\"../b\""), near.npos) << near;
   }
 }
 

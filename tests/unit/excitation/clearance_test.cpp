@@ -1,6 +1,8 @@
 // excitation tests - a motion with a clearance, judged by frames and distances that this file computes by hand.
 #include <gtest/gtest.h>
 
+#include "codegen/src/io/input_error.hpp"
+#include "host_sim/diagnose/analysis/excited.hpp"
 #include "host_sim/identify/excitation/compose.hpp"
 #include "host_sim/identify/excitation/optimise.hpp"
 #include "tests/unit/excitation/arms.hpp"
@@ -105,12 +107,17 @@ double LeastDistance(const codegen::Robot& robot, const VectorXd& q) {
   return least;
 }
 
-class WithClearance : public testing::Test {
+// FCL and Assimp are optional; without them no distance can be measured.
+class WithDistances : public testing::Test {
  protected:
   void SetUp() override {
-    if (!collision::CanMeasure()) GTEST_SKIP() << "built without FCL";
+    if (!collision::CanMeasure()) GTEST_SKIP() << "built without FCL or Assimp";
   }
   const files::test::TemporaryFolder folder_;
+};
+
+class WithClearance : public WithDistances {
+ protected:
   const codegen::Model model_ = test::Arm(WithRods(folder_));
   const Observation observation_{model_};
 };
@@ -162,6 +169,31 @@ TEST_F(WithClearance, Gradient_IsTheDifferenceQuotientOfTheValue) {
     const double quotient = (objective(u + shift, unused) - objective(u - shift, unused)) / 2e-6;
     EXPECT_NEAR(gradient[k], quotient, 1e-3 * gradient.norm()) << k;
   }
+}
+
+// The forearm's ball is 20.6 mm off the base's where the elbow is straight, and nearer with every degree of bend.
+codegen::Robot ThatBendsTowardsItsBase(const files::test::TemporaryFolder& folder) {
+  std::string text = files::test::ReadBytes("codegen/robots/two_link.toml");
+  text +=
+      "\n[[capsule]]\nlink = 0\nfrom_m = [0, 0, 0]\nto_m = [0, 0, 0]\nradius_m = 0.25\n"
+      "[[capsule]]\nlink = 2\nfrom_m = [0.02, 0, 0]\nto_m = [0.02, 0, 0]\nradius_m = 0.2494\n";
+  return codegen::ReadRobot(folder.Write("bends.toml", text));
+}
+
+TEST_F(WithDistances, WithoutRoomForTheDefaultOne_ExciteKeepsASmallerOneAndSaysSo) {
+  const codegen::Model model = test::Arm(ThatBendsTowardsItsBase(folder_));
+  analysis::ExciteOptions options;
+  options.starts = 2, options.periods = 1;
+  const analysis::Excited found(model, options);
+  EXPECT_EQ(found.too_far_m, std::vector<double>{0.02});
+  EXPECT_DOUBLE_EQ(found.clearance->margin_m(), 0.01);
+  const codegen::Signals motion = found.Motion();
+  // The elbow lies 0.5 m off the shoulder's axis; the law of cosines gives the distance of the two balls.
+  const Eigen::ArrayXd distance = (0.25 + 0.0004 + 0.02 * motion.q.col(1).array().cos()).sqrt() - 0.4994;
+  EXPECT_GE(distance.minCoeff(), 0.01);
+  EXPECT_LT(distance.minCoeff(), 0.02);
+  options.clearance_asked = true;
+  EXPECT_THROW(analysis::Excited(model, options), io::InputError);
 }
 
 }  // namespace

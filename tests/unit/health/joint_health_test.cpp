@@ -152,8 +152,16 @@ TEST(ChangedTogether, AreJointsWithAnotherLoadSinceTheSameTime) {
 TEST(JointHealth, BeforeEnoughMotion_SaysThatItIsTooEarly) {
   SyntheticJoint joint([](const ResidualRow&, double) { return 30; });
   EXPECT_EQ(Judge(joint.Read()).verdict, Verdict::kTooEarly);
+  EXPECT_EQ(kReferenceRows, monitor::ResidualBins::kReferenceRows);
+  EXPECT_FLOAT_EQ(static_cast<float>(1 - monitor::ResidualBins::kBins / kMemory), monitor::ResidualBins::kKeep);
   joint.Run(140);
+  const JointHealth early = Judge(joint.Read());
+  EXPECT_EQ(early.verdict, Verdict::kTooEarly);
+  EXPECT_GT(early.missing_rows, 0);
+  joint.Run(early.missing_rows / 125 - 1);
   EXPECT_EQ(Judge(joint.Read()).verdict, Verdict::kTooEarly);
+  joint.Run(2);
+  EXPECT_NE(Judge(joint.Read()).verdict, Verdict::kTooEarly);
 }
 
 }  // namespace

@@ -192,6 +192,16 @@ TEST(CommonTimes, GapsAndEnds_HaveNoNumber_AndAreSaid) {
                 "ended: 1 gap, the longest 7 s, 3 s after its first time; nothing is interpolated there"}));
 }
 
+TEST(CommonTimes, OfAColumnThatIsOftenEmpty_AreSaid) {
+  files::NumericTable table{{"q", "tau"}, Eigen::MatrixXd::Ones(10, 2), {}};
+  for (int k = 1; k < 10; k += 2) table.values(k, 1) = NAN;
+  const Common common =
+      OnCommonTimes(SplitByEmptyCells(table, Eigen::VectorXd::LinSpaced(10, 0, 0.9)), {"q", "tau"}, {});
+  EXPECT_EQ(common.numbers.values.rows(), 5);
+  EXPECT_EQ(common.notes,
+            std::vector<std::string>{"column 'q': of its 10 times the 5 count at which column 'tau' has numbers, too"});
+}
+
 TEST(CommonTimes, HeldColumn_KeepsItsLastValue_AndEqualTimesAreNotInterpolated) {
   const Series grid = Line("grid", {0, 1, 2}, 1), flag = Line("flag", {0, 0.75, 1.5, 2.25}, 4);
   const Series same = Line("same", {0, 1, 2}, 0.1);

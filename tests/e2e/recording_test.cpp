@@ -2,6 +2,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <fstream>
@@ -22,28 +24,28 @@ namespace {
 
 constexpr int kLogTicks = 3000;  // of a motion: more than the 200 samples of a log
 
+// A slow motion of all joints about zero.
+std::string WriteMotion(const std::string& path, int points) {
+  std::ofstream out(path);
+  out << "t,q1,q2,q3,q4,q5,q6\n";
+  for (int k = 0; k < points; ++k) {
+    out << 0.008 * k;
+    for (int j = 0; j < 6; ++j) out << ',' << 0.1 * std::sin(0.008 * k);
+    out << '\n';
+  }
+  return path;
+}
+
 class EarlyEnd : public testing::Test {
  protected:
   std::string Path(const std::string& name) const { return (folder_ / name).string(); }
-
-  // A slow motion of all joints about zero.
-  std::string Motion(int points) const {
-    std::ofstream out(Path("motion.csv"));
-    out << "t,q1,q2,q3,q4,q5,q6\n";
-    for (int k = 0; k < points; ++k) {
-      out << 0.008 * k;
-      for (int j = 0; j < 6; ++j) out << ',' << 0.1 * std::sin(0.008 * k);
-      out << '\n';
-    }
-    return Path("motion.csv");
-  }
 
   pid_t StartRecord(int port, const std::string& out, int points) {
     const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC),
               err = open(Path("err").c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0644);
     const pid_t child =
         Start({ARMCAL_TOOL, "record", "--connect", "127.0.0.1:" + std::to_string(port), "--robot", "er20_like",
-               "--trajectory", Motion(points), "--out", Path(out), "--json", Path("log.json")},
+               "--trajectory", WriteMotion(Path("motion.csv"), points), "--out", Path(out), "--json", Path("log.json")},
               nowhere, err);
     close(nowhere), close(err);
     return child;
@@ -189,6 +191,37 @@ TEST(Record, WithTheFileOfAnotherArm_IsRefused_AndAnotherSchemaIsNamed) {
   EXPECT_EQ(o.code, 0);
   EXPECT_EQ(o.err, "");
   EXPECT_EQ(ReadJson(told).at("robot_schema"), own);
+}
+
+// Two motions, one after the other, of a drive in virtual time.
+std::string TwoLogs(const std::string& name, std::chrono::milliseconds pause) {
+  const fs::path folder = FreshFolder(name);
+  const std::string motion = WriteMotion((folder / "motion.csv").string(), 300);
+  const RunningDrive drive(folder);
+  std::string logs;
+  for (const char* log : {"first.csv", "second.csv"}) {
+    std::this_thread::sleep_for(pause);
+    const Outcome o = Tool({"record", "--connect", drive.address(), "--robot", "er20_like", "--trajectory", motion,
+                            "--out", (folder / log).string()});
+    EXPECT_EQ(o.code, 0) << o.err;
+    logs += ReadText(folder / log);
+  }
+  return logs;
+}
+
+TEST(Record, OfTheSameCommandsInVirtualTime_IsTheSameLog_HoweverLongTheyTake) {
+  const std::string at_once = TwoLogs("same_at_once", std::chrono::milliseconds(0));
+  std::atomic<bool> ended{false};
+  std::vector<std::thread> others;
+  for (unsigned k = 0; k < 2 * std::max(1U, std::thread::hardware_concurrency()); ++k)
+    others.emplace_back([&] {
+      while (!ended) {}
+    });
+  const std::string later = TwoLogs("same_later", std::chrono::milliseconds(150));
+  ended = true;
+  for (std::thread& other : others) other.join();
+  EXPECT_GT(at_once.size(), 50000U);
+  EXPECT_TRUE(at_once == later);
 }
 
 }  // namespace

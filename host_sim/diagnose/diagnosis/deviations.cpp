@@ -12,26 +12,35 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kStep = 1e-3;    // of an unknown's range or size, for the slope of its columns
+constexpr double kStep = 1e-3, kWider = 4, kWidest = 0.1;  // of an unknown's range or size, for the slope of its columns
 constexpr double kBlock_s = 0.5;  // over which noise may hang together
 
-// What the term's torque changes by per unit of its unknown number k.
-Columns Slope(const Chosen& term, const VectorXd& amplitude, std::size_t k, const Evidence& evidence) {
+// What the term's torque changes by per unit of its unknown number k. The step grows until the change shows above the
+// noise: a landing or a switch falls on a sample, and a smaller step moves none.
+Columns Slope(const Chosen& term, const VectorXd& amplitude, std::size_t k, const Diagnosis::Work& w) {
   const auto& unknown = term.candidate->unknowns()[k % term.candidate->unknowns().size()];
-  const double step = kStep * std::min(unknown.upper - unknown.lower,
-                                       unknown.logarithmic ? std::abs(term.eta[k]) : unknown.upper - unknown.lower);
+  const double size = std::min(unknown.upper - unknown.lower,
+                               unknown.logarithmic ? std::abs(term.eta[k]) : unknown.upper - unknown.lower);
   VectorXd held = amplitude;  // of a delay that has been applied the column is zero, and so is its estimate
   for (int c = 0; c < held.size(); ++c)
     if (term.candidate->column(c).fixed_amplitude) held[c] = term.candidate->column(c).amplitude;
-  std::vector<double> eta = term.eta;
-  eta[k] += step;
-  const Columns above = GatherColumns(*term.candidate, evidence, eta);
-  eta[k] -= 2 * step;
-  const Columns below = GatherColumns(*term.candidate, evidence, eta);
-  Columns out{above.joints, {}};
-  for (std::size_t r = 0; r < above.joints.size(); ++r)
-    out.block.emplace_back((above.block[r] - below.block[r]) * held / (2 * step));
-  return out;
+  for (double share = kStep;; share *= kWider) {
+    const double step = share * size;
+    std::vector<double> eta = term.eta;
+    eta[k] += step;
+    const Columns above = GatherColumns(*term.candidate, w.evidence, eta);
+    eta[k] -= 2 * step;
+    const Columns below = GatherColumns(*term.candidate, w.evidence, eta);
+    Columns out{above.joints, {}};
+    double shows = 0;  // chi^2
+    for (std::size_t r = 0; r < above.joints.size(); ++r) {
+      out.block.emplace_back((above.block[r] - below.block[r]) * held / (2 * step));
+      shows += (step * out.block[r] / w.estimate.sigma[above.joints[r]]).squaredNorm();
+    }
+    const double wider = kWider * step;
+    if (shows > 1 || share * kWider > kWidest || term.eta[k] - wider < unknown.lower || term.eta[k] + wider > unknown.upper)
+      return out;
+  }
 }
 
 // Columns of the terms' own unknowns, one after the other, side by side over all joints.
@@ -45,7 +54,7 @@ Columns Slopes(const std::vector<std::pair<const Chosen*, std::size_t>>& unknown
   for (std::size_t u = 0; u < unknowns.size(); ++u) {
     const auto& [term, k] = unknowns[u];
     const auto t = static_cast<std::size_t>(std::find(terms.begin(), terms.end(), term) - terms.begin());
-    const Columns own = Slope(*term, w.estimate.amplitude[t], k, w.evidence);
+    const Columns own = Slope(*term, w.estimate.amplitude[t], k, w);
     for (std::size_t r = 0; r < own.joints.size(); ++r)
       all.block[static_cast<std::size_t>(own.joints[r])].col(static_cast<Eigen::Index>(u)) = own.block[r];
   }

@@ -415,8 +415,9 @@ std::vector<calibration::Dataset> Selector::Without(const Columns& columns, cons
 }
 
 // The noise of the derivation is in the logs at every bandwidth, and what smooths it looks like elasticity. Far below
-// the bandwidth hardly any of it is left: a term must show along that motion, too. And if the noise biases the rows of
-// these joints, a term cannot be told from it. What the term itself explains is not held against it.
+// the bandwidth hardly any of it is left: a term must show along that motion, too. And where the noise biases the rows
+// of a joint, a term cannot be told from it: the term must show on the other joints. What the term itself explains is
+// not held against it.
 bool Selector::IsOfTheMotion(const Found& f, const Columns& columns, const VectorXd& amplitude,
                              const Metric& wide) const {
   const std::vector<calibration::Dataset> smooth = calibration::SmoothedInstruments(w_.train);
@@ -433,9 +434,13 @@ bool Selector::IsOfTheMotion(const Found& f, const Columns& columns, const Vecto
   std::vector<const calibration::Dataset*> logs;
   for (const calibration::Dataset& log : left) logs.push_back(&log);
   const calibration::Exogeneity e = calibration::TestExogeneity(w_.model, logs, smooth, z);
-  const std::vector<int>& joints = f.candidate->rows();
-  return std::all_of(joints.begin(), joints.end(),
-                     [&](int j) { return e.joint[static_cast<std::size_t>(j)].exogenous; });
+  Columns unbiased;
+  for (std::size_t r = 0; r < columns.joints.size(); ++r) {
+    if (!e.joint[static_cast<std::size_t>(columns.joints[r])].exogenous) continue;
+    unbiased.joints.push_back(columns.joints[r]);
+    unbiased.block.push_back(columns.block[r]);
+  }
+  return !unbiased.joints.empty() && LogChance(f, wide.Try(unbiased).gain) < kLogSurely;
 }
 
 // Lag and delay of a torque channel are estimates. Where they are a little wrong, every step of the torque leaves an

@@ -36,6 +36,25 @@ void Player::Stop(client::StopReason reason, const Eigen::VectorXd& q) {
   state_ = client::PlayerState::kStopped;
 }
 
+void Player::Command(client::PlayerCommand command) {
+  const std::lock_guard lock(mutex_);
+  if (command == client::PlayerCommand::kStop) commands_.clear();
+  if (command != client::PlayerCommand::kNone) commands_.push_back(command);
+}
+
+bool Player::command_pending() const {
+  const std::lock_guard lock(mutex_);
+  return !commands_.empty();
+}
+
+client::PlayerCommand Player::TakeCommand(bool settled) {
+  const std::lock_guard lock(mutex_);
+  if (commands_.empty() || (!settled && !moving())) return client::PlayerCommand::kNone;
+  const client::PlayerCommand next = commands_.front();
+  commands_.pop_front();
+  return next;
+}
+
 void Player::Obey(client::PlayerCommand command, const Eigen::VectorXd& q) {
   switch (command) {
     case client::PlayerCommand::kNone:
@@ -71,8 +90,8 @@ void Player::Obey(client::PlayerCommand command, const Eigen::VectorXd& q) {
   }
 }
 
-const SetPoint& Player::Step(std::uint32_t tick, const Eigen::VectorXd& q_measured) {
-  Obey(command_.exchange(client::PlayerCommand::kNone), q_measured);
+const SetPoint& Player::Step(std::uint32_t tick, const Eigen::VectorXd& q_measured, bool settled) {
+  Obey(TakeCommand(settled), q_measured);
   if (!enabled()) Hold(q_measured);
   if (moving() && (q_measured - set_.q).cwiseAbs().maxCoeff() > kMaxTrackingError_rad)
     Stop(client::StopReason::kTrackingError, q_measured);

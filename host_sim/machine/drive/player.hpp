@@ -2,8 +2,9 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
 #include <memory>
-#include <optional>
+#include <mutex>
 
 #include <Eigen/Core>
 
@@ -30,18 +31,21 @@ class Player final : public PlayedMotion {
 
   bool Load(double step_s, std::uint32_t points, const float* q) override;
   void SetSpeed(double share) override { speed_.store(share); }
-  void Command(client::PlayerCommand command) override { command_.store(command); }
+  // Waits for its turn. A stop drops what waits.
+  void Command(client::PlayerCommand command) override;
 
   client::PlayerState state() const override { return state_.load(); }
   client::StopReason reason() const override { return reason_.load(); }
   std::uint32_t first_tick() const override { return first_tick_.load(); }  // of the played part
   std::uint32_t last_tick() const override { return last_tick_.load(); }
-  bool command_pending() const { return command_.load() != client::PlayerCommand::kNone; }
+  bool command_pending() const;
 
-  // One tick: takes a command, moves the set-point. Context: tick.
-  const SetPoint& Step(std::uint32_t tick, const Eigen::VectorXd& q_measured);
+  // One tick: takes a command, moves the set-point. settled: the arm rests, and a command may be taken; during a motion
+  // one may always. Context: tick.
+  const SetPoint& Step(std::uint32_t tick, const Eigen::VectorXd& q_measured, bool settled);
 
  private:
+  client::PlayerCommand TakeCommand(bool settled);
   void Obey(client::PlayerCommand command, const Eigen::VectorXd& q_measured);
   void Hold(const Eigen::VectorXd& q);
   void Stop(client::StopReason reason, const Eigen::VectorXd& q);
@@ -51,7 +55,8 @@ class Player final : public PlayedMotion {
   MotionLimits limits_;
   std::shared_ptr<const trajectory::TrajectorySpline> loaded_, playing_;
   std::atomic<double> speed_{1.0};
-  std::atomic<client::PlayerCommand> command_{client::PlayerCommand::kNone};
+  mutable std::mutex mutex_;
+  std::deque<client::PlayerCommand> commands_;  // by mutex_
   std::atomic<client::PlayerState> state_{client::PlayerState::kDisabled};
   std::atomic<client::StopReason> reason_{client::StopReason::kNone};
   std::atomic<std::uint32_t> first_tick_{0}, last_tick_{0};

@@ -130,7 +130,9 @@ void SimulatedDrive::Tick() {
   // before.
   const SetPoint reference =
       player_.enabled() ? last_set_ : SetPoint{q, Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
-  const SetPoint& set = player_.Step(tick, q);
+  // In virtual time a command waits until the arm has come to rest after the one before. So the same commands give the
+  // same log, however long they take to arrive.
+  const SetPoint& set = player_.Step(tick, q, options_.real_time || grant_.load() == 0);
   last_set_ = set;
   if (before != player_.state() && player_.reason() == client::StopReason::kTrackingError)
     firmware_->ReportTrackingError();

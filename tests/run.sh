@@ -3,7 +3,7 @@
 #   tests/run.sh fast   host build, unit and property tests
 #   tests/run.sh [all]    + end-to-end tests, planted faults, firmware and wire tests under sanitizers, both Cortex-M images and their
 #                         tests under QEMU
-#   tests/run.sh long     + the long tests, all fast tests under sanitizers, fuzzing
+#   tests/run.sh long     + the long tests, all planted faults, all fast tests under sanitizers, fuzzing
 #   tests/run.sh peers  alone: comparisons with other people's programs, which pip installs into build/peers; the report in a browser
 # The last line is "N passed, M failed"; a CTest test, a build and a check count one each.
 set -uo pipefail
@@ -128,7 +128,7 @@ if [[ $scope != fast ]]; then
 
   # Under sanitizers: what bytes from outside reach and what runs on the target. Matrix code takes long to compile so. So the filters and
   # their loops are run by the programs of the boards here; their unit tests, and the host's matrix code, come with `long`.
-  rooms=(core signal physical monitor feedforward table link controller client files bags logs report port_template)
+  rooms=(core signal physical monitor feedforward table link controller client files bags logs port_template)
   programs=(elementary kernels filters)
   targets=("${rooms[@]/#/test_}" "${programs[@]/#/bits_}")
   tests="^($(IFS='|'; echo "${rooms[*]/#/test_}|${programs[*]/#/sanitized_}"))$"

@@ -215,7 +215,8 @@ TEST(Record, OfTheSameCommandsInVirtualTime_IsTheSameLog_HoweverLongTheyTake) {
   std::vector<std::thread> others;
   for (unsigned k = 0; k < 2 * std::max(1U, std::thread::hardware_concurrency()); ++k)
     others.emplace_back([&] {
-      while (!ended) {}
+      while (!ended) {
+      }
     });
   const std::string later = TwoLogs("same_later", std::chrono::milliseconds(150));
   ended = true;

@@ -1,7 +1,7 @@
 // faults - runs the tests of a fault's room with the fault switched on; knows names and exit codes only.
-//   run_faults FAULTS TESTS [NUMBER]: folders of <room>.toml and of the programs faults_<room>. Prints which test
-//   caught which fault; fails if a fault survives, or if a test fails without any. A fault may never end: a run has
-//   four times what the sound tests of its room take, and ten seconds.
+//   run_faults FAULTS TESTS [NUMBER | ROOM ...]: folders of <room>.toml and of the programs faults_<room>; one fault,
+//   or those of some rooms. Prints which test caught which fault; fails if a fault survives, or if a test fails without
+//   any. A fault may never end: a run has four times what the sound tests of its room take, and ten seconds.
 #include <fmt/core.h>
 #include <sys/wait.h>
 
@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
+#include <set>
 #include <thread>
 
 #include "tests/faults/fault_list.hpp"
@@ -43,14 +44,18 @@ std::string FailingTest(const std::string& tests, const std::string& room, std::
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 3 && argc != 4) throw std::runtime_error("usage: run_faults FAULTS TESTS [NUMBER]");
+  if (argc < 3) throw std::runtime_error("usage: run_faults FAULTS TESTS [NUMBER | ROOM ...]");
   const std::vector<Fault> faults = armcal::faults::ReadFaults(argv[1]);
   const std::string tests = argv[2];
-  const std::size_t only = argc == 4 ? std::stoul(argv[3]) : 0;
+  const std::set<std::string> asked_for(argv + 3, argv + argc);
+  std::vector<std::size_t> taken;
+  for (std::size_t k = 0; k < faults.size(); ++k)
+    if (asked_for.empty() || asked_for.contains(faults[k].room) || asked_for.contains(std::to_string(k + 1)))
+      taken.push_back(k);
+  if (taken.empty()) throw std::runtime_error("no such fault");
 
   std::map<std::string, int> timeout_s;  // of each room
-  for (std::size_t k = 0; k < faults.size(); ++k)
-    if (only == 0 || only == k + 1) timeout_s[faults[k].room] = kLongest_s;
+  for (const std::size_t k : taken) timeout_s[faults[k].room] = kLongest_s;
   int bad = 0;
   for (auto& [room, longest_s] : timeout_s) {
     const auto start = std::chrono::steady_clock::now();
@@ -65,21 +70,21 @@ int main(int argc, char** argv) try {
   std::vector<std::string> caught(faults.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t k; (k = next++) < faults.size();)
-      if (only == 0 || only == k + 1)
-        caught[k] = FailingTest(tests, faults[k].room, k + 1, timeout_s.at(faults[k].room));
+    for (std::size_t i; (i = next++) < taken.size();) {
+      const std::size_t k = taken[i];
+      caught[k] = FailingTest(tests, faults[k].room, k + 1, timeout_s.at(faults[k].room));
+    }
   };
   std::vector<std::thread> workers;
   for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i) workers.emplace_back(work);
   for (std::thread& worker : workers) worker.join();
 
-  for (std::size_t k = 0; k < faults.size(); ++k) {
-    if (only != 0 && only != k + 1) continue;
+  for (const std::size_t k : taken) {
     bad += caught[k].empty();
     fmt::print("{:3} {:11} {:70} {}\n", k + 1, faults[k].room, faults[k].name,
                caught[k].empty() ? "SURVIVES" : caught[k]);
   }
-  fmt::print("{} faults, {}\n", only == 0 ? faults.size() : 1, bad == 0 ? "all caught" : "NOT all caught");
+  fmt::print("{} faults, {}\n", taken.size(), bad == 0 ? "all caught" : "NOT all caught");
   return bad != 0;
 } catch (const std::exception& e) {
   fmt::print(stderr, "run_faults: {}\n", e.what());

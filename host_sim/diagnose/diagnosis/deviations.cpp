@@ -12,7 +12,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kStep = 1e-3, kWider = 4, kWidest = 0.1;  // of an unknown's range or size, for the slope of its columns
+constexpr double kStep = 1e-3;    // of an unknown's range or size, for the slope of its columns
+constexpr double kWider = 4;      // times, from one tried step to the next
+constexpr double kWidest = 0.1;   // of the range or size: no wider step is tried
 constexpr double kBlock_s = 0.5;  // over which noise may hang together
 
 // What the term's torque changes by per unit of its unknown number k. The step grows until the change shows above the
@@ -38,7 +40,8 @@ Columns Slope(const Chosen& term, const VectorXd& amplitude, std::size_t k, cons
       shows += (step * out.block[r] / w.estimate.sigma[above.joints[r]]).squaredNorm();
     }
     const double wider = kWider * step;
-    if (shows > 1 || share * kWider > kWidest || term.eta[k] - wider < unknown.lower || term.eta[k] + wider > unknown.upper)
+    if (shows > 1 || share * kWider > kWidest || term.eta[k] - wider < unknown.lower ||
+        term.eta[k] + wider > unknown.upper)
       return out;
   }
 }

@@ -17,13 +17,13 @@ TICK, SAMPLE_GAPS, ROWS_USED, STATE = 0x0046, 0x0054, 0x0060, 0x0040
 
 
 def save(b, table):
-    """Answers how many ticks the save took, and how many rows were used in the first half of it."""
+    """Answers how many ticks the save took, and how many rows were used before the erase can have ended."""
     command = b.send(table)
     begin, rows = b.line.u32(TICK), b.line.u32(ROWS_USED)
     b.line.write(0x0000, command)
     used = 0
     while (state := b.line.read(4, STATE, 1)[0]) == COMMITTING:
-        if (now := b.line.u32(TICK)) - begin < ERASE_TICKS // 2:
+        if (now := b.line.u32(TICK)) - begin < ERASE_TICKS:
             used = b.line.u32(ROWS_USED) - rows
     assert state == ACTIVE, f"transaction state {state}, status {b.line.read(4, STATE + 1, 1)[0]}"
     return b.line.u32(TICK) - begin, used

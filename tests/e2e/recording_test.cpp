@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <fstream>
@@ -194,13 +193,12 @@ TEST(Record, WithTheFileOfAnotherArm_IsRefused_AndAnotherSchemaIsNamed) {
 }
 
 // Two motions, one after the other, of a drive in virtual time.
-std::string TwoLogs(const std::string& name, std::chrono::milliseconds pause) {
+std::string TwoLogs(const std::string& name) {
   const fs::path folder = FreshFolder(name);
   const std::string motion = WriteMotion((folder / "motion.csv").string(), 300);
   const RunningDrive drive(folder);
   std::string logs;
   for (const char* log : {"first.csv", "second.csv"}) {
-    std::this_thread::sleep_for(pause);
     const Outcome o = Tool({"record", "--connect", drive.address(), "--robot", "er20_like", "--trajectory", motion,
                             "--out", (folder / log).string()});
     EXPECT_EQ(o.code, 0) << o.err;
@@ -210,7 +208,7 @@ std::string TwoLogs(const std::string& name, std::chrono::milliseconds pause) {
 }
 
 TEST(Record, OfTheSameCommandsInVirtualTime_IsTheSameLog_HoweverLongTheyTake) {
-  const std::string at_once = TwoLogs("same_at_once", std::chrono::milliseconds(0));
+  const std::string at_once = TwoLogs("same_at_once");
   std::atomic<bool> ended{false};
   std::vector<std::thread> others;
   for (unsigned k = 0; k < 2 * std::max(1U, std::thread::hardware_concurrency()); ++k)
@@ -218,7 +216,7 @@ TEST(Record, OfTheSameCommandsInVirtualTime_IsTheSameLog_HoweverLongTheyTake) {
       while (!ended) {
       }
     });
-  const std::string later = TwoLogs("same_later", std::chrono::milliseconds(150));
+  const std::string later = TwoLogs("same_later");
   ended = true;
   for (std::thread& other : others) other.join();
   EXPECT_GT(at_once.size(), 50000U);

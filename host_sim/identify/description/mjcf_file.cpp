@@ -22,15 +22,18 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
+std::string QuaternionText(const Quaterniond& q) {
+  return fmt::format("{} {} {} {}", Exact(q.w()), Exact(q.x()), Exact(q.y()), Exact(q.z()));
+}
+
 // MuJoCo finds the principal axes of a full inertia to eight digits only, so it is given them.
 XmlContent Inertial(const Body& body) {
   const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(body.inertia);
   Matrix3d axes = principal.eigenvectors();
   if (axes.determinant() < 0) axes.col(0) *= -1;
-  const Quaterniond tilt(axes);
   return {"inertial",
           {{"pos", Exact(body.center)},
-           {"quat", fmt::format("{} {} {} {}", Exact(tilt.w()), Exact(tilt.x()), Exact(tilt.y()), Exact(tilt.z()))},
+           {"quat", QuaternionText(Quaterniond(axes))},
            {"mass", Exact(body.mass)},
            {"diaginertia", Exact(Vector3d(principal.eigenvalues()))}}};
 }
@@ -290,11 +293,9 @@ Description ToMjcf(const DescribedArm& arm) {
   for (std::size_t j = 0; j < arm.joint.size(); ++j, indent += "  ") {
     const Joint& joint = robot.joint[j];
     const DescribedJoint& own = arm.joint[j];
-    const Eigen::Isometry3d T = FrameOf(robot, j);
-    const Eigen::Quaterniond turn(T.linear());
-    d.text += fmt::format("{}<body name=\"{}\" pos=\"{}\" quat=\"{} {} {} {}\">\n", indent, XmlText(LinkName(robot, j)),
-                          Exact(Eigen::Vector3d(T.translation())), Exact(turn.w()), Exact(turn.x()), Exact(turn.y()),
-                          Exact(turn.z()));
+    const Isometry3d T = FrameOf(robot, j);
+    d.text += fmt::format("{}<body name=\"{}\" pos=\"{}\" quat=\"{}\">\n", indent, XmlText(LinkName(robot, j)),
+                          Exact(Vector3d(T.translation())), QuaternionText(Quaterniond(T.linear())));
     d.text += fmt::format("{}  {}\n", indent, Inertial(codegen::ToBody(own.body)).Text());
     XmlContent content{"joint",
                        {{"name", XmlText(joint.name)},

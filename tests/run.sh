@@ -83,7 +83,7 @@ if [[ $scope == peers ]]; then
   step "excitations in MuJoCo" build/peers/venv/bin/python tests/peers/collisions_test.py build/host/armcal build/peers/collisions
   step "arms of public collections" build/peers/venv/bin/python tests/peers/arms_test.py build/host/armcal build/peers/arms
   step "logs by other people's libraries" build/peers/venv/bin/python tests/peers/logs_test.py build/host/armcal build/peers/logs
-  python_package() { build/peers/venv/bin/pip install -q --disable-pip-version-check -C "cmake.define.ARMCAL_BUILT=$PWD/build/host" ./host_sim/python; }
+  python_package() { build/peers/venv/bin/pip install -q --disable-pip-version-check --config-settings "cmake.define.ARMCAL_BUILT=$PWD/build/host" ./host_sim/python; }
   step "the Python package" python_package || finish
   step "its regressor and Pinocchio" build/peers/venv/bin/python tests/peers/python_test.py build/host/armcal build/peers/python
   step "its long calls and its example" build/peers/venv/bin/python tests/peers/python_calls_test.py build/host/armcal build/peers/python_calls

@@ -12,6 +12,7 @@
 namespace armcal::verdict {
 
 using diagnosis::Term;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -159,6 +160,28 @@ std::vector<int> Rested(const DiagnosisView& v) {
   return out;
 }
 
+namespace {
+
+// Of joints that the terms predict better where they move, and worse over all samples; empty if there is none.
+std::string WorseAtRest(const DiagnosisView& v) {
+  constexpr double kWorse = 1.02;
+  const auto rms = [&](const MatrixXd& residual, bool moving) { return calibration::Rms(*v.test, residual, moving); };
+  const VectorXd before = rms(v.held_out->before, false), after = rms(v.held_out->after, false),
+                 moved = rms(v.held_out->before, true) - rms(v.held_out->after, true);
+  std::string out;
+  for (int j = 0; j < v.model->joints(); ++j)
+    if (moved[j] > 0 && after[j] > kWorse * before[j])
+      out += fmt::format("{}joint {} from {:.4g} to {:.4g} {}", out.empty() ? "" : ", ", j + 1, before[j], after[j],
+                         calibration::TorqueUnit(v.model->robot().joint[static_cast<std::size_t>(j)]));
+  if (out.empty()) return out;
+  return fmt::format(
+      "friction at rest: the terms lower the error where a joint moves, but over all held-out samples it grows ({}); no "
+      "term describes a joint that stands",
+      out);
+}
+
+}  // namespace
+
 std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
   std::vector<std::string> out;
   if (!v.train || v.train->empty()) return out;
@@ -200,6 +223,7 @@ std::vector<std::string> NotLookedAt(const DiagnosisView& v) {
       "rows at rest, near a turn, beside jolts and beside gaps: {} % of the samples of joints 1 to {}; presliding "
       "and breakaway show there",
       left_out, n));
+  if (std::string worse = WorseAtRest(v); !worse.empty()) out.push_back(std::move(worse));
   if (const std::vector<int> rested = Rested(v); !rested.empty())
     out.push_back(
         fmt::format("joint{} {}: at rest in the training logs", rested.size() > 1 ? "s" : "", JointGroup(rested)));

@@ -120,6 +120,22 @@ TEST(NotLookedAt, NamesJointsThatStoodAndRowsLeftOut) {
   EXPECT_EQ(all.find("further terms"), std::string::npos) << all;
 }
 
+// The terms predict joint 2 better where it moves. At rest they add 5 N m.
+TEST(NotLookedAt, SaysThatTheTermsAreWrongAtRest) {
+  Diagnosed d(81);
+  const auto all = [&] {
+    std::string lines;
+    for (const std::string& line : NotLookedAt(d.view)) lines += line + "\n";
+    return lines;
+  };
+  EXPECT_EQ(all().find("friction at rest"), std::string::npos) << all();
+  int rested = 0;
+  for (int k = 0; k < d.test.samples(); ++k)
+    if (!d.test.moving(k, 1)) d.held_out.after(k, 1) += 5, ++rested;
+  ASSERT_GT(rested, 10);
+  EXPECT_NE(all().find("it grows (joint 2 from "), std::string::npos) << all();
+}
+
 // A log of 0.4 s leaves fewer rows than a search needs.
 TEST(NotLookedAt, SaysThatALogIsTooShort) {
   tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 8);

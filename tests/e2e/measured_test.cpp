@@ -170,7 +170,7 @@ TEST(Measured, Emps_GivesThePublishedParameters) {
   EXPECT_EQ(found, published.size());
 }
 
-TEST(Measured, Kr300_DiagnosisWritesTheWholeVerdict) {
+TEST(LongMeasured, Kr300_DiagnosisWritesTheWholeVerdict) {
   const fs::path data = Measured("kuka_kr300");
   SKIP_WITHOUT(data, "kuka_kr300");
   const fs::path folder = FreshFolder("kr300_diagnose");

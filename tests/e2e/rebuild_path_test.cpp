@@ -6,7 +6,7 @@
 namespace armcal::tests {
 namespace {
 
-TEST(RebuildPath, Stribeck_IsFoundGeneratedBuiltAndFlashed) {
+TEST(LongRebuildPath, Stribeck_IsFoundGeneratedBuiltAndFlashed) {
   const fs::path folder = FreshFolder("stribeck");
   const nlohmann::json result = RunDemo("stribeck", folder);
   ASSERT_FALSE(result.is_null());

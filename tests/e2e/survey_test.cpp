@@ -49,26 +49,34 @@ void ExpectGoalsMet(const SurveyRun& run, std::size_t goals) {
   EXPECT_EQ(run.outcome.code, 0);
 }
 
+// The row whose cells are these words; null if there is none.
+nlohmann::json RowOf(const SurveyRun& run, const std::string& table,
+                     const std::vector<std::pair<std::string, std::string>>& words) {
+  for (const auto& row : run.all.at("tables").at(table).at("rows"))
+    if (std::all_of(words.begin(), words.end(), [&](const auto& w) { return row.at(w.first) == w.second; })) return row;
+  ADD_FAILURE() << "table " << table << " has no such row";
+  return {};
+}
+
+nlohmann::json NoisyRow(const SurveyRun& run, const std::string& table, const std::string& method) {
+  return RowOf(run, table, {{"method", method}, {"torque", "with noise"}});
+}
+
 // The tables with findings of their own. LongSurvey has the others.
 class Survey : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    run_.emplace("survey", std::vector<std::string>{"8", "9", "10", "12", "shipped", "figures"});
+    run_.emplace("survey", std::vector<std::string>{"8", "10", "12", "shipped", "figures"});
   }
   static void TearDownTestSuite() { run_.reset(); }
   void SetUp() override { ASSERT_FALSE(run_->all.is_null()) << run_->outcome.code << " " << run_->outcome.err; }
 
   static const nlohmann::json& Rows(const std::string& table) { return run_->all.at("tables").at(table).at("rows"); }
-  // The row whose cells are these words; null if there is none.
   static nlohmann::json Row(const std::string& table, const std::vector<std::pair<std::string, std::string>>& words) {
-    for (const auto& row : Rows(table))
-      if (std::all_of(words.begin(), words.end(), [&](const auto& w) { return row.at(w.first) == w.second; }))
-        return row;
-    ADD_FAILURE() << "table " << table << " has no such row";
-    return {};
+    return RowOf(*run_, table, words);
   }
   static nlohmann::json Noisy(const std::string& table, const std::string& method) {
-    return Row(table, {{"method", method}, {"torque", "with noise"}});
+    return NoisyRow(*run_, table, method);
   }
 
   inline static std::optional<SurveyRun> run_;
@@ -94,12 +102,6 @@ TEST_F(Survey, Searches_ArePhysicalAndWorseThanTheirStart_ThePriorsMap_IsBetter)
   EXPECT_LT(Value(map.at("e_d / e_d(prior)")), 1);
 }
 
-TEST_F(Survey, ExtendedKalmanFilter_FailsOnTheStribeckSpeed_BetterOnesDoNot) {
-  EXPECT_GT(Value(Noisy("9", "extended Kalman filter").at("e_f")), 1);
-  for (const char* method : {"variable projection", "iterated EKF in logarithms", "fixed Stribeck basis"})
-    EXPECT_LT(Value(Noisy("9", method).at("e_f")), 0.2) << method;
-}
-
 TEST_F(Survey, Instruments_UndoWhatNoiseInQDoesToLeastSquares) {
   const auto least_squares = Row("10", {{"method", "pseudo-inverse"}}), iv = Row("10", {{"method", "IDIM-IV"}});
   EXPECT_LT(Value(iv.at("base error no filter")), 0.2 * Value(least_squares.at("base error no filter")));
@@ -121,12 +123,12 @@ TEST_F(Survey, ForgettingFollowsBetterThanKalman_TheBankBetterThanBoth) {
 
 TEST_F(Survey, EveryTableAndFigureIsThere_EveryGoalIsMet) {
   for (const char* table :
-       {"trajectories", "8", "9", "10", "10 tier 2", "12", "(9)", "shipped prior", "figure 4", "slips"})
+       {"trajectories", "8", "10", "10 tier 2", "12", "(9)", "shipped prior", "figure 4", "slips"})
     EXPECT_TRUE(run_->all.at("tables").contains(table)) << table;
   const std::string page = ReadText(run_->folder / "out.html");
   for (const char* figure : {"Figure 1", "Figure 2", "Figure 3", "Figure 4"})
     EXPECT_NE(page.find(figure), std::string::npos) << figure;
-  ExpectGoalsMet(*run_, 20);
+  ExpectGoalsMet(*run_, 19);
   int shipped = 0;
   for (const auto& goal : run_->all.at("goals"))
     shipped += goal.at("name").get<std::string>().find("shipped prior") != std::string::npos;
@@ -134,10 +136,15 @@ TEST_F(Survey, EveryTableAndFigureIsThere_EveryGoalIsMet) {
 }
 
 TEST(LongSurvey, EveryOtherTableIsThere_EveryGoalIsMet) {
-  const SurveyRun run("survey_long", {"5", "6", "7", "11", "priors"});
+  const SurveyRun run("survey_long", {"5", "6", "7", "9", "11", "priors"});
   ASSERT_FALSE(run.all.is_null()) << run.outcome.code << " " << run.outcome.err;
-  for (const char* table : {"5", "6", "7", "11", "priors"}) EXPECT_TRUE(run.all.at("tables").contains(table)) << table;
-  ExpectGoalsMet(run, 14);  // 4 of them are in every run
+  for (const char* table : {"5", "6", "7", "9", "11", "priors"})
+    EXPECT_TRUE(run.all.at("tables").contains(table)) << table;
+  ExpectGoalsMet(run, 17);  // 4 of them are in every run
+  // The extended Kalman filter fails on the Stribeck speed.
+  EXPECT_GT(Value(NoisyRow(run, "9", "extended Kalman filter").at("e_f")), 1);
+  for (const char* method : {"variable projection", "iterated EKF in logarithms", "fixed Stribeck basis"})
+    EXPECT_LT(Value(NoisyRow(run, "9", method).at("e_f")), 0.2) << method;
 }
 
 TEST(Excite, WithEveryCurveAndCriterion_WritesATrajectoryWithinTheLimits) {

@@ -39,6 +39,13 @@ std::set<codegen::InputId> Candidate::inputs() const {
   return out;
 }
 
+bool Candidate::ReadsAllOf(const Candidate& other) const {
+  const auto &own = graph_->inputs(), &asked = other.graph_->inputs();
+  return std::all_of(asked.begin(), asked.end(), [&](const codegen::InputId& id) {
+    return id.quantity == codegen::Quantity::kSymbol || std::find(own.begin(), own.end(), id) != own.end();
+  });
+}
+
 std::string Candidate::name() const {
   std::string s = record().name;
   for (std::size_t k = 0; k < joints().size(); ++k) s += (k ? "-" : ", joint ") + std::to_string(joints()[k] + 1);

@@ -47,6 +47,8 @@ class Candidate {
   bool reads(codegen::Quantity quantity) const;
   // What its columns read, and the load of its joints, which a search may ask for.
   std::set<codegen::InputId> inputs() const;
+  // It reads every signal that the other one reads. Unknowns and states are no signals.
+  bool ReadsAllOf(const Candidate& other) const;
   bool is_curve() const { return record().generic_penalty > 0; }       // fits a form, names no cause
   bool is_surface() const { return !record().search.second.empty(); }  // a curve over two signals
   // It happens at one time of the training log. One part of a log says nothing about it in another part, or in another

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "host_sim/diagnose/diagnosis/determined.hpp"
+#include "host_sim/diagnose/diagnosis/selector.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 
 namespace armcal::diagnosis {
@@ -80,6 +81,14 @@ std::vector<std::size_t> Free(const Chosen& term) {
   return out;
 }
 
+// A curve over all that the term reads takes up what the term's unknowns change: beside it they would run to a bound.
+bool IsBesideItsCurve(const Chosen& term, const std::vector<const Chosen*>& terms) {
+  return std::any_of(terms.begin(), terms.end(), [&](const Chosen* other) {
+    return other->candidate->is_curve() && SharesJoint(*other->candidate, *term.candidate) &&
+           other->candidate->ReadsAllOf(*term.candidate);
+  });
+}
+
 }  // namespace
 
 void Diagnosis::Work::Polish() {
@@ -91,7 +100,7 @@ void Diagnosis::Work::Polish() {
   std::vector<double*> value;
   for (Chosen& c : chosen) {
     const codegen::SearchWay how = c.candidate->record().search.how;
-    if (!c.confirmed || c.candidate->is_curve() ||
+    if (!c.confirmed || c.candidate->is_curve() || IsBesideItsCurve(c, terms) ||
         (how != codegen::SearchWay::kProfile && how != codegen::SearchWay::kSpectral))
       continue;
     for (std::size_t k = 0; k < c.eta.size(); ++k) {

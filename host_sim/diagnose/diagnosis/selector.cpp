@@ -355,10 +355,13 @@ void Selector::Sort(std::vector<Found>& ranked) {
                    [&](const Found& a, const Found& b) { return standing(a) > standing(b); });
   if (ranked.empty() || !ranked[0].candidate->is_curve()) return;
   const Found& curve = ranked[0];
-  // A surface has so many coefficients that it fits a part of much else.
+  // A surface has so many coefficients that it fits a part of what one of its signals does. What reads another signal
+  // is another explanation.
   const bool is_surface = curve.candidate->is_surface();
-  const double enough = is_surface ? kSimplerExplains : kCauseExplains;
-  const auto explains = [&](const Found& f) { return f.gain.gain > enough * curve.gain.gain; };
+  const auto enough = [&](const Found& f) {
+    return is_surface && curve.candidate->ReadsAllOf(*f.candidate) ? kSimplerExplains : kCauseExplains;
+  };
+  const auto explains = [&](const Found& f) { return f.gain.gain > enough(f) * curve.gain.gain; };
   const auto simpler = std::find_if(ranked.begin(), ranked.end(), [&](const Found& f) {
     const bool is_simpler = is_surface ? !f.candidate->is_surface() : !f.candidate->is_curve();
     return is_simpler && f.candidate->rows() == curve.candidate->rows() && f.log_chance < kLogRare &&
@@ -367,9 +370,9 @@ void Selector::Sort(std::vector<Found>& ranked) {
   if (simpler == ranked.end()) return;
   const char* what = simpler->candidate->is_curve() ? "curve" : "cause";
   refused_[curve.candidate] =
-      explains(*simpler)
-          ? fmt::format("it names no cause, and a {} explains over {:.0f} % of what it explains", what, 100 * enough)
-          : fmt::format("it names no cause, and the logs do not tell it from a {}", what);
+      explains(*simpler) ? fmt::format("it names no cause, and a {} explains over {:.0f} % of what it explains", what,
+                                       100 * enough(*simpler))
+                         : fmt::format("it names no cause, and the logs do not tell it from a {}", what);
   std::rotate(ranked.begin(), simpler, simpler + 1);
 }
 

@@ -57,7 +57,12 @@ TEST(CurveOdds, AreTheLikelihoodOfTheRows) {
   for (const double size : {0.05, 0.3, 2.0}) {
     const CurveRows rows(60, 8, size);
     const double best = BestLikelihood(rows, {Alike(8, 0.1), Alike(8, 1.5)});
-    EXPECT_NEAR(rows.Odds(8).Evidence(rows.Gain()), best, 0.02 * best + 0.05) << size;
+    MatrixXd precision;
+    const double evidence = rows.Odds(8).Evidence(rows.Gain(), &precision);
+    EXPECT_NEAR(evidence, best, 0.02 * best + 0.05) << size;
+    if (evidence > 0) {
+      EXPECT_NEAR(rows.Likelihood(precision.inverse()), evidence, 1e-3 * evidence) << size;
+    }
   }
 }
 

@@ -46,5 +46,19 @@ TEST(InBounds, AsksTheParameter_NotItsDeviationFromThePrior) {
   }
 }
 
+// A column of mean 1. The base and its prior take (sum of the column)^2 / 100 of its squares.
+TEST(Imitates, ItselfTakesAllThatTheBaseLeavesOfAColumn) {
+  const BaseRows rows = OneParameter();
+  const Metric metric(rows, {NoiseModel{}});
+  Columns column;
+  column.joints = {0};
+  column.block = {MatrixXd::Ones(rows.index[0].size(), 1)};
+  for (int k = 0; k < rows.index[0].size(); ++k) column.block[0](k, 0) += k % 2 ? 0.5 : -0.5;
+  const double left = column.block[0].squaredNorm() - std::pow(column.block[0].sum(), 2) / 100;
+  const auto [taken, own] = metric.Imitates(column, column, VectorXd::Ones(1));
+  EXPECT_NEAR(own, left, 1e-9 * left);
+  EXPECT_NEAR(taken, left, 1e-6 * left);
+}
+
 }  // namespace
 }  // namespace armcal::diagnosis

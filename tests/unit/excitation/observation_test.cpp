@@ -66,6 +66,23 @@ TEST(Observation, OfThePublishedSeriesWithoutRotors_HasThePublishedTorquePeaks) 
     EXPECT_NEAR(peaks[j].torque_Nm, published[j], 0.6) << "joint " << j + 1;  // rounded to 1 N m
 }
 
+// An arm that is turned by half a turn about its first axis, which lies level: gravity pulls the other way.
+TEST(FindPeaks, OfATorqueThatIsNegativeOnly_AreItsSize) {
+  const codegen::Model model = test::Arm(test::RobotFile("two_link"));
+  const Observation observation(model);
+  const auto held = [&](double q1) {
+    codegen::Signals s;
+    s.t = Eigen::VectorXd::LinSpaced(5, 0, 1);
+    s.q = s.qd = s.qdd = Eigen::MatrixXd::Zero(5, 2);
+    s.q.col(0).setConstant(q1);
+    return FindPeaks(observation, s)[0].torque_Nm;
+  };
+  for (const double q1 : {-0.4, 0.3}) {
+    EXPECT_GT(held(q1), 1) << q1;
+    EXPECT_NEAR(held(q1 + std::numbers::pi), held(q1), 1e-9 * held(q1)) << q1;
+  }
+}
+
 TEST(Observation, OfAnArmAtRest_IsSingular) {
   const codegen::Model model = test::Arm(test::RobotFile("er20_like"));
   codegen::Signals s;

@@ -89,6 +89,38 @@ TEST(Robust, TwoPercentOfOutliers_DoNotMoveTheEstimate) {
   EXPECT_GT(tests::TorqueError(arm, d, plain.z), 3 * clean);  // planted
 }
 
+// Joint 2 has five times the noise that it is said to have.
+TEST(Robust, AJointThatIsNoisierThanStated_HasLargerDeviations) {
+  SyntheticArm arm(tests::PlainRobot("er20_like", tests::Columns::kBase), 3);
+  Dataset d = arm.Run(10, 4);
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  for (int k = 0; k < d.samples(); ++k) d.tau(k, 1) += 4.9 * arm.noise_Nm(1) * normal(random);
+  const Problem p = tests::ProblemOf(arm, {&d});
+  const Solution robust = Robust(p), plain = tests::LeastSquares(p);
+  EXPECT_LT(tests::WorstDeviation(arm, robust), 4.5);
+  const int c = Column(arm.model(), "Fv2");
+  EXPECT_NEAR(std::sqrt(robust.covariance(c, c) / plain.covariance(c, c)), 5, 1);
+}
+
+// Viscous friction grows by a half at once.
+TEST(MultipleModel, AfterAStep_IsThereWithinThreeSeconds) {
+  SyntheticArm arm(tests::PlainRobot("er20_like", tests::Columns::kBase), 2);
+  Dataset d = arm.Run(30, 3);
+  constexpr double kStep_s = 15;
+  for (int j = 0; j < 6; ++j)
+    d.tau.col(j).array() +=
+        (d.s.t.array() > kStep_s).cast<double>() * 0.5 * arm.Friction("Fv", j) * d.s.qd.col(j).array();
+  const Solution s = MultipleModel(tests::ProblemOf(arm, {&d}));
+  for (int j = 0; j < 6; ++j) {
+    const int c = Column(arm.model(), "Fv" + std::to_string(j + 1));
+    double worst = 0;
+    for (int k = 0; k < d.samples(); ++k)
+      if (d.s.t[k] > kStep_s + 3) worst = std::max(worst, std::abs(s.path(k, c) / (1.5 * arm.Friction("Fv", j)) - 1));
+    EXPECT_LT(worst, 0.07) << j + 1;
+  }
+}
+
 TEST(ParallelDecimation, RippleAboveItsBand_DoesNotMatter) {
   SyntheticArm arm(tests::PlainRobot("two_link", tests::Columns::kBase), 3);
   Dataset d = arm.Run(20, 4);

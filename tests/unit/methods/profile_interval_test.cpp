@@ -136,9 +136,22 @@ TEST(ProfileInterval, OfAnAmplitude_EndsWhereTheBestSpeedCosts192More) {
   }
 }
 
+TEST(ProfileInterval, OfWhatHasNoProfile_Is196DeviationsToEachSide) {
+  const codegen::Model model(WithLaw("stribeck"), tests::Records());
+  const Fitted fitted =
+      FitLaw(model, [](double v) { return 3 * std::exp(-std::pow(v / 0.1, 2)) * SignOf(v); }, 3, true);
+  for (int c = 0; c < model.columns(); ++c) {
+    if (!model.is_rigid(c)) continue;
+    const double sd = std::sqrt(fitted.solution.covariance(c, c));
+    EXPECT_NEAR(fitted.solution.interval(c, 1) - fitted.solution.z[c], 1.96 * sd, 0.01 * sd) << c;
+    EXPECT_NEAR(fitted.solution.z[c] - fitted.solution.interval(c, 0), 1.96 * sd, 0.01 * sd) << c;
+  }
+}
+
 TEST(ProfileInterval, OfASpeedWhoseAmplitudeIsZero_IsOpen) {
   const codegen::Model model(WithLaw("stribeck"), tests::Records());
-  const Fitted fitted = FitLaw(model, [](double) { return 0.0; }, 5, true);
+  const Fitted fitted = FitLaw(
+      model, [](double) { return 0.0; }, 5, true);
   const int vs = fitted.Place(model, "stribeck.vs1");
   EXPECT_TRUE(std::isinf(fitted.solution.interval(vs, 0)) || std::isinf(fitted.solution.interval(vs, 1)));
 }

@@ -105,25 +105,33 @@ Problem Informed(Problem p) {
 }
 Solution InformedLogEkf(const Problem& problem) { return LogEkf(Informed(problem)); }
 
+// The coordinates whose logarithm the filter estimates.
+std::vector<int> Logarithms(const Problem& p) {
+  const codegen::Model& model = *p.model;
+  std::vector<int> out;
+  for (int c = 0; c < p.start.size(); ++c)
+    if (c >= model.columns() ? p.lower[c] < p.upper[c]
+                             : !model.is_rigid(c) && model.table()[model.table_index(c)].effect == "stribeck")
+      out.push_back(c);
+  return out;
+}
+
+// Of a logarithm, where the parameter's relative deviation is the problem's.
+double PriorVariance(const Problem& p, int c) { return std::log1p(p.covariance(c, c) / (p.start[c] * p.start[c])); }
+
 // One pass over the log ends off this point, because its first rows are linearised at the prior.
 TEST(LogEkf, EndsWhereNoStepInALogarithmIsMoreLikely) {
   for (const std::uint64_t seed : {11, 12, 13, 14}) {
     const DrawnArm draw(seed);
     const Problem p = Informed(draw.problem);
-    const codegen::Model& model = draw.arm.model();
     const Solution found = LogEkf(p);
-    std::vector<int> logarithms;
-    for (int c = 0; c < p.start.size(); ++c)
-      if (c >= model.columns() ? p.lower[c] < p.upper[c]
-                               : !model.is_rigid(c) && model.table()[model.table_index(c)].effect == "stribeck")
-        logarithms.push_back(c);
+    const std::vector<int> logarithms = Logarithms(p);
     ASSERT_EQ(logarithms.size(), 4U);
-    // chi^2: the logs, and a normal prior of each logarithm whose relative deviation is the problem's.
+    // chi^2: the logs, and a normal prior of each logarithm.
     const auto against = [&](const VectorXd& z) {
       const VectorXd error = Linearise(p, z).residual;
       double sum = error.squaredNorm();
-      for (const int c : logarithms)
-        sum += std::pow(std::log(z[c] / p.start[c]), 2) / std::log1p(p.covariance(c, c) / (p.start[c] * p.start[c]));
+      for (const int c : logarithms) sum += std::pow(std::log(z[c] / p.start[c]), 2) / PriorVariance(p, c);
       return sum;
     };
     const double least = against(found.z);
@@ -133,6 +141,32 @@ TEST(LogEkf, EndsWhereNoStepInALogarithmIsMoreLikely) {
         z[c] *= std::exp(side * 0.1 * std::sqrt(found.covariance(c, c)) / z[c]);
         EXPECT_GT(against(z), least) << seed << " " << c;
       }
+  }
+}
+
+// The deviations follow from what rows and prior tell, linearised where the filter ended.
+TEST(LogEkf, DeviationsAreThoseOfTheParameters_NotOfTheirLogarithms) {
+  for (const std::uint64_t seed : {11, 12}) {
+    const DrawnArm draw(seed);
+    const Problem p = Informed(draw.problem);
+    const Solution found = LogEkf(p);
+    Eigen::MatrixXd A = Linearise(p, found.z).A, prior = p.covariance;
+    for (const int c : Logarithms(p)) {
+      A.col(c) *= found.z[c];
+      prior.row(c).setZero(), prior.col(c).setZero();
+      prior(c, c) = PriorVariance(p, c);
+    }
+    std::vector<int> known;  // all but what is held
+    for (int c = 0; c < A.cols(); ++c)
+      if (prior(c, c) > 0 && (c < p.model->columns() || p.lower[c] < p.upper[c])) known.push_back(c);
+    const Eigen::MatrixXd told = Eigen::MatrixXd(A.transpose() * A)(known, known) +
+                                 Eigen::MatrixXd(prior(known, known)).inverse(),
+                          expected = told.inverse();
+    for (const int c : Logarithms(p)) {
+      const auto at = std::find(known.begin(), known.end(), c) - known.begin();
+      const double sd = found.z[c] * std::sqrt(expected(at, at));
+      EXPECT_NEAR(std::sqrt(found.covariance(c, c)), sd, 0.1 * sd) << seed << " " << c;
+    }
   }
 }
 
@@ -161,6 +195,34 @@ TEST(StribeckBasis, FindsALawThatEndsAtALowSpeed) {
     tests::HoldDelta(problem);
     const Solution s = StribeckBasis(problem);
     EXPECT_LT(FrictionError(arm, law, s.z), 0.1) << speed;
+  }
+}
+
+// The expected q_s is twice the true one, give or take a third. The logs know better.
+TEST(StribeckBasis, WithAnExpectationThatIsOff_FollowsTheLogs) {
+  SyntheticArm arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), 5);
+  constexpr double kSpeed_radps = 0.045;
+  const Dataset data = arm.Run(
+      40, 105,
+      [&](const tests::State& s) {
+        const double x = s.qd / kSpeed_radps;
+        return 0.5 * arm.Friction("Fc", s.joint) * std::copysign(std::exp(-x * x), s.qd);
+      },
+      0.05);
+  Problem p = tests::ProblemOf(arm, {&data});
+  tests::HoldDelta(p);
+  const codegen::Model& model = arm.model();
+  for (int k = 0; k < model.nonlinear(); ++k) {
+    if (model.unknowns()[k].key != "vs") continue;
+    const int c = model.columns() + k;
+    p.start[c] = 2 * kSpeed_radps;
+    p.covariance.row(c).setZero(), p.covariance.col(c).setZero();
+    p.covariance(c, c) = std::pow(0.3 * p.start[c], 2);
+  }
+  const Solution s = StribeckBasis(p);
+  for (int k = 0; k < model.nonlinear(); ++k) {
+    if (model.unknowns()[k].key != "vs") continue;
+    EXPECT_NEAR(s.z[model.columns() + k] / kSpeed_radps, 1, 0.2) << k;
   }
 }
 

@@ -150,8 +150,7 @@ TEST(ProfileInterval, OfWhatHasNoProfile_Is196DeviationsToEachSide) {
 
 TEST(ProfileInterval, OfASpeedWhoseAmplitudeIsZero_IsOpen) {
   const codegen::Model model(WithLaw("stribeck"), tests::Records());
-  const Fitted fitted = FitLaw(
-      model, [](double) { return 0.0; }, 5, true);
+  const Fitted fitted = FitLaw(model, [](double) { return 0.0; }, 5, true);
   const int vs = fitted.Place(model, "stribeck.vs1");
   EXPECT_TRUE(std::isinf(fitted.solution.interval(vs, 0)) || std::isinf(fitted.solution.interval(vs, 1)));
 }

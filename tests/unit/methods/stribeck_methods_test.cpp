@@ -20,7 +20,20 @@ struct Law {
     std::uniform_real_distribution<double> u(0, 1);
     for (int j = 0; j < 2; ++j) extra[j] = 0.1 + 0.4 * u(random), speed[j] = 0.05 * std::pow(4, u(random));
   }
+  // The same law on both joints, with half of Fc more at standstill.
+  static Law Slow(double speed_radps) {
+    Law law(0);
+    for (int j = 0; j < 2; ++j) law.speed[j] = speed_radps, law.extra[j] = 0.5;
+    return law;
+  }
 };
+
+tests::Effect FrictionOf(const SyntheticArm& arm, const Law& law) {
+  return [&arm, law](const tests::State& s) {
+    const double x = s.qd / law.speed[s.joint];
+    return law.extra[s.joint] * arm.Friction("Fc", s.joint) * std::copysign(std::exp(-x * x), s.qd);
+  };
+}
 
 // Mean relative error of Fc, Fv, Fs, q_s over the joints: the study's e_f.
 double FrictionError(const SyntheticArm& arm, const Law& law, const VectorXd& z) {
@@ -54,13 +67,7 @@ struct DrawnArm {
   Problem problem;
   explicit DrawnArm(std::uint64_t seed)
       : arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), seed), law(seed) {
-    data = arm.Run(
-        20, 100 + seed,
-        [this](const tests::State& s) {
-          const double x = s.qd / law.speed[s.joint];
-          return law.extra[s.joint] * arm.Friction("Fc", s.joint) * std::copysign(std::exp(-x * x), s.qd);
-        },
-        0.25);
+    data = arm.Run(20, 100 + seed, FrictionOf(arm, law), 0.25);
     problem = tests::ProblemOf(arm, {&data});
     tests::HoldDelta(problem);
   }
@@ -181,16 +188,9 @@ TEST(StribeckBasis, FindsStribeckTruths) { Judge(StribeckBasis, "stribeck_basis"
 // lower third, where a slow motion shows them.
 TEST(StribeckBasis, FindsALawThatEndsAtALowSpeed) {
   SyntheticArm arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), 5);
-  Law law(5);
   for (const double speed : {0.03, 0.045}) {
-    for (int j = 0; j < 2; ++j) law.speed[j] = speed, law.extra[j] = 0.5;
-    const Dataset data = arm.Run(
-        40, 105,
-        [&](const tests::State& s) {
-          const double x = s.qd / speed;
-          return law.extra[s.joint] * arm.Friction("Fc", s.joint) * std::copysign(std::exp(-x * x), s.qd);
-        },
-        0.05);
+    const Law law = Law::Slow(speed);
+    const Dataset data = arm.Run(40, 105, FrictionOf(arm, law), 0.05);
     Problem problem = tests::ProblemOf(arm, {&data});
     tests::HoldDelta(problem);
     const Solution s = StribeckBasis(problem);
@@ -202,28 +202,20 @@ TEST(StribeckBasis, FindsALawThatEndsAtALowSpeed) {
 TEST(StribeckBasis, WithAnExpectationThatIsOff_FollowsTheLogs) {
   SyntheticArm arm(tests::WithStribeck(tests::PlainRobot("two_link", tests::Columns::kBase)), 5);
   constexpr double kSpeed_radps = 0.045;
-  const Dataset data = arm.Run(
-      40, 105,
-      [&](const tests::State& s) {
-        const double x = s.qd / kSpeed_radps;
-        return 0.5 * arm.Friction("Fc", s.joint) * std::copysign(std::exp(-x * x), s.qd);
-      },
-      0.05);
+  const Dataset data = arm.Run(40, 105, FrictionOf(arm, Law::Slow(kSpeed_radps)), 0.05);
   Problem p = tests::ProblemOf(arm, {&data});
   tests::HoldDelta(p);
-  const codegen::Model& model = arm.model();
-  for (int k = 0; k < model.nonlinear(); ++k) {
-    if (model.unknowns()[k].key != "vs") continue;
-    const int c = model.columns() + k;
+  std::vector<int> speeds;
+  for (int k = 0; k < arm.model().nonlinear(); ++k)
+    if (arm.model().unknowns()[k].key == "vs") speeds.push_back(arm.model().columns() + k);
+  ASSERT_EQ(speeds.size(), 2U);
+  for (const int c : speeds) {
     p.start[c] = 2 * kSpeed_radps;
     p.covariance.row(c).setZero(), p.covariance.col(c).setZero();
     p.covariance(c, c) = std::pow(0.3 * p.start[c], 2);
   }
   const Solution s = StribeckBasis(p);
-  for (int k = 0; k < model.nonlinear(); ++k) {
-    if (model.unknowns()[k].key != "vs") continue;
-    EXPECT_NEAR(s.z[model.columns() + k] / kSpeed_radps, 1, 0.2) << k;
-  }
+  for (const int c : speeds) EXPECT_NEAR(s.z[c] / kSpeed_radps, 1, 0.2) << c;
 }
 
 TEST(VariableProjection, FromAFarStart_ReachesTheSameMinimum) {

@@ -108,12 +108,17 @@ TEST(Verdict, OfAHeldOutLogThatDiffers_NamesTheJoint) {
   EXPECT_NE(DiagnosisText(d.view).find("joint 1: the held-out log leaves"), std::string::npos);
 }
 
+std::string NotLookedAtText(const DiagnosisView& view) {
+  std::string all;
+  for (const std::string& line : NotLookedAt(view)) all += line + "\n";
+  return all;
+}
+
 TEST(NotLookedAt, NamesJointsThatStoodAndRowsLeftOut) {
   Diagnosed d(81);
   d.train[0].moving.col(0).setZero(), d.train[0].used.col(0).setZero();
   d.train[0].cutoff_Hz = Eigen::Vector2d(6, 8);
-  std::string all;
-  for (const std::string& line : NotLookedAt(d.view)) all += line + "\n";
+  const std::string all = NotLookedAtText(d.view);
   EXPECT_NE(all.find("faster than 6, 8 Hz"), std::string::npos) << all;
   EXPECT_NE(all.find("100, "), std::string::npos) << all;  // per cent of the rows of joint 1
   EXPECT_NE(all.find("joint 1: at rest"), std::string::npos) << all;
@@ -123,17 +128,14 @@ TEST(NotLookedAt, NamesJointsThatStoodAndRowsLeftOut) {
 // The terms predict joint 2 better where it moves. At rest they add 5 N m.
 TEST(NotLookedAt, SaysThatTheTermsAreWrongAtRest) {
   Diagnosed d(81);
-  const auto all = [&] {
-    std::string lines;
-    for (const std::string& line : NotLookedAt(d.view)) lines += line + "\n";
-    return lines;
-  };
-  EXPECT_EQ(all().find("friction at rest"), std::string::npos) << all();
+  const std::string sound = NotLookedAtText(d.view);
+  EXPECT_EQ(sound.find("friction at rest"), std::string::npos) << sound;
   int rested = 0;
   for (int k = 0; k < d.test.samples(); ++k)
     if (!d.test.moving(k, 1)) d.held_out.after(k, 1) += 5, ++rested;
   ASSERT_GT(rested, 10);
-  EXPECT_NE(all().find("it grows (joint 2 from "), std::string::npos) << all();
+  const std::string all = NotLookedAtText(d.view);
+  EXPECT_NE(all.find("it grows (joint 2 from "), std::string::npos) << all;
 }
 
 // A log of 0.4 s leaves fewer rows than a search needs.

@@ -10,10 +10,12 @@
 namespace armcal::codegen {
 namespace {
 
+Expr Clamp(Graph& g, Expr x, Expr lower, Expr upper) { return g.Binary(Op::kMin, g.Binary(Op::kMax, x, lower), upper); }
+
 // Cubic B-spline of unit knot spacing with support [0, 4], by truncated powers; u is clamped so that none of them
 // grows.
 Expr CardinalSpline(Graph& g, Expr u) {
-  const Expr x = g.Binary(Op::kMin, g.Binary(Op::kMax, u, g.Constant(0)), g.Constant(4));
+  const Expr x = Clamp(g, u, g.Constant(0), g.Constant(4));
   Expr sum = g.Constant(0);
   const double binomial[] = {1, -4, 6, -4};
   for (int k = 0; k < 4; ++k) {
@@ -71,7 +73,7 @@ Expr Flight(Graph& g, const std::vector<Expr>& a, bool is_place) {
   const auto flown = [&](Expr place, Expr speed) {
     return place + (speed + (2.0 * before + a[0]) * dt / g.Constant(6)) * dt;
   };
-  const auto lands = [&](Expr to) { return g.Binary(Op::kMin, g.Binary(Op::kMax, to, -half), half); };
+  const auto lands = [&](Expr to) { return Clamp(g, to, -half, half); };
   const auto flies = [&](Expr to) { return g.Constant(1) - g.Unary(Op::kAbs, g.Unary(Op::kSign, to - lands(to))); };
   const std::string name = StateName("flight", a), speed_name = StateName("flight", a, 1);
   const Expr place = g.State(name, half * g.Unary(Op::kSign, a[0]), [&](Expr p) {
@@ -85,13 +87,12 @@ Expr Flight(Graph& g, const std::vector<Expr>& a, bool is_place) {
 
 Expr Play(Graph& g, const std::vector<Expr>& a) {
   const Expr half = 0.5 * a[1];
-  const auto step = [&](Expr z) { return g.Binary(Op::kMin, g.Binary(Op::kMax, z, a[0] - half), a[0] + half); };
+  const auto step = [&](Expr z) { return Clamp(g, z, a[0] - half, a[0] + half); };
   return step(g.State(StateName("play", a), a[0], step));
 }
 
 Expr Delay(Graph& g, const std::vector<Expr>& a, int taps) {
-  const Expr u =
-      g.Binary(Op::kMin, g.Binary(Op::kMax, a[1] / g.Input({Quantity::kTimeStep}), g.Constant(0)), g.Constant(taps));
+  const Expr u = Clamp(g, a[1] / g.Input({Quantity::kTimeStep}), g.Constant(0), g.Constant(taps));
   Expr tap = a[0], sum = g.Constant(0);
   for (int k = 0; k <= taps; ++k) {
     const Expr weight =
@@ -216,7 +217,7 @@ class Parser {
       if (name == word) return need(2), g_.Binary(op, a[0], a[1]);
     if (name == "sgn") return need(1), scope_.sgn(a[0]);
     if (name == "step") return need(1), 0.5 * (g_.Unary(Op::kSign, a[0]) + 1.0);
-    if (name == "clamp") return need(3), g_.Binary(Op::kMin, g_.Binary(Op::kMax, a[0], a[1]), a[2]);
+    if (name == "clamp") return need(3), Clamp(g_, a[0], a[1], a[2]);
     if (name == "sech") {
       need(1);
       const Expr e = g_.Unary(Op::kExp, -g_.Unary(Op::kAbs, a[0]));  // at most 1: no overflow
@@ -226,7 +227,7 @@ class Parser {
       need(5);
       const char* const what = "a constant index and count in bspline";
       const double i = ConstantOf(a[3], what), n = ConstantOf(a[4], what);
-      const Expr x = g_.Binary(Op::kMin, g_.Binary(Op::kMax, a[0], a[1]), a[2]);
+      const Expr x = Clamp(g_, a[0], a[1], a[2]);
       const Expr u = (n - 3) * ((x - a[1]) / (a[2] - a[1]));  // n splines: n-3 intervals
       return CardinalSpline(g_, u - (i - 3));
     }

@@ -3,7 +3,8 @@
 
   slow_sectors.py BOARD IMAGE
 
-Saves tables. Reads during each save how many rows the filter has used and how many samples were lost. 77: no QEMU.
+Saves tables. Reads during each save how many rows the filter has used and how many samples were lost. The board counts
+rows about once a second. On a busy computer it may do so after the erase alone, so not each save shows rows. 77: no QEMU.
 """
 import shutil
 import sys
@@ -11,7 +12,7 @@ import tempfile
 
 from stored_tables import BLANK, Board, blank_memory, halves, variant
 
-SAVES, STORAGE_BYTES = 2, 2 * 128 * 1024
+SHOWN, MOST_SAVES, STORAGE_BYTES = 2, 20, 2 * 128 * 1024
 ERASE_TICKS, COMMITTING, ACTIVE = 2000, 4, 5
 TICK, SAMPLE_GAPS, ROWS_USED, STATE = 0x0046, 0x0054, 0x0060, 0x0040
 
@@ -37,14 +38,18 @@ def main():
     with tempfile.TemporaryDirectory() as folder, Board(board, image, blank_memory(folder, STORAGE_BYTES)) as b:
         assert b.line.read(4, 0x0042, 1) == [BLANK], "the first boot of an empty storage"
         default = b.table()
-        for k in range(SAVES):
+        shown = 0
+        for k in range(MOST_SAVES):
             ticks, used = save(b, variant(default, k))
             assert b.table() == variant(default, k), f"save {k}"
             assert ticks >= ERASE_TICKS, f"save {k} took {ticks} ticks"
-            assert used > 0, f"save {k}: no row was used meanwhile"
             lost = b.line.u32(SAMPLE_GAPS)
             assert lost == 0, f"save {k}: {lost} samples lost"
-            print(f"save {k}: {ticks} ticks, no sample lost")
+            print(f"save {k}: {ticks} ticks, {used} rows used meanwhile, no sample lost")
+            shown += used > 0
+            if shown == SHOWN:
+                break
+        assert shown == SHOWN, f"{shown} of {MOST_SAVES} saves showed a row that was used meanwhile"
     return 0
 
 

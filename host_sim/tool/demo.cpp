@@ -32,7 +32,7 @@ using nlohmann::ordered_json;
 
 struct DemoOptions {
   std::string scenario = "stribeck", out = "build/demo";
-  int excite_s = 60;
+  int excite_s = 60, excite_starts = 40;
 };
 
 ordered_json ReadJson(const std::string& path) { return ordered_json::parse(files::ReadWholeFile(path)); }
@@ -133,7 +133,7 @@ class Demo {
     calibration::WriteTable(File("table_cad.toml"), calibration::DefaultTable(LoadModel(robot_)));
     Stage("excite: trajectories within the limits");
     // A fixed number of searches: the run follows from its seeds, not from how busy the machine is.
-    const std::string searches = "40", most_s = std::to_string(o_.excite_s);
+    const std::string searches = std::to_string(o_.excite_starts), most_s = std::to_string(o_.excite_s);
     Verb({"excite", "--robot", robot_, "--purpose", "train", "--seed", "1", "--starts", searches, "--seconds", most_s,
           "--out", File("train.csv")});
     Verb({"excite", "--robot", robot_, "--purpose", "test", "--seed", "2", "--starts", searches, "--seconds", most_s,
@@ -290,6 +290,11 @@ void AddDemo(CLI::App& app, Action& action) {
   verb->add_option("--scenario", o->scenario, "scenario file, or a name in host_sim/scenarios")->capture_default_str();
   verb->add_option("--out", o->out, "folder for everything that is made")->capture_default_str()->type_name(kFolder);
   verb->add_option("--excite-seconds", o->excite_s, "at most, for each search of a trajectory")->capture_default_str();
+  verb->add_option(
+          "--excite-starts", o->excite_starts,
+          "searches of each trajectory; if the time is enough for all, the result is the same on every computer")
+      ->check(Between(1, 1000))
+      ->capture_default_str();
   verb->callback([o, &action] { action = [o] { return Demo(*o).Run(); }; });
 }
 

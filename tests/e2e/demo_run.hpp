@@ -12,7 +12,7 @@ namespace armcal::tests {
 // it compiles is kept for other tests, not in the user's cache.
 inline nlohmann::json RunDemo(const std::string& scenario, const fs::path& folder) {
   setenv("XDG_CACHE_HOME", ARMCAL_E2E_FOLDER "/cache", 1);
-  const Outcome o = Tool({"demo", "--scenario", scenario, "--out", folder.string(), "--excite-seconds", "3"});
+  const Outcome o = Tool({"demo", "--scenario", scenario, "--out", folder.string(), "--excite-starts", "6"});
   EXPECT_EQ(o.code, 0) << o.err << o.out;
   if (o.code != 0) return {};
   return ReadJson(folder / "result.json");

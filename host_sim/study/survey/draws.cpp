@@ -219,6 +219,11 @@ std::unique_ptr<Truth> MakeAnalytic(const Settings& settings, const Motions& mot
 
 }  // namespace
 
+Motions AlongFriction(Motions motions) {
+  motions.nonlinear = motions.friction;
+  return motions;
+}
+
 void ForEachDraw(const Settings& settings, const std::string& what, int count, const std::function<void(int)>& work) {
   int done = 0;
   std::mutex line;

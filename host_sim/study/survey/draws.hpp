@@ -60,9 +60,12 @@ struct Settings {
 // The trajectories that all tables share.
 struct Motions {
   ExcitedBy linear, nonlinear;
+  ExcitedBy friction;             // of (4), searched for small deviations of friction; only if a table has it
   std::vector<ExcitedBy> others;  // for the table of trajectories alone
   excitation::Series other;       // for validation: nothing is fitted to it
 };
+// The same, with the motion that is searched for friction in the place of `nonlinear`.
+Motions AlongFriction(Motions motions);
 
 struct DrawSettings {
   Law law = Law::kCoulombViscous;

@@ -114,11 +114,9 @@ void ShowPriors(const Settings& settings, const Motions& motions, Findings& out)
       out.goals.push_back({"Table 9, (4) with drawn truths, analytic, noise, " + name + ": mean e_f",
                            Over(o->noisy, &Score::e_f).mean, 0.06, true});
   // The same laws along a trajectory searched for friction: it has low speeds instead of a small cond(K).
-  for (const ExcitedBy& e : motions.others) {
-    if (e.law != Law::kGradient || e.criterion != excitation::Criterion::Kind::kAccuracy) continue;
-    Motions along = motions;
-    along.nonlinear = e;
-    const auto stribeck = RunDraws(settings, along, settings_of(uniform, Law::kStribeck, true, 1), laws);
+  if (motions.friction.searches > 0) {
+    const auto stribeck =
+        RunDraws(settings, AlongFriction(motions), settings_of(uniform, Law::kStribeck, true, 1), laws);
     AddRows(PriorName(uniform), "(4), drawn truths, noise, friction-aware trajectory", stribeck, true, sheet);
   }
   out.sheets.push_back(sheet);

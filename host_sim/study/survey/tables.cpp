@@ -56,6 +56,9 @@ Motions SearchMotions(const Settings& settings) {
   excite(motions.linear, settings.search_s);
   excite(motions.nonlinear, settings.search_s);
   motions.other = Validation(settings.robot, settings.records, settings.seed);
+  motions.friction.law = Law::kGradient;
+  motions.friction.criterion = Criterion::Kind::kAccuracy;
+  if (settings.Wants("online") || settings.Wants("trajectories")) excite(motions.friction, settings.search_s);
   if (!settings.Wants("trajectories")) return motions;
   const auto other = [&](Law law, Family family, Search search, Criterion::Kind criterion) {
     motions.others.push_back({law, family, search, criterion, {}});
@@ -63,11 +66,12 @@ Motions SearchMotions(const Settings& settings) {
   for (const Law law : {Law::kCoulombViscous, Law::kGradient}) {
     other(law, Family::kFourier, Search::kGenetic, Criterion::Kind::kCondition);
     other(law, Family::kFourier, Search::kGradient, Criterion::Kind::kDOptimal);
-    other(law, Family::kFourier, Search::kGradient, Criterion::Kind::kAccuracy);
   }
+  other(Law::kCoulombViscous, Family::kFourier, Search::kGradient, Criterion::Kind::kAccuracy);
   for (const Family family : {Family::kSine, Family::kPolynomial, Family::kSpline})
     other(Law::kCoulombViscous, family, Search::kGradient, Criterion::Kind::kCondition);
   for (ExcitedBy& e : motions.others) excite(e, settings.search_s);
+  motions.others.push_back(motions.friction);
   return motions;
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <functional>
 
 #include "host_sim/diagnose/diagnosis/known_term.hpp"
 #include "host_sim/diagnose/diagnosis/limits.hpp"
@@ -86,6 +87,73 @@ TEST(NextTerm, IsBarredByAConfusableOne_OnTheSameJointOnly) {
     const bool found = Selector(one.work).Next({&known}, next);
     ASSERT_EQ(found, joint == 0);
     EXPECT_EQ(next.candidate, found ? one.Of("viscous_cubic", 1) : nullptr);
+  }
+}
+
+// A wave over position that is five times as large in every fifth block of the log. All these blocks are in one fold,
+// so what the other folds say of its amplitude is wrong there, and what it says of theirs is wrong, too.
+TEST(NextTerm, WhoseGainIsInOneFold_IsRefused) {
+  constexpr int kBlocks = 20, kFolds = 5;
+  tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 6);
+  const codegen::Catalogue records{{"wave", ColumnRecord("wave", "sin(40*q)")}};
+  for (const bool steady : {true, false}) {
+    Dataset log = arm.Run(20, 60);
+    for (int k = 0; k < log.samples(); ++k) {
+      const bool strong = steady || k * kBlocks / log.samples() % kFolds == 0;
+      log.tau(k, 0) += (strong ? 0.4 : 0.08) * std::sin(40 * log.s.q(k, 0));
+    }
+    Diagnosis::Work work(arm.model(), records, {&log});
+    Chosen next;
+    EXPECT_EQ(Selector(work).Next({}, next), steady);
+  }
+}
+
+// Beside a torque over both positions there is a smaller one that the surface cannot follow: over speed, or a fine wave
+// over one of the positions. The surface explains a part of what its own signals do, so the wave goes first. What reads
+// another signal is another effect, and the larger of two goes first.
+TEST(NextTerm, GoesBeforeASurfaceOfTwiceItsGain_IfItReadsTheSameSignals) {
+  struct Small {
+    const char* expression;
+    std::function<double(double q, double qd)> value;  // half to nine tenths of the surface's gain
+    bool goes_first;
+  };
+  for (const Small& small : {Small{"sin(25*q)", [](double q, double) { return 0.14 * std::sin(25 * q); }, true},
+                             Small{"sin(9*qd)", [](double, double qd) { return 0.12 * std::sin(9 * qd); }, false}}) {
+    tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 6);
+    const codegen::Catalogue records{{"small", ColumnRecord("small", small.expression)},
+                                     {"curve_two_positions", tests::Records().at("curve_two_positions")}};
+    Dataset log = arm.Run(60, 63);
+    for (int k = 0; k < log.samples(); ++k) {
+      const double q = log.s.q(k, 0), qd = log.s.qd(k, 0);
+      log.tau(k, 0) += 0.52 * std::sin(3 * q) * std::cos(3 * log.s.q(k, 1)) + small.value(q, qd);
+    }
+    Diagnosis::Work work(arm.model(), records, {&log});
+    Chosen next;
+    ASSERT_TRUE(Selector(work).Next({}, next));
+    EXPECT_EQ(next.candidate->record().name == "small", small.goes_first) << small.expression;
+    EXPECT_EQ(next.candidate->rows(), std::vector<int>{0});
+  }
+}
+
+// Half of the true speed. A curve over speed on the same joint fits what is wrong of it, so nothing says in which
+// direction it is wrong.
+TEST(Refinement, MovesAnUnknown_UnlessACurveOverItsSignalIsInTheModel) {
+  constexpr double kTrue = 0.12, kFound = 0.06;
+  const codegen::Catalogue records{{"stribeck", tests::Records().at("stribeck")},
+                                   {"curve_friction", tests::Records().at("curve_friction")}};
+  for (const bool beside : {false, true}) {
+    OneLog one(records, 60, [](const tests::State& s) {
+      return s.joint == 0 ? 0.6 * std::exp(-std::abs(s.qd) / kTrue) * (s.qd > 0 ? 1 : -1) : 0;
+    });
+    Chosen stribeck, curve;
+    stribeck.candidate = one.Of("stribeck", 0), stribeck.eta = {kFound, 1};
+    curve.candidate = one.Of("curve_friction", 0), curve.eta = {0, one.log.s.qd.col(0).maxCoeff()};
+    one.work.chosen = {stribeck};
+    if (beside) one.work.chosen.push_back(curve);
+    one.work.Polish();
+    const double speed = one.work.chosen[0].eta[0];
+    if (beside) EXPECT_EQ(speed, kFound);
+    else EXPECT_NEAR(speed, kTrue, 0.2 * kTrue);
   }
 }
 

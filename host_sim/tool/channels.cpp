@@ -42,13 +42,13 @@ void PrintSights(const logs::Look& look) {
   fmt::print("{}\n", report::Text(columns));
 }
 
-// The map names the definitions from its own folder.
+// The map names the definitions from its own folder; a map that is printed, from the current one.
 std::vector<std::string> FromFolderOf(const std::string& map, const std::vector<std::string>& paths) {
+  const std::filesystem::path folder =
+      map.empty() ? std::filesystem::current_path() : std::filesystem::absolute(map).parent_path();
   std::vector<std::string> out;
   for (const std::string& path : paths)
-    out.push_back(
-        std::filesystem::proximate(std::filesystem::absolute(path), std::filesystem::absolute(map).parent_path())
-            .string());
+    out.push_back(std::filesystem::proximate(std::filesystem::absolute(path), folder).string());
   return out;
 }
 

@@ -21,6 +21,7 @@ struct ChooseOptions {
 };
 
 std::string Percent(const choice::Ratio& ratio) {
+  if (std::isnan(ratio.value)) return "-";
   return fmt::format("{:+.1f} [{:+.1f}, {:+.1f}]", 100 * ratio.value, 100 * ratio.low, 100 * ratio.high);
 }
 
@@ -35,6 +36,7 @@ ordered_json ToJson(const choice::Ratio& ratio) {
 std::string Sentence(const choice::Choice& choice, std::size_t j) {
   const choice::JointChoice& joint = choice.joint[j];
   const std::string name = choice.laws[joint.chosen].name;
+  if (!joint.failed.empty()) return fmt::format("joint {}: no law can be fitted: {}", j + 1, joint.failed);
   if (!joint.differ)
     return fmt::format("joint {}: the laws do not differ on these logs; {} has the fewest parameters", j + 1, name);
   if (joint.chosen == joint.best) return fmt::format("joint {}: {} has the smallest error", j + 1, name);
@@ -73,10 +75,11 @@ void PrintChoice(const choice::Choice& choice, ordered_json& json) {
                               {"differ", joint.differ},
                               {"sentence", Sentence(choice, j)},
                               {"errors", errors}});
+    if (!joint.failed.empty()) json["joints"].back()["failed"] = joint.failed;
   }
   fmt::print("on stretches of the training logs that the fit has not seen\n{}\n", report::Text(t));
   for (std::size_t j = 0; j < choice.joint.size(); ++j)
-    for (std::size_t l = 0; l < choice.laws.size(); ++l)
+    for (std::size_t l = 0; l < choice.laws.size() && choice.joint[j].failed.empty(); ++l)
       if (const std::string& why = choice.joint[j].law[l].failed; !why.empty())
         fmt::print("joint {}: {} was not fitted: {}\n", j + 1, choice.laws[l].name, why);
   for (std::size_t j = 0; j < choice.joint.size(); ++j) fmt::print("{}\n", Sentence(choice, j));
@@ -102,8 +105,8 @@ void PrintTests(const std::vector<std::vector<choice::HeldOut>>& tests, const st
     ordered_json joints = ordered_json::array();
     for (std::size_t j = 0; j < tests[log].size(); ++j) {
       const choice::HeldOut& e = tests[log][j];
-      t.rows.push_back({std::to_string(j + 1), fmt::format("{:.4g}", e.torque_Nm), fmt::format("{:.4g}", e.plain_Nm),
-                        fmt::format("{:.4g}", e.chosen_Nm), Percent(e.over_plain)});
+      t.rows.push_back({std::to_string(j + 1), report::Number(e.torque_Nm, 4), report::Number(e.plain_Nm, 4),
+                        report::Number(e.chosen_Nm, 4), Percent(e.over_plain)});
       joints.push_back({{"joint", j + 1},
                         {"torque_Nm", e.torque_Nm},
                         {"coulomb_viscous_Nm", e.plain_Nm},
@@ -125,7 +128,7 @@ int RunChoose(const ChooseOptions& o) {
   report::Progress progress("laws");
   settings.progress = [&](double share) { progress.Set(share); };
   const choice::Choice choice = choice::Choose(robot, records, train, settings);
-  ordered_json json{{"robot", o.robot}, {"train", o.train}};
+  ordered_json json{{"robot", o.robot}, {"train", calibration::Sources(train)}};
   PrintChoice(choice, json);
   PrintEffects(choice);
   if (!o.test.empty()) {

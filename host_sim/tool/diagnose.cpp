@@ -74,7 +74,7 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
 
   // The model is written, and its hash taken, before the held-out log is opened.
   std::string provenance = "Train:", model_hash;
-  for (const std::string& p : o.train)
+  for (const std::string& p : calibration::Sources(run->train))
     provenance +=
         " " + std::filesystem::path(p).filename().string() + " (sha256 " + files::FileHash(p).substr(0, 16) + ")";
   const auto folder =
@@ -162,7 +162,12 @@ void AddDiagnose(CLI::App& app, Action& action) {
   auto batch = std::make_shared<BatchOptions>();
   AddBatchOptions(*verb, *batch);
   verb->callback([o, batch, &action] {
-    action = [o, batch] { return batch->asked() ? RunBatch(*o, *batch) : RunOneDiagnosis(*o); };
+    action = [o, batch] {
+      if (batch->asked()) return RunBatch(*o, *batch);
+      if (!batch->out.empty() || batch->jobs != 0 || !batch->part.empty())
+        throw io::InputError("--out, --jobs, --part: expected --batch or --splits beside them");
+      return RunOneDiagnosis(*o);
+    };
   });
 }
 

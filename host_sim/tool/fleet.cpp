@@ -23,7 +23,10 @@ std::string WhyNoDate(const std::string& text) {
   const bool whole = (read == 2 || read == 3 || read == 6) && static_cast<std::size_t>(end) == text.size();
   const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};
-  if (whole && month > 0 && day > 0 && date.ok() && hour < 24 && minute < 60 && second < 60) return "";
+  // Dates are sorted as text, so each number has all its digits.
+  const bool padded = text.find_first_not_of("0123456789-T:Z") == std::string::npos &&
+                      (text.size() == 7 || text.size() == 10 || text.size() == 20);
+  if (whole && padded && month > 0 && day > 0 && date.ok() && hour < 24 && minute < 60 && second < 60) return "";
   return text + ": expected a date as 2026-03, 2026-03-01 or 2026-03-01T12:00:00Z";
 }
 

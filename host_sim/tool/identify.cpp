@@ -63,18 +63,18 @@ nlohmann::ordered_json PrintUnknowns(const codegen::Model& model, const calibrat
 
 // The arm under its control law along what the logs say was commanded; empty where that is not known.
 calibration::ClosedLoop Loop(const codegen::Model& model, const std::vector<calibration::Dataset>& data) {
-  const std::map<std::string, Eigen::MatrixXd> reference = calibration::References(data);
-  if (reference.empty() || model.robot().control.structure.empty()) return {};
-  return calibration::MakeClosedLoop(model, reference);
+  if (!calibration::HaveReferences(data) || model.robot().control.structure.empty()) return {};
+  return calibration::MakeClosedLoop(model);
 }
 
-// Where the robot file has no prior, a search still needs a start and ranges: those of weighted least squares. Returns
-// what to tell the user.
+// Where the robot file has no prior, a search still needs a start and ranges: those of least squares. Returns what to
+// tell the user.
 std::string RangesFromLeastSquares(calibration::Problem& problem) {
   constexpr double kDeviations = 10;
   calibration::Problem plain = problem;
   plain.covariance.resize(0, 0);
-  const calibration::Solution s = calibration::Solve(calibration::FindMethod("weighted_pseudo_inverse"), plain);
+  const char* const name = problem.model->nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse";
+  const calibration::Solution s = calibration::Solve(calibration::FindMethod(name), plain);
   const Eigen::VectorXd reach = kDeviations * s.covariance.diagonal().cwiseSqrt();
   problem.start = s.z;
   problem.lower = problem.lower.cwiseMax(s.z - reach), problem.upper = problem.upper.cwiseMin(s.z + reach);
@@ -109,7 +109,8 @@ int RunMethod(const MethodOptions& o) {
     problem.intervals = true;
     s = calibration::Solve(method, problem);
   }
-  nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}, {"method", method.name}};
+  nlohmann::ordered_json json{
+      {"robot", model.robot().name}, {"train", calibration::Sources(train)}, {"method", method.name}};
   json["parameters"] = PrintUnknowns(model, s);
   json["physical"] = s.physical, json["converged"] = s.converged, json["iterations"] = s.iterations;
   json["seconds"] = s.seconds, json["memory_bytes"] = s.memory_bytes, json["from_prior"] = s.from_prior;
@@ -193,7 +194,7 @@ void WriteTable(const PayloadOptions& o, const codegen::Model& model, std::vecto
   const calibration::Fit all = calibration::WeightedFit(known, calibration::Pointers(without));
   const calibration::Fit held =
       calibration::WeightedFit(known, calibration::Pointers(without), calibration::HardlyDetermined(known, all));
-  const analysis::IdentifiedBodies read = analysis::ReadBodies(known, all, held, without[0].s.t[1] - without[0].s.t[0]);
+  const analysis::IdentifiedBodies read = analysis::ReadBodies(known, all, held, without);
   PrintHeld(read);
   calibration::TableFile table = read.table;
   for (std::size_t j = 0; j < scale.size(); ++j) table.joint[j].torque_scale *= scale[j];
@@ -337,8 +338,8 @@ void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
 
 int RunIdentify(const IdentifyOptions& o) {
   if (o.payload.asked()) {
-    if (!o.train.empty() || !o.test.empty() || !o.method.empty())
-      throw io::InputError("--with, --without: expected no --train, --test or --method beside them");
+    if (!o.train.empty() || !o.test.empty() || !o.method.empty() || o.force || o.band_Hz > 0)
+      throw io::InputError("--with, --without: expected no --train, --test, --method, --force or --band beside them");
     if (!o.report.empty())
       throw io::InputError("--report: expected no --with or --without; a page shows a fit of --train");
     PayloadOptions payload = o.payload;
@@ -349,6 +350,7 @@ int RunIdentify(const IdentifyOptions& o) {
   if (o.train.empty()) throw io::InputError("--train: expected log(s) to fit");
   if (!o.method.empty() && !o.report.empty())
     throw io::InputError("--report: expected no --method; a page shows the weighted fit");
+  if (!o.method.empty() && o.force) throw io::InputError("--force: expected no --method; it is about the weighted fit");
   if (!o.method.empty() && !o.table.empty())
     throw io::InputError("--table-out: expected no --method; a table comes from the weighted fit");
   MethodOptions method{o.robot, o.method, o.test, o.json, o.format, o.train, o.band_Hz, o.cutoff_Hz, {}};
@@ -376,7 +378,7 @@ int RunIdentify(const IdentifyOptions& o) {
   } else if (!o.table.empty()) {
     throw io::InputError(o.robot + ": prior = \"none\": a table needs standard parameters, and those need a prior");
   }
-  nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", o.train}};
+  nlohmann::ordered_json json{{"robot", model.robot().name}, {"train", calibration::Sources(train)}};
   json.update(found.ToJson());
   if (!o.table.empty()) json["table_file"] = o.table;
   if (!o.test.empty()) {
@@ -387,7 +389,7 @@ int RunIdentify(const IdentifyOptions& o) {
     json.update(held_out.json);
     AddMotion(calibration::CompareMotion(model, found.all, calibration::Pointers(train), test), json);
   } else {
-    json.update(found.Compare(train[0], false, 0).json);
+    json.update(found.Compare(train[0], false, o.band_Hz).json);
   }
   WriteJson(o.json, json);
   if (!o.report.empty()) {

@@ -154,7 +154,8 @@ int RunReplay(const ReplayOptions& o) {
   json["start_samples"] = o.start_samples, json["step_s"] = o.step_s;
   calibration::Given given;
   if (o.refine.empty()) {
-    if (o.refits > 0) throw io::InputError("--refits: expected --refine LOG beside it");
+    if (o.cutoff_Hz > 0)
+      throw io::InputError("--cutoff: expected --refine LOG beside it; a simulation needs no derived speeds");
     given = ReadGiven(o.given, model);
   } else {
     if (!o.given.table.empty() || !o.given.payload.empty())
@@ -163,14 +164,17 @@ int RunReplay(const ReplayOptions& o) {
     const std::vector<calibration::Dataset> data = read.All(o.refine);
     const calibration::Fit fit = calibration::WeightedFit(model, calibration::Pointers(data));
     std::vector<replay::Training> training;
-    for (std::size_t l = 0; l < data.size(); ++l)
-      training.push_back(replay::MakeTraining(read.Raw(o.refine[l]), data[l]));
+    for (const calibration::Dataset& log : data)  // without those that are too short
+      training.push_back(replay::MakeTraining(read.Raw(log.source), log));
     const replay::Refined refined = replay::Refine(model, training, fit, o.refinement);
     PrintRefined(model, refined, fit);
-    json["refine"] = {
-        {"train", o.refine},        {"segment_s", refined.segment_s}, {"segments", refined.segments},
-        {"tries", refined.tries},   {"agree", refined.agree},         {"rms", verdict::ToList(refined.rms)},
-        {"seed", o.refinement.seed}};
+    json["refine"] = {{"train", calibration::Sources(data)},
+                      {"segment_s", refined.segment_s},
+                      {"segments", refined.segments},
+                      {"tries", refined.tries},
+                      {"agree", refined.agree},
+                      {"rms", verdict::ToList(refined.rms)},
+                      {"seed", o.refinement.seed}};
     for (const auto& l : refined.lengths)
       json["refine"]["lengths"].push_back({{"segment_s", l.segment_s}, {"left_out_error", l.error}});
     PutParameters(model, refined, json);
@@ -206,19 +210,22 @@ void AddReplay(CLI::App& app, Action& action) {
                    "initial position and speed come from a parabola through this many samples")
       ->check(Between(3, 1000000));
   verb->add_option("--step", o->step_s, "longest step of the simulation (s)")->check(Between(1e-6, 1.0));
-  verb->add_option("--refine", o->refine,
-                   "log(s) to fit the parameters to, by output error of many short runs (multiple shooting)");
+  auto* refine = verb->add_option(
+      "--refine", o->refine, "log(s) to fit the parameters to, by output error of many short runs (multiple shooting)");
   verb->add_option("--period", o->refinement.block_s,
                    "length of the blocks that are left out or drawn (s): the period of the training motion; default: "
                    "a quarter of each log")
-      ->check(AboveZero());
+      ->check(AboveZero())
+      ->needs(refine);
   verb->add_option("--segment", o->refinement.segment_s,
                    "length of a run (s); default: chosen by blocks of the training logs that are left out in turn")
-      ->check(AboveZero());
-  verb->add_option("--tries", o->refinement.tries, "starting points")->check(Between(1, 1000));
-  verb->add_option("--seed", o->refinement.seed, "of the random draws");
+      ->check(AboveZero())
+      ->needs(refine);
+  verb->add_option("--tries", o->refinement.tries, "starting points")->check(Between(1, 1000))->needs(refine);
+  verb->add_option("--seed", o->refinement.seed, "of the random draws")->needs(refine);
   verb->add_option("--refits", o->refits, "refit that often on blocks drawn anew, each time from drawn starting points")
-      ->check(Between(0, 1000));
+      ->check(Between(0, 1000))
+      ->needs(refine);
   AddCutoff(*verb, o->cutoff_Hz);
   verb->add_option("--json", o->json, "write everything here; --table takes it as parameters");
   verb->callback([o, &action] { action = [o] { return RunReplay(*o); }; });

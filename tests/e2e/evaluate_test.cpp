@@ -112,5 +112,25 @@ TEST(Replay, WritesErrorsAndParametersThatTableTakes) {
   ExpectOneLine(Tool({"replay", "--robot", "emps", "--refits", "2", log.string()}), 2, "--refine");
 }
 
+// The first log has two seconds: it is left out, and the second one is fitted as if it were alone.
+TEST(Replay, ALogThatIsTooShortToTrain_ChangesNothing) {
+  const fs::path folder = FreshFolder("replay_short"), log = WriteLog(folder), cut = folder / "short.csv";
+  std::ifstream in(log);
+  std::ofstream out(cut);
+  std::string line;
+  for (int k = 0; k <= 1000 && std::getline(in, line); ++k) out << line << '\n';
+  out.close();
+  const auto refined = [&](std::vector<std::string> train) {
+    const fs::path json = folder / "out.json";
+    std::vector<std::string> words{"replay",    "--robot", "emps",    "--json", json.string(), log.string(),
+                                   "--segment", "2.5",     "--tries", "1",      "--refine"};
+    words.insert(words.end(), train.begin(), train.end());
+    const Outcome o = Tool(words);
+    EXPECT_EQ(o.code, 0) << o.err;
+    return ReadJson(json);
+  };
+  EXPECT_EQ(refined({cut.string(), log.string()}), refined({log.string()}));
+}
+
 }  // namespace
 }  // namespace armcal::tests

@@ -148,6 +148,8 @@ TEST(Fleet, TablesAndHealthOfADrive_AreKeptWordForWord) {
   };
   calibration::TableFile made = calibration::DefaultTable(codegen::LoadModel("er20_like"));
   calibration::WriteTable(table, made);
+  for (const char* unpadded : {"2026-3", "2026-03-1"})
+    ExpectOneLine(ask({"health"}, unpadded), 2, "expected a date as 2026-03");
   EXPECT_EQ(ask({"flash", "--robot", "er20_like", "--table", table}, "2026-01").code, 0);
   EXPECT_EQ(ask({"backup", backup}, "").code, 0);
   made.blend_ms += 100;

@@ -37,6 +37,14 @@ TEST(Formats, ChosenTime_IsPrinted) {
   ExpectOneLine(Tool({"channels", log, "-o", map}), 2, "--overwrite");
 }
 
+TEST(Formats, AMapThatIsPrinted_NamesDefinitionsFromTheCurrentFolder) {
+  const fs::path folder = FreshFolder("formats_printed"), type = folder / "Status.msg";
+  std::ofstream(type) << "float64 value\n";
+  const Outcome o = Tool({"channels", (kLogs / "plain.db3.zst").string(), "--msg", type.string()});
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.out.find("messages = [\"" + fs::proximate(type).string() + "\"]"), std::string::npos) << o.out;
+}
+
 TEST(Formats, DefinitionOfAMessage_IsTakenByEveryVerbThatReadsLogs) {
   const fs::path folder = FreshFolder("formats_msg");
   const std::string log = (kLogs / "types.db3.zst").string(), map = (folder / "map.toml").string(),

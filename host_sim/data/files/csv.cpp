@@ -133,7 +133,7 @@ class ClockColumn {
     const auto [end, error] = std::from_chars(field.data(), field.data() + point, whole);
     const bool plain = error == std::errc() && end == field.data() + point && whole >= 0 &&
                        field.find_first_not_of("0123456789", std::min(point + 1, field.size())) == field.npos;
-    if (!begin_) begin_ = plain && value >= kLarge ? whole : 0;
+    if (!begin_) begin_ = plain && value >= kLargeTime ? whole : 0;
     if (*begin_ == 0) return value;
     if (!plain) return value - static_cast<double>(*begin_);
     const std::string part = "0" + std::string(field.substr(point)) + "0";
@@ -141,7 +141,6 @@ class ClockColumn {
   }
 
  private:
-  static constexpr double kLarge = 1e8;
   std::optional<std::int64_t> begin_;
 };
 

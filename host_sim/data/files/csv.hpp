@@ -18,13 +18,14 @@ struct NumericTable {
 // What a field without a number means: an empty one, or "nan".
 enum class Missing { kRefused, kNan };
 
+inline constexpr double kLargeTime = 1e8;  // in any unit: such as a time since 1970
+
 // Reads the columns whose name is `wanted` (all of them without it), in the order of the file. Fields are separated by
 // commas; blanks around a field, CRLF and a byte-order mark are accepted; blank lines at the end too.
 // InputError with file, line, column and what was expected: unreadable file, empty or repeated name, a row of another
 // length than the header, a wanted field that is not a finite number (with Missing::kNan a missing one reads as NaN).
-// Unwanted fields are not read at all. If the first number of the column `clock` is 1e8 or more, such as a time since
-// 1970, the column is read as the difference to the whole part of this number, because a double does not hold all its
-// digits.
+// Unwanted fields are not read at all. If the first number of the column `clock` is kLargeTime or more, the column is
+// read as the difference to the whole part of this number, because a double does not hold all its digits.
 NumericTable ReadCsv(const std::filesystem::path& path, const std::function<bool(const std::string& name)>& wanted = {},
                      Missing missing = Missing::kRefused, const std::string& clock = {});
 

@@ -161,6 +161,7 @@ Log MakeLog(RawLog raw, int min_samples) {
                          (rows > log.samples() ? " in " + std::to_string(rows) + " rows" : "") +
                          ", expected at least " + std::to_string(min_samples));
   }
+  if (std::abs(log.t[0]) >= files::kLargeTime) log.t.array() -= log.t[0];  // a sum with such a time would be rounded
   log.gaps = LostBehind(log.t);
   return std::move(raw.log);
 }
@@ -175,7 +176,7 @@ Log ReadLog(const std::filesystem::path& path, int min_samples) {
         const auto split = SplitName(name);
         return name == "t" || (split && IsQuantity(split->quantity));
       },
-      files::Missing::kNan);
+      files::Missing::kNan, "t");
   const ChannelMap map = OurNames(path.string(), table.names);
   return MakeLog(Raw(path.string(), {std::move(table), path.string() + ":1"}, map), min_samples);
 }

@@ -146,6 +146,15 @@ Guessed UnitOf(const Set& set) {
           fmt::format("no unit in the name; the largest value is {:.4g}", largest)};
 }
 
+std::string Quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) >= ' ' && c != '\x7F') out += c;
+  }
+  return out + '"';
+}
+
 // The time column of a file without topics, as lines of the map.
 std::string TimeLines(const Sight& sight) {
   const auto& table = sight.series.numbers;
@@ -171,17 +180,8 @@ std::string TimeLines(const Sight& sight) {
         break;
       }
   }
-  return fmt::format("[time]\ncolumn = {}\nunit = \"{}\"{}\n", "\"" + name + "\"", unit,
+  return fmt::format("[time]\ncolumn = {}\nunit = \"{}\"{}\n", Quoted(name), unit,
                      why.empty() ? "" : "  # guess: " + why);
-}
-
-std::string Quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) >= ' ' && c != '\x7F') out += c;
-  }
-  return out + '"';
 }
 
 std::string List(const std::vector<std::string>& texts) {

@@ -239,7 +239,9 @@ VectorXd ChooseCutoffs_Hz(const Log& log, const Sensitivity& sensitivity) {
     const double width = sensitivity.sign_width_radps.size() ? sensitivity.sign_width_radps[j] : INFINITY;
     for (int row = 0; row < log.joints; ++row) {
       const JointNoise seen{noise[j].position_rad, noise[row].torque_Nm, noise[j].band_Hz};
-      out[j] = std::min(out[j], QuietCutoff_Hz(seen, std::abs(sensitivity.inertia(row, j)), rate_Hz, width));
+      // A brake may hold the joint of this row. Its torque never changes, and nothing is compared with it.
+      const double inertia = seen.torque_Nm > 0 ? std::abs(sensitivity.inertia(row, j)) : 0;
+      out[j] = std::min(out[j], QuietCutoff_Hz(seen, inertia, rate_Hz, width));
     }
     out[j] = std::max(out[j], MotionCutoff_Hz(noise[j], rate_Hz));
   }

@@ -59,6 +59,7 @@ void Diagnosed::Judge(const logs::Log& log, const std::string& robot, const std:
   view.motion = calibration::CompareMotion(*model, finding.declared, calibration::Pointers(train), test);
   if (view.motion.repeats()) diagnosis->ConfirmNothing(verdict::MotionText(view.motion)[0]);
   view.model = model.get(), view.finding = &finding, view.test = &test, view.held_out = &held_out, view.train = &train;
+  view.left_at_samples = LeftAtSamples();
   if (!finding.terms.empty()) {
     const std::vector<calibration::Dataset> judged{test};
     view.term_torque = verdict::CommonRows(*model, judged, finding.declared).Beyond(diagnosis->TermTorque(test));
@@ -95,12 +96,8 @@ void Diagnosed::WriteJson() {
   const auto limited = [this](int j) {
     return std::any_of(whole_.begin(), whole_.end(), [j](const auto& log) { return log.averaged(j); });
   };
-  Eigen::VectorXd left;
-  for (int j = 0; j < model->joints(); ++j) {
-    if (!limited(j)) continue;
-    if (left.size() == 0) left = LeftAtSamples();
-    json["noise_floor"][static_cast<std::size_t>(j)] = left[j];
-  }
+  for (int j = 0; j < model->joints(); ++j)
+    if (limited(j)) json["noise_floor"][static_cast<std::size_t>(j)] = view.left_at_samples[j];
   for (const calibration::Dataset& log : train) {
     json["cutoff_Hz"].push_back(verdict::ToList(log.cutoff_Hz));
     for (const auto& [key, limits_Hz] : {std::pair{"band_Hz", &log.band_Hz}, std::pair{"saved_Hz", &log.saved_Hz}}) {

@@ -54,11 +54,12 @@ int IdentifiedBodies::FromPrior() const {
 }
 
 IdentifiedBodies ReadBodies(const codegen::Model& model, const calibration::Fit& all, const calibration::Fit& used,
-                            double step_s) {
+                            const std::vector<calibration::Dataset>& train) {
+  const Eigen::VectorXd noise = calibration::NoiseDensity(model, calibration::Pointers(train), used);
   IdentifiedBodies out;
   out.widths = calibration::EstimateLinkWidths(model, used);
   out.bodies = calibration::ReadOutWithWidths(model, used, out.widths);
-  out.table = calibration::IdentifiedTable(model, all, used, out.bodies, step_s);
+  out.table = calibration::IdentifiedTable(model, all, out.bodies, noise);
   // A fit within limits may cross others, and friction that depends on the load changes with the bodies.
   std::vector<calibration::Limit> limits;
   for (int round = 0; round < kMostRounds; ++round) {
@@ -67,7 +68,7 @@ IdentifiedBodies ReadBodies(const codegen::Model& model, const calibration::Fit&
     limits.insert(limits.end(), beyond.limits.begin(), beyond.limits.end());
     out.held.insert(out.held.end(), beyond.said.begin(), beyond.said.end());
     out.bodies = calibration::ReadOutWithWidths(model, used, out.widths, limits);
-    out.table = calibration::IdentifiedTable(model, all, used, out.bodies, step_s);
+    out.table = calibration::IdentifiedTable(model, all, out.bodies, noise);
   }
   for (int k = 0; k < model.body_parameters(); ++k) {
     calibration::TableRow& row = out.table.row[static_cast<std::size_t>(k)];
@@ -86,7 +87,7 @@ Identified::Identified(const codegen::Model& identified, const std::vector<calib
 void Identified::ReadOut(const std::vector<calibration::Dataset>& train, bool force) {
   used = calibration::WeightedFit(model, calibration::Pointers(train),
                                   force ? std::vector<int>{} : calibration::HardlyDetermined(model, all));
-  read = ReadBodies(model, all, used, train[0].s.t[1] - train[0].s.t[0]);
+  read = ReadBodies(model, all, used, train);
   has_bodies = true;
 }
 

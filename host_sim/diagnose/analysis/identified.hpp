@@ -26,9 +26,9 @@ struct IdentifiedBodies {
   std::vector<std::string> held;  // what the fit gave beyond the ceilings, a sentence for each
   int FromPrior() const;          // so many rows of the table rest mostly on the prior
 };
-// all: every parameter free; used: those held that the logs hardly determine. step_s: the logs' sample time.
+// all: every parameter free; used: those held that the logs hardly determine.
 IdentifiedBodies ReadBodies(const codegen::Model& model, const calibration::Fit& all, const calibration::Fit& used,
-                            double step_s);
+                            const std::vector<calibration::Dataset>& train);
 
 struct Identified {
   // InputError, before the fit: no body can be as the robot file's prior says.

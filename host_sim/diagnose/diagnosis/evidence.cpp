@@ -122,7 +122,9 @@ Thinned::Thinned(const Evidence& evidence, int rows, KeptColumns& columns) : all
     for (const RowIndex& each : evidence.index)
       if (each.averaged()) skip = std::max(skip, each.size() / rows);
   every |= 1;  // odd: a sample in the middle
-  reach = std::min(every / 2, static_cast<int>(0.5 * kSmooth_s / evidence.logs[0].dt[0]));
+  double longest_s = 0;
+  for (const Quantities& log : evidence.logs) longest_s = std::max(longest_s, log.dt[0]);
+  reach = std::min(every / 2, static_cast<int>(0.5 * kSmooth_s / longest_s));
   for (std::size_t log = 0; log < evidence.logs.size(); log += static_cast<std::size_t>(skip)) {
     data.push_back(std::make_unique<calibration::Dataset>());
     logs.push_back(PickSamples(evidence.logs[log], every, *data.back()));

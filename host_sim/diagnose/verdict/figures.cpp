@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 
 #include "codegen/src/io/input_error.hpp"
@@ -18,6 +19,8 @@ namespace armcal::verdict {
 using calibration::Exogeneity;
 
 namespace {
+
+constexpr double kRounding = 1e-12;
 
 std::string FileName(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
@@ -46,12 +49,22 @@ double RootMean(const std::vector<Predicted>& logs, const std::vector<Eigen::Mat
   return count ? std::sqrt(sum / count) : 0;
 }
 
-// Population standard deviation over every sample.
+// Over the joints that have the figure.
+double MeanOf(const Eigen::VectorXd& of_joint) {
+  double sum = 0;
+  int count = 0;
+  for (const double x : of_joint)
+    if (!std::isnan(x)) sum += x, ++count;
+  return count ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+// Population standard deviation over every sample; 0: it is rounding alone.
 double DeviationOf(const std::vector<Eigen::MatrixXd>& value, int joint) {
   double sum = 0, square = 0, count = 0;
   for (const Eigen::MatrixXd& v : value) sum += v.col(joint).sum(), count += static_cast<double>(v.rows());
   for (const Eigen::MatrixXd& v : value) square += (v.col(joint).array() - sum / count).square().sum();
-  return std::sqrt(square / count);
+  const double deviation = std::sqrt(square / count);
+  return deviation > kRounding * std::abs(sum / count) ? deviation : 0;
 }
 
 ErrorFigures FiguresOf(const std::vector<Predicted>& logs, const std::vector<Eigen::MatrixXd>& torque,
@@ -65,8 +78,9 @@ ErrorFigures FiguresOf(const std::vector<Predicted>& logs, const std::vector<Eig
     f.rms[j] = RootMean(logs, error, j, scored);
     f.rms_moving[j] = RootMean(logs, error, j, moving);
     f.relative[j] = f.rms_moving[j] / std::max(RootMean(logs, torque, j, moving), 1e-300);
-    f.nrmse[j] = RootMean(logs, error, j, [](const calibration::Dataset&, int) { return true; }) /
-                 std::max(DeviationOf(torque, j), 1e-300);
+    const double deviation = DeviationOf(torque, j);  // 0: a brake holds the joint
+    const double all = RootMean(logs, error, j, [](const calibration::Dataset&, int) { return true; });
+    f.nrmse[j] = deviation > 0 ? all / deviation : std::numeric_limits<double>::quiet_NaN();
   }
   return f;
 }
@@ -112,8 +126,7 @@ void PrintError(const HeldOutError& e, const codegen::Robot& robot, const std::s
   const auto add = [](std::vector<std::string>& row, const ErrorFigures& f, int j) {
     for (const double v : {f.rms[j], f.rms_moving[j]}) row.push_back(fmt::format("{:.4g}", v));
     row.push_back(fmt::format("{:.2f}", 100 * f.relative[j]));
-    row.push_back(fmt::format("{:.4f}", f.nrmse[j]));
-    row.push_back(fmt::format("{:.4f}", f.r2()[j]));
+    for (const double v : {f.nrmse[j], f.r2()[j]}) row.push_back(std::isnan(v) ? "-" : fmt::format("{:.4f}", v));
   };
   const bool band = e.band_Hz > 0;
   if (band)
@@ -127,7 +140,7 @@ void PrintError(const HeldOutError& e, const codegen::Robot& robot, const std::s
   fmt::print("{}", report::Text(t));
   if (e.full.rms.size() < 2) return;
   const auto mean = [](const ErrorFigures& f) {
-    return fmt::format("NRMSE {:.4f}, R2 {:.4f}", f.nrmse.mean(), f.r2().mean());
+    return fmt::format("NRMSE {:.4f}, R2 {:.4f}", MeanOf(f.nrmse), MeanOf(f.r2()));
   };
   fmt::print("mean of joints: {}{}\n", mean(e.full),
              band ? fmt::format("; below {:g} Hz: {}", e.band_Hz, mean(e.band)) : "");
@@ -142,13 +155,13 @@ nlohmann::ordered_json ToJson(const HeldOutError& e) {
                            {"moving_share", ToList(e.moving_share)},
                            {"nrmse", ToList(e.full.nrmse)},
                            {"r2", ToList(e.full.r2())},
-                           {"nrmse_mean", e.full.nrmse.mean()},
-                           {"r2_mean", e.full.r2().mean()}};
+                           {"nrmse_mean", MeanOf(e.full.nrmse)},
+                           {"r2_mean", MeanOf(e.full.r2())}};
   if (e.band_Hz > 0) {
     j["band_Hz"] = e.band_Hz, j["relative_moving_in_band"] = ToList(e.band.relative);
     j["rms_in_band"] = ToList(e.band.rms), j["rms_moving_in_band"] = ToList(e.band.rms_moving);
     j["nrmse_in_band"] = ToList(e.band.nrmse), j["r2_in_band"] = ToList(e.band.r2());
-    j["nrmse_mean_in_band"] = e.band.nrmse.mean(), j["r2_mean_in_band"] = e.band.r2().mean();
+    j["nrmse_mean_in_band"] = MeanOf(e.band.nrmse), j["r2_mean_in_band"] = MeanOf(e.band.r2());
   }
   return j;
 }

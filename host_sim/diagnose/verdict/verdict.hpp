@@ -30,6 +30,8 @@ struct DiagnosisView {
   calibration::Exogeneity exogeneity;               // of the training logs, with the terms in
   std::vector<std::vector<Separation>> separation;  // per term
   const std::vector<calibration::Dataset>* train = nullptr;
+  // [n] What the terms leave at the samples of the training logs, RMS where the joint moves.
+  Eigen::VectorXd left_at_samples;
   calibration::HeldOutMotion motion;
 };
 

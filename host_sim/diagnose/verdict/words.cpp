@@ -25,6 +25,19 @@ bool Apart(const std::vector<int>& a, const std::vector<int>& b) {
          std::none_of(a.begin(), a.end(), [&](int j) { return std::find(b.begin(), b.end(), j) != b.end(); });
 }
 
+// Averages have less noise than samples, and those of a lower band have less than those of a higher one.
+bool HasRowsOfOneKind(const DiagnosisView& v, int j) {
+  constexpr double kNear = 1.2;
+  const auto band_Hz = [j](const calibration::Dataset& log) {
+    return log.averaged(j) ? log.band_Hz[j] : double{INFINITY};
+  };
+  const double held_out_Hz = band_Hz(*v.test);
+  return std::all_of(v.train->begin(), v.train->end(), [&](const calibration::Dataset& log) {
+    const double own_Hz = band_Hz(log);
+    return own_Hz == held_out_Hz || (own_Hz < kNear * held_out_Hz && held_out_Hz < kNear * own_Hz);
+  });
+}
+
 }  // namespace
 
 bool AnyConfirmed(const diagnosis::Finding& f) {
@@ -34,10 +47,13 @@ bool AnyConfirmed(const diagnosis::Finding& f) {
 std::vector<Strange> StrangeJoints(const DiagnosisView& v) {
   constexpr double kMuch = 2;
   std::vector<Strange> out;
-  const Eigen::VectorXd left = calibration::RmsInBand(*v.test, v.held_out->after);
-  for (int j = 0; j < left.size(); ++j)
-    if (const double trained = v.finding->sigma[j]; trained > 0 && left[j] > kMuch * trained)
-      out.push_back({j, left[j], trained});
+  const Eigen::VectorXd in_band = calibration::RmsInBand(*v.test, v.held_out->after),
+                        at_samples = calibration::Rms(*v.test, v.held_out->after, true);
+  for (int j = 0; j < in_band.size(); ++j) {
+    const bool rows = HasRowsOfOneKind(v, j);
+    const double left = rows ? in_band[j] : at_samples[j], trained = rows ? v.finding->sigma[j] : v.left_at_samples[j];
+    if (trained > 0 && left > kMuch * trained) out.push_back({j, left, trained});
+  }
   return out;
 }
 

@@ -77,7 +77,9 @@ VectorXd Power(const VectorXd& y) {
 }  // namespace
 
 double FilteredAbove_Hz(const Dataset& data, int joint, const VectorXd& predicted) {
-  const VectorXd torque = Power(data.tau.col(joint)), model = Power(predicted);
+  const auto measured = data.tau.col(joint);
+  if (measured.minCoeff() == measured.maxCoeff()) return INFINITY;  // a brake holds the joint
+  const VectorXd torque = Power(measured), model = Power(predicted);
   if (torque.size() == 0) return INFINITY;
   // Three bins at a time: a single one may be empty by chance.
   const auto ratio = [&](Index k) { return torque.segment(k - 1, 3).sum() / (model.segment(k - 1, 3).sum() + 1e-300); };

@@ -31,8 +31,10 @@ struct Match {
   double needed = 0;    // RMS about its mean
 };
 
-// torque = scale needed + Coulomb, viscous, offset, over rows of one joint.
+// torque = scale needed + Coulomb, viscous, offset, over rows of one joint. A torque that never changes, as of a joint
+// that a brake holds, tells nothing.
 Match Compare(const VectorXd& torque, const VectorXd& needed, const VectorXd& speed) {
+  if (torque.minCoeff() == torque.maxCoeff()) return {};
   MatrixXd A(torque.size(), 4);
   A << needed, speed.cwiseSign(), speed, VectorXd::Ones(torque.size());
   const VectorXd x = A.colPivHouseholderQr().solve(torque);

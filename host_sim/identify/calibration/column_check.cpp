@@ -300,7 +300,9 @@ void CheckResting(const codegen::Model& model, const Dataset& log, const VectorX
   for (int j = 0; j < model.joints(); ++j) {
     if (log.s.q.col(j).maxCoeff() - log.s.q.col(j).minCoeff() > kRounding) continue;
     const double spread = std::sqrt((log.tau.col(j).array() - log.tau.col(j).mean()).square().mean());
-    if (left[j] > kResting * model.robot().joint[j].torque_limit_Nm && left[j] > kUnexplained * spread)
+    const double limit = model.robot().joint[j].torque_limit_Nm;
+    if (spread < kBraked * limit) continue;  // a brake may hold it
+    if (left[j] > kResting * limit && left[j] > kUnexplained * spread)
       throw io::InputError(
           fmt::format("{}: joint {}: position never changes, but its torque varies by {:.3g} that a "
                       "joint at rest does not explain (is the encoder stuck?)",

@@ -63,6 +63,11 @@ ColumnFit::ColumnFit(const codegen::Model& model, const std::vector<const Datase
     tau_.row(i) = d->tau.row(k);
     if (temperature) signals_.temp.row(i) = d->s.temp.row(k);
   }
+  for (int j = 0; j < n; ++j) {
+    const bool rests = std::none_of(data.begin(), data.end(), [j](const Dataset* d) { return d->used.col(j).any(); });
+    const double spread = std::sqrt((tau_.col(j).array() - tau_.col(j).mean()).square().mean());
+    braked_.push_back(rests && spread < kBraked * model.robot().joint[static_cast<std::size_t>(j)].torque_limit_Nm);
+  }
 }
 
 ColumnFit::Motion ColumnFit::Move(const ColumnChange& change) const {
@@ -116,7 +121,11 @@ ColumnFitResult ColumnFit::Fit(const Motion& motion, const ColumnChange& change)
     right.push_back(motion.A[at].transpose() * tau.back());
     out.spread[j] = std::sqrt((tau.back().array() - tau.back().mean()).square().mean());
   }
-  VectorXd sigma = out.spread.cwiseMax(1e-12);
+  const auto braked = [&](int j) { return braked_[static_cast<std::size_t>(change.tau[static_cast<std::size_t>(j)])]; };
+  VectorXd least = VectorXd::Constant(n, 1e-12);  // of sigma
+  for (int j = 0; j < n; ++j)
+    if (braked(j)) least[j] = model_.robot().joint[static_cast<std::size_t>(j)].torque_limit_Nm;
+  VectorXd sigma = out.spread.cwiseMax(least);
   MatrixXd H(columns, columns);
   VectorXd scale;
   Eigen::LDLT<MatrixXd> factor;
@@ -139,11 +148,11 @@ ColumnFitResult ColumnFit::Fit(const Motion& motion, const ColumnChange& change)
       const auto at = static_cast<std::size_t>(j);
       const VectorXd left = tau[at] - motion.A[at] * out.x(motion.column[at]);
       out.left[j] = std::sqrt(left.squaredNorm() / static_cast<double>(rows()));
-      sigma[j] = std::max(out.left[j], std::sqrt(kLeast) * out.spread[j] + 1e-12);
+      sigma[j] = std::max(out.left[j], std::sqrt(kLeast) * out.spread[j] + least[j]);
     }
   }
   for (int j = 0; j < n; ++j)
-    if (out.spread[j] > 0) out.log_left += 2 * std::log(sigma[j] / out.spread[j]);
+    if (out.spread[j] > 0 && !braked(j)) out.log_left += 2 * std::log(sigma[j] / out.spread[j]);
   out.covariance = scale.asDiagonal() * factor.solve(MatrixXd::Identity(columns, columns)) * scale.asDiagonal();
   return out;
 }

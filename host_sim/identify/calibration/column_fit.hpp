@@ -29,6 +29,8 @@ struct ColumnFitResult {
   Eigen::MatrixXd covariance;  // of x, as if the rows were independent
 };
 
+inline constexpr double kBraked = 0.01;  // of the torque limit: the torque of a joint that a brake holds varies less
+
 class ColumnFit {
  public:
   // Takes about `rows` rows, evenly out of all logs; a row counts if any joint's row of the log may be used. Declared
@@ -56,6 +58,7 @@ class ColumnFit {
   const codegen::Model& model_;
   codegen::Signals signals_;
   Eigen::MatrixXd tau_;
+  std::vector<char> braked_;  // [n] torque column of a joint that a brake holds: it does not follow the load
 };
 
 }  // namespace armcal::calibration

@@ -340,12 +340,13 @@ Eigen::VectorXd RmsInBand(const Dataset& d, const Eigen::MatrixXd& residual) {
   return rms;
 }
 
-std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& data) {
-  std::map<std::string, Eigen::MatrixXd> out;
-  for (const auto& d : data) {
-    if (d.reference.size() == 0) return {};
-    out.emplace(d.source, d.reference);
-  }
+bool HaveReferences(const std::vector<Dataset>& data) {
+  return std::all_of(data.begin(), data.end(), [](const Dataset& d) { return d.reference.size() > 0; });
+}
+
+std::vector<std::string> Sources(const std::vector<Dataset>& data) {
+  std::vector<std::string> out;
+  for (const Dataset& d : data) out.push_back(d.source);
   return out;
 }
 

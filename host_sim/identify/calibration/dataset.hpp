@@ -66,8 +66,11 @@ Eigen::VectorXd Rms(const Dataset& d, const Eigen::MatrixXd& residual, bool movi
 // The same of each joint's rows: averages where its band is limited, else the scored samples where it moves.
 Eigen::VectorXd RmsInBand(const Dataset& d, const Eigen::MatrixXd& residual);
 
-// Commanded positions of each log, by the log's name. Empty if a log has none.
-std::map<std::string, Eigen::MatrixXd> References(const std::vector<Dataset>& data);
+// Every log has commanded positions.
+bool HaveReferences(const std::vector<Dataset>& data);
+
+// The names of the logs.
+std::vector<std::string> Sources(const std::vector<Dataset>& data);
 
 std::vector<const Dataset*> Pointers(const std::vector<Dataset>& data);
 

@@ -56,10 +56,15 @@ void CheckClock(const logs::Log& log) {
 
 std::vector<std::string> CheckGaps(const logs::Log& log) {
   if (log.gaps.empty()) return {};
+  // Rows that reading has left out are not missing. A value may stand in several lines.
+  std::vector<double> lines;
+  for (int k = 0; k + 1 < log.samples(); ++k) lines.push_back(log.line_of(k + 1) - log.line_of(k));
+  const double lines_a_value = std::max(1.0, logs::Median(std::move(lines)));
   double missing = 0;
-  for (const int k : log.gaps) {  // rows that reading has left out are not missing
+  for (const int k : log.gaps) {
     const double steps = std::round((log.t[k + 1] - log.t[k]) / log.step_s());
-    missing += std::max(0.0, steps - static_cast<double>(log.line_of(k + 1) - log.line_of(k)));
+    const double values = std::round((log.line_of(k + 1) - log.line_of(k)) / lines_a_value);
+    missing += std::max(0.0, steps - values);
   }
   if (missing == 0) return {};
   const std::string text = missing == 1 ? "1 sample is missing"
@@ -174,7 +179,7 @@ SpeedMatch MatchSpeed(const logs::Log& log, int j) {
 
 // All joints agree on another time unit, or one joint's speed has another unit or sign.
 std::vector<std::string> CheckSpeedColumns(const codegen::Robot& robot, const logs::Log& log) {
-  constexpr double kTold = 0.7, kAlike = 0.2;
+  constexpr double kTold = 0.7, kAlike = 0.2, kRadps_rpm = 0.10471975511965977, kOfRpm = 0.02;
   if (log.qd.cols() != log.joints) return {};
   const auto near = [](double x, double y) { return std::abs(x / y - 1) < kAlike; };
   std::vector<std::string> notes;
@@ -186,10 +191,10 @@ std::vector<std::string> CheckSpeedColumns(const codegen::Robot& robot, const lo
     if (m.told < kTold) continue;
     slope.push_back(m.slope);
     if (near(m.slope, 1)) continue;
-    const char* looks = near(m.slope, -1)                    ? "; its sign looks wrong"
-                        : near(m.slope * kDegPerRad, 1)      ? "; it looks like deg/s"
-                        : near(m.slope, 0.10471975511965977) ? "; it looks like rpm"
-                                                             : "";
+    const char* looks = near(m.slope, -1)               ? "; its sign looks wrong"
+                        : near(m.slope * kDegPerRad, 1) ? "; it looks like deg/s"
+                        : near(m.slope, kRadps_rpm)     ? "; it looks like rpm"
+                                                        : "";
     notes.push_back(Joint(j) +
                     fmt::format("the logged speed is {:.3g} times that of the positions{}", 1 / m.slope, looks));
   }
@@ -201,9 +206,11 @@ std::vector<std::string> CheckSpeedColumns(const codegen::Robot& robot, const lo
       Fail(log, fmt::format("the logged speeds are {:.3g} times those of the positions; expected q and qd both in rad "
                             "or both in deg (units of the channel map)",
                             1 / y));
+  // Speeds in rpm are near a tenth, too.
+  const bool in_rpm = all_near(kRadps_rpm) && std::abs(logs::Median(slope) / kRadps_rpm - 1) < kOfRpm;
   for (const double factor : {10.0, 100.0, 1e3, 1e6, 1e9})
     for (const double y : {factor, 1 / factor})
-      if (all_near(y))
+      if (all_near(y) && !in_rpm)
         Fail(log,
              fmt::format("the positions move {:g} times {} than the logged speeds say (time step {:.3g} s); expected "
                          "time in s",

@@ -57,15 +57,15 @@ std::vector<int> HardlyDetermined(const codegen::Model& model, const Fit& fit) {
   return out;
 }
 
-TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const Fit& held, const PhysicalReadOut& bodies,
-                          double log_step_s) {
+TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const PhysicalReadOut& bodies,
+                          const VectorXd& noise_density) {
   TableFile t = DefaultTable(model);
   t.note = "identified";
   const auto& robot = model.robot();
   const double sample_s = robot.sample_ticks / robot.tick_rate_Hz;
   for (int j = 0; j < model.joints(); ++j) {
-    // white noise, averaged over another sample time
-    t.joint[j].sigma_Nm = held.sigma[j] * std::sqrt(log_step_s / sample_s);
+    // white noise, averaged over a sample time of the drive
+    t.joint[j].sigma_Nm = noise_density[j] / std::sqrt(sample_s);
     t.joint[j].torque_scale = 1 / (1 + bodies.x[model.columns() + j]);
   }
   for (int k = 0; k < model.body_parameters(); ++k) {

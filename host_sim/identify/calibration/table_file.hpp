@@ -40,9 +40,10 @@ inline constexpr double kFromPrior = 0.7;  // posterior / prior standard deviati
 TableFile DefaultTable(const codegen::Model& model);
 
 // An identification as a table. `held`: the fit that keeps at the prior those columns which the data hardly determine.
-// `all`: the fit that holds nothing. Bodies come from the physical read-out of `held`.
-TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const Fit& held, const PhysicalReadOut& bodies,
-                          double log_step_s);
+// `all`: the fit that holds nothing. Bodies come from the physical read-out of `held`. noise_density: as NoiseDensity
+// has it.
+TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const PhysicalReadOut& bodies,
+                          const Eigen::VectorXd& noise_density);
 
 // Friction and effect columns whose posterior / prior ratio is above kFromPrior.
 std::vector<int> HardlyDetermined(const codegen::Model& model, const Fit& fit);

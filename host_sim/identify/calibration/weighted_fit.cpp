@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "codegen/src/io/watch.hpp"
+#include "host_sim/data/logs/steps.hpp"
 #include "host_sim/identify/calibration/barrier_fit.hpp"
 
 namespace armcal::calibration {
@@ -135,6 +136,25 @@ Fit WeightedFit(const codegen::Model& model, const std::vector<const Dataset*>& 
   fit.prior_sd = prior.covariance.diagonal().cwiseSqrt();
   if (!prior.informative) fit.prior_sd.setConstant(std::numeric_limits<double>::infinity());
   return fit;
+}
+
+VectorXd NoiseDensity(const codegen::Model& model, const std::vector<const Dataset*>& data, const Fit& fit) {
+  VectorXd square = VectorXd::Zero(model.joints()), rows = square;
+  const auto limited = [&](int j) {
+    return std::any_of(data.begin(), data.end(), [j](const Dataset* d) { return d->averaged(j); });
+  };
+  for (const Dataset* d : data) {
+    const double step_s = logs::MedianStep(d->s.t) * d->per_sample;
+    const VectorXd left = Rms(*d, d->tau - Predict(model, *d, fit.x, fit.eta), true);
+    for (int j = 0; j < model.joints(); ++j) {
+      const double own = d->moving.col(j).sum(), sd = limited(j) ? left[j] : fit.sigma[j];
+      square[j] += own * sd * sd * step_s, rows[j] += own;
+    }
+  }
+  const codegen::Robot& robot = model.robot();
+  for (int j = 0; j < model.joints(); ++j)  // a joint that rests has the robot file's noise, which is that of one tick
+    if (rows[j] == 0) square[j] = std::pow(robot.joint[j].torque_noise_Nm, 2) / robot.tick_rate_Hz, rows[j] = 1;
+  return square.cwiseQuotient(rows).cwiseSqrt();
 }
 
 DataTerm LogsAbout(const Fit& fit, const VectorXd& x) {

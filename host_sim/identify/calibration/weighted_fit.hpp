@@ -50,6 +50,10 @@ struct PhysicalReadOut {
 // Half the weighted sum of squares of the logs about x. Its cost stays zero.
 DataTerm LogsAbout(const Fit& fit, const Eigen::VectorXd& x);
 
+// [n] N m sqrt(s): the deviation of one sample of the residual, times the root of the sample's time. A row of a joint
+// whose band is limited is an average, which has less noise; there the samples count in which the joint moves.
+Eigen::VectorXd NoiseDensity(const codegen::Model& model, const std::vector<const Dataset*>& data, const Fit& fit);
+
 // Throws io::InputError if a link of the prior is not physical (names it), or if the robot has prior = "none".
 PhysicalReadOut ReadOutPhysical(const codegen::Model& model, const Fit& fit);
 

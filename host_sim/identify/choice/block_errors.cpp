@@ -66,13 +66,17 @@ MatrixXd SquaresByStretch(const calibration::Dataset& log, const MatrixXd& resid
 
 Ratio Compare(const VectorXd& a, const VectorXd& b) {
   const auto ratio = [](double above, double below) { return std::sqrt(above / std::max(below, 1e-300)) - 1; };
+  std::vector<Index> told;  // stretches in which the joint has rows
+  for (Index k = 0; k < a.size(); ++k)
+    if (a[k] > 0 || b[k] > 0) told.push_back(k);
+  if (told.empty()) return {std::nan(""), std::nan(""), std::nan("")};
   std::mt19937_64 random(1);
-  std::uniform_int_distribution<Index> pick(0, a.size() - 1);
+  std::uniform_int_distribution<std::size_t> pick(0, told.size() - 1);
   std::vector<double> drawn;
   for (int draw = 0; draw < kDraws; ++draw) {
     double above = 0, below = 0;
-    for (Index k = 0; k < a.size(); ++k) {
-      const Index at = pick(random);
+    for (std::size_t k = 0; k < told.size(); ++k) {
+      const Index at = told[pick(random)];
       above += a[at], below += b[at];
     }
     drawn.push_back(ratio(above, below));

@@ -77,6 +77,8 @@ VectorXd CountRows(const Dataset& log) {
 // rows: of this joint, in all training logs.
 JointChoice Compared(const std::vector<OutOfFold>& judged, double rows) {
   JointChoice out;
+  if (std::none_of(judged.begin(), judged.end(), [](const OutOfFold& one) { return one.why.empty(); }))
+    out.failed = judged[0].why;
   double least = INFINITY;
   for (std::size_t l = 0; l < judged.size(); ++l) {
     LawError error;
@@ -120,11 +122,10 @@ Choice Choose(const codegen::Robot& robot, const codegen::Catalogue& records, co
       if (settings.progress)
         settings.progress((j + static_cast<double>(law + 1) / static_cast<double>(out.laws.size())) / robot.joints());
     }
-    if (std::none_of(judged.begin(), judged.end(), [](const OutOfFold& one) { return one.why.empty(); }))
-      throw io::InputError(train[0].source + ": joint " + std::to_string(j + 1) +
-                           ": no law can be fitted: " + judged[0].why);
     out.joint.push_back(Compared(judged, rows[j]));
   }
+  if (std::none_of(out.joint.begin(), out.joint.end(), [](const JointChoice& one) { return one.failed.empty(); }))
+    throw io::InputError(train[0].source + ": no law can be fitted: " + out.joint[0].failed);
   return out;
 }
 
@@ -165,7 +166,7 @@ std::vector<std::vector<HeldOut>> Judge(const Choice& choice, const codegen::Rob
     out.emplace_back();
     for (int j = 0; j < robot.joints(); ++j) {
       const auto rms = [&](const MatrixXd& squares) {
-        return std::sqrt(squares.col(j).sum() / std::max(1.0, rows[j]));
+        return rows[j] > 0 ? std::sqrt(squares.col(j).sum() / rows[j]) : std::nan("");
       };
       out.back().push_back({rms(b), rms(a), rms(torque), Compare(a.col(j), b.col(j))});
     }

@@ -26,8 +26,10 @@ struct JointChoice {
   std::vector<LawError> law;  // in the order of Choice::laws
   std::size_t best = 0, chosen = 0;
   bool differ = false;  // some law is beaten
+  std::string failed;   // why no law could be fitted; then nothing above holds
 };
 
+// NaN where the joint has no row of the log.
 struct HeldOut {
   double plain_Nm = 0, chosen_Nm = 0, torque_Nm = 0;  // RMS where the joint moves, in the band that is fitted
   Ratio over_plain;                                   // of the errors
@@ -44,8 +46,8 @@ struct ChooseSettings {
 };
 
 // Each joint's torque is fitted by itself, by least squares and without a prior, with each law in turn. The joint takes
-// the law with the fewest parameters that is not beaten by the best one. InputError: no law could be fitted, or a log
-// is shorter than ten stretches of half a second.
+// the law with the fewest parameters that is not beaten by the best one. InputError: no joint has a law that could be
+// fitted, or a log is shorter than ten stretches of half a second.
 Choice Choose(const codegen::Robot& robot, const codegen::Catalogue& records,
               const std::vector<calibration::Dataset>& train, const ChooseSettings& settings = {});
 

@@ -139,14 +139,12 @@ LoopRun LoopSimulator::Run(const VectorXd& t, const MatrixXd& reference, const V
   return out;
 }
 
-ClosedLoop MakeClosedLoop(const codegen::Model& model, std::map<std::string, MatrixXd> reference,
-                          const LoopSettings& settings) {
+ClosedLoop MakeClosedLoop(const codegen::Model& model, const LoopSettings& settings) {
   const auto simulator = std::make_shared<LoopSimulator>(model, settings);
-  return [simulator, reference = std::move(reference)](const Dataset& log, const VectorXd& z) {
-    const auto it = reference.find(log.source);
-    if (it == reference.end() || it->second.rows() != log.samples())
+  return [simulator](const Dataset& log, const VectorXd& z) {
+    if (log.reference.rows() != log.samples())
       throw io::InputError(log.source + ": expected a reference (qref) for every sample");
-    return simulator->Run(log.s.t, it->second, z).s;
+    return simulator->Run(log.s.t, log.reference, z).s;
   };
 }
 

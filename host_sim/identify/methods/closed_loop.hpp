@@ -48,9 +48,8 @@ class LoopSimulator {
   Eigen::VectorXd q_, qd_, qdd_, tau_;
 };
 
-// For Problem::closed_loop: one simulation a call, reference by the log's `source`. InputError for a log without one.
-ClosedLoop MakeClosedLoop(const codegen::Model& model, std::map<std::string, Eigen::MatrixXd> reference,
-                          const LoopSettings& settings = {});
+// For Problem::closed_loop: one simulation a call, along the log's `reference`. InputError for a log without one.
+ClosedLoop MakeClosedLoop(const codegen::Model& model, const LoopSettings& settings = {});
 
 // The training logs with their signals replaced by those of a simulated arm.
 class LoopLogs {

@@ -264,12 +264,11 @@ std::vector<Dataset> SmoothedInstruments(const std::vector<const Dataset*>& data
 namespace {
 
 // Empty where the arm that the robot file describes does not follow its reference in simulation.
-std::vector<Dataset> Simulated(const codegen::Model& model, const std::vector<Dataset>& data,
-                               const std::map<std::string, MatrixXd>& reference, const VectorXd& z) {
+std::vector<Dataset> Simulated(const codegen::Model& model, const std::vector<Dataset>& data, const VectorXd& z) {
   if (model.robot().control.structure.empty() || model.states() > 0) return {};
   Problem problem = MakeProblem(model, Pointers(data));
   try {
-    problem.closed_loop = MakeClosedLoop(model, reference);
+    problem.closed_loop = MakeClosedLoop(model);
     return SimulatedInstruments(problem, z);
   } catch (const io::InputError&) {
     return {};  // then the reference itself serves
@@ -280,13 +279,13 @@ std::vector<Dataset> Simulated(const codegen::Model& model, const std::vector<Da
 
 Exogeneity CheckExogeneity(const codegen::Model& model, const std::vector<Dataset>& data, const VectorXd& z,
                            Instruments best) {
-  const std::map<std::string, MatrixXd> reference = References(data);
+  const bool commanded = HaveReferences(data);
   std::string kind = kSimulatedLoop;
   std::vector<Dataset> instruments;
-  if (best == Instruments::kSimulated && !reference.empty()) instruments = Simulated(model, data, reference, z);
+  if (best == Instruments::kSimulated && commanded) instruments = Simulated(model, data, z);
   if (instruments.empty()) {
-    kind = reference.empty() ? kSmoothedPositions : kCommandedMotion;
-    instruments = reference.empty() ? SmoothedInstruments(Pointers(data)) : ReferenceInstruments(Pointers(data));
+    kind = commanded ? kCommandedMotion : kSmoothedPositions;
+    instruments = commanded ? ReferenceInstruments(Pointers(data)) : SmoothedInstruments(Pointers(data));
   }
   Exogeneity e = TestExogeneity(model, Pointers(data), instruments, z);
   e.instruments = kind;

@@ -124,7 +124,10 @@ class Shooting {
     VectorXd e;
     if (!Errors(segments, VectorXd::Ones(blocks()), w, e)) return false;
     scale_ = JointRms(e, segments.size());
-    return scale_.allFinite() && scale_.minCoeff() > 0;
+    const double largest = scale_.maxCoeff();
+    for (double& s : scale_)
+      if (s == 0) s = largest;  // friction holds the joint at rest
+    return scale_.allFinite() && largest > 0;
   }
   VectorXd JointRms(const VectorXd& errors, std::size_t segments) const {
     const Eigen::Index n = model_.joints();
@@ -145,9 +148,25 @@ class Shooting {
       if (!Errors(whole, VectorXd::Ones(blocks()), w, e)) return std::numeric_limits<double>::infinity();
       sum += JointRms(e, 1).cwiseAbs2();
     }
-    const MatrixXd& q = logs_[0].record.q;
-    const VectorXd spread = ((q.rowwise() - q.colwise().mean()).colwise().squaredNorm() / q.rows()).cwiseSqrt();
-    return std::sqrt((sum / blocks()).cwiseQuotient(spread.cwiseAbs2().cwiseMax(1e-300)).mean());
+    const VectorXd variance = Variance();
+    double relative = 0;
+    int moving = 0;
+    for (Eigen::Index j = 0; j < sum.size(); ++j)
+      if (variance[j] > 0) relative += sum[j] / blocks() / variance[j], ++moving;
+    return std::sqrt(relative / moving);
+  }
+
+  // Of each joint's position over all logs; 0: the joint rests in all of them.
+  VectorXd Variance() const {
+    VectorXd sum = VectorXd::Zero(model_.joints());
+    double samples = 0;
+    for (const Training& log : logs_) {
+      const MatrixXd& q = log.record.q;
+      for (Eigen::Index j = 0; j < q.cols(); ++j)
+        if (q.col(j).minCoeff() < q.col(j).maxCoeff()) sum[j] += (q.col(j).array() - q.col(j).mean()).square().sum();
+      samples += static_cast<double>(q.rows());
+    }
+    return sum / samples;
   }
 
   VectorXd Drawn(std::mt19937_64& random) const {

@@ -131,7 +131,7 @@ class Bench {
     Draw draw{codegen::Model(DrawPrior(arm_, error_, seed), settings_.records), {}};
     draw.log[kFiltered] = Measured(Filtered(wanted_.t, q), tau);
     draw.log[kPlain] = Measured(Differentiated(wanted_.t, q), tau);
-    for (calibration::Dataset& log : draw.log) log.source = kLog;
+    for (calibration::Dataset& log : draw.log) log.source = kLog, log.reference = wanted_.q;
     draw.log[kFourier] = calibration::FourierFit(draw.prior, draw.log[kPlain], period_s_);
     return draw;
   }
@@ -140,7 +140,7 @@ class Bench {
     const calibration::Dataset& log = draw.log[signal];
     calibration::Problem p = WithPrior(draw.prior, {&log}, RelativeDeviation(error_));
     if (!c.prior) p.covariance.resize(0, 0);
-    p.closed_loop = calibration::MakeClosedLoop(draw.prior, {{kLog, wanted_.q}}, {feedforward_, false});
+    p.closed_loop = calibration::MakeClosedLoop(draw.prior, {feedforward_, false});
     p.stop = settings_.stop;
     Attempt attempt = Try(calibration::FindMethod(c.method), p);
     if (!attempt.solution) why = attempt.why;

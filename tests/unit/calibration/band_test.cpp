@@ -94,6 +94,12 @@ TEST(Band, ALag_ABelt_AndASmoothMotion_AreNoFilter) {
   EXPECT_EQ(FilteredAbove_Hz(OneJoint(smooth + noise), 0, smooth), INFINITY);
 }
 
+TEST(Band, ATorqueThatNeverChanges_WasNotFiltered) {  // a brake holds the joint
+  const VectorXd motion = LowPass(White(10, 1), 3);
+  for (const double held : {0.0, 0.3})
+    EXPECT_EQ(FilteredAbove_Hz(OneJoint(VectorXd::Constant(motion.size(), held)), 0, motion), INFINITY);
+}
+
 TEST(Band, NoiseOfTheTorque_IsNoLimit) {
   const VectorXd motion = LowPass(White(6, 1), 2);
   EXPECT_EQ(AgreedBand_Hz(Transfer(OneJoint(motion + White(7, 1)), 0, motion)), INFINITY);

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/identify/calibration/body_check.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
@@ -113,6 +115,13 @@ TEST_F(LogCheck, OfTimeInAnotherUnit_TheLoggedSpeedTells) {
   ExpectRefused("10 times faster");
 }
 
+TEST_F(LogCheck, OfSpeedsInRpm_SaysSoAndReadsTheLog) {  // 1 rpm is 0.105 rad/s, nearly a tenth
+  log_.qd = data_.s.qd * (60 / (2 * std::numbers::pi));
+  const SignalCheck check = CheckSignals(arm_.model().robot(), log_);
+  ASSERT_EQ(check.notes.size(), 2u);
+  for (const std::string& note : check.notes) EXPECT_NE(note.find("rpm"), std::string::npos) << note;
+}
+
 TEST_F(LogCheck, OfAnEncoderThatSticksForASecond_NamesIt) {
   Eigen::Index fastest = 0;
   (void)data_.s.qd.col(0).segment(500, 1000).cwiseAbs().maxCoeff(&fastest);
@@ -147,6 +156,10 @@ TEST_F(LogCheck, OfAFewMissingSamples_IsALineAndOfManyARefusal) {
   EXPECT_NE(notes[0].find("20 samples are missing"), std::string::npos) << notes[0];
   log_ = without(1000, 600);
   ExpectRefused("600 samples are missing");
+  // Each value stood in four lines of the file, and the gap is one line wide there.
+  log_.line.resize(log_.samples());
+  for (int k = 0; k < log_.samples(); ++k) log_.line[k] = 2 + 4 * k;
+  ExpectRefused("600 samples are missing");
 }
 
 TEST_F(LogCheck, OfExchangedTorqueColumns_NamesThem) {
@@ -166,6 +179,20 @@ TEST_F(LogCheck, OfATorqueThatTheBodiesCannotNeed_NamesTheJoint) {
   }
   data_.tau = 0.5 * tau;  // the gear ratio or the motor may be another one
   EXPECT_EQ(Said(), "");
+}
+
+// A brake holds joint 2. Its torque tells neither its unit nor whether columns are exchanged; those of joint 1 do.
+TEST_F(LogCheck, OfABrakedJoint_JudgesTheOthers) {
+  data_ = arm_.Run(20, 2, {}, 0.5, {1});
+  data_.source = "run.csv";
+  const Eigen::MatrixXd tau = data_.tau;
+  for (const double held : {0.0, 7.3}) {
+    data_.tau = tau;
+    data_.tau.col(1).setConstant(held);
+    EXPECT_EQ(Said(), "") << held;
+    data_.tau.col(0).swap(data_.tau.col(1));
+    EXPECT_NE(Said(), "") << held;
+  }
 }
 
 // Rows that can be fitted are what a fit is made of: without any there is none, and a moving joint without any is

@@ -123,10 +123,11 @@ TEST(TableFile, OfADriveThatReadsAQuarterTooMuch_ScalesByFourFifths) {
   read.x = fit.x;
   read.x[model.columns() + 1] = 0.25;
   const double sample_s = model.robot().sample_ticks / model.robot().tick_rate_Hz;
-  const TableFile t = IdentifiedTable(model, fit, fit, read, 4 * sample_s);
+  const TableFile t =
+      IdentifiedTable(model, fit, read, Eigen::VectorXd::Constant(model.joints(), 2 * std::sqrt(sample_s)));
   EXPECT_DOUBLE_EQ(t.joint[1].torque_scale, 0.8);
   EXPECT_DOUBLE_EQ(t.joint[0].torque_scale, 1);
-  EXPECT_DOUBLE_EQ(t.joint[1].sigma_Nm, 2);  // a row of the log is the mean of four samples
+  EXPECT_DOUBLE_EQ(t.joint[1].sigma_Nm, 2);
 }
 
 TEST(TableFile, AnotherSchemaOrSize_IsRefused) {

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/identify/calibration/band.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
 #include "host_sim/identify/calibration/weighted_fit.hpp"
 #include "tests/unit/calibration/synthetic_arm.hpp"
@@ -102,6 +103,21 @@ TEST(WeightedFit, AJointThatStandsStill_LeavesItsFrictionToThePrior) {
     EXPECT_EQ(fit.ratio(c) > kFromPrior, still) << name << " " << fit.ratio(c);
     EXPECT_EQ(std::count(hardly.begin(), hardly.end(), c), still ? 1 : 0) << name;
   }
+}
+
+// A row of joint 1 is an average over some twenty samples, and joint 3 rests. The noise of one sample is drawn, at 125
+// Hz; that of a joint that rests is the robot file's, of one tick.
+TEST(NoiseDensity, IsThatOfASample_WhereRowsAreAveragesToo) {
+  SyntheticArm arm(Er20(), 1);
+  Dataset d = arm.Run(40, 101, {}, 0.5, {2});
+  d.band_Hz.setConstant(6, INFINITY), d.band_Hz[0] = 6;
+  d.average.resize(6), d.average[0] = AverageRows(d, 0);
+  const Fit fit = WeightedFit(arm.model(), {&d});
+  EXPECT_LT(fit.sigma[0], 0.5 * arm.noise_Nm(0));
+  const VectorXd density = NoiseDensity(arm.model(), {&d}, fit);
+  for (const int j : {0, 1, 3, 4, 5}) EXPECT_NEAR(density[j], arm.noise_Nm(j) / std::sqrt(125), 0.06 * density[j]) << j;
+  const codegen::Robot& robot = arm.model().robot();
+  EXPECT_DOUBLE_EQ(density[2], robot.joint[2].torque_noise_Nm / std::sqrt(robot.tick_rate_Hz));
 }
 
 TEST(WeightedFit, HeldColumns_StayAtThePrior) {

@@ -71,6 +71,25 @@ TEST(Choose, TheErrorOfTheTrueLaw_IsTheNoise) {
   }
 }
 
+TEST(Choose, AJointThatRests_IsNotJudged_AndTheOthersAre) {
+  const codegen::Robot robot = TwoLink();
+  tests::SyntheticArm arm(robot, 3);
+  const auto friction = [](const State& s) {
+    return s.joint != 0 ? 0 : 0.1 * std::abs(s.tau_rigid) * (s.qd > 0 ? 1 : -1);
+  };
+  const auto run = [&](double seconds, std::uint64_t seed, const std::vector<int>& still) {
+    return std::vector<calibration::Dataset>{arm.Run(seconds, seed, friction, 0.5, still)};
+  };
+  const std::vector<calibration::Dataset> train = run(30, 11, {1});
+  const Choice choice = Choose(robot, tests::Records(), train);
+  EXPECT_NE(choice.joint[1].failed, "");
+  EXPECT_EQ(choice.joint[0].failed, "");
+  EXPECT_EQ(choice.laws[choice.joint[0].chosen].name, "load_friction");
+  const HeldOut rests = Judge(choice, robot, tests::Records(), train, run(20, 12, {1}))[0][1];
+  EXPECT_TRUE(std::isnan(rests.over_plain.value) && std::isnan(rests.plain_Nm));
+  EXPECT_THROW((void)Choose(robot, tests::Records(), run(30, 13, {0, 1})), io::InputError);
+}
+
 TEST(Choose, ALogThatIsTooShort_AndARobotWithALawOfItsOwn_AreRefused) {
   const codegen::Robot robot = TwoLink();
   tests::SyntheticArm arm(robot, 3);
@@ -95,6 +114,10 @@ TEST(BlockErrors, AnInterval_KnowsWhetherTheDifferenceIsEverywhere) {
   const Ratio once = Compare(one, b);
   EXPECT_GT(once.value, 0.1);
   EXPECT_EQ(once.low, 0);
+  Eigen::VectorXd few = Eigen::VectorXd::Zero(30);
+  few.tail(2) = b.tail(2);  // the joint rests in the other stretches
+  EXPECT_NEAR(Compare(4 * few, few).low, 1, 1e-12);
+  EXPECT_TRUE(std::isnan(Compare(0 * few, 0 * few).value));
 }
 
 // What a fold leaves out and what it is judged on are the same stretches.

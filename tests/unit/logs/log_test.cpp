@@ -1,6 +1,7 @@
 // logs tests - read what was written, and get one line for each kind of bad file.
 #include "host_sim/data/logs/log.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/unit/files/temporary_folder.hpp"
@@ -69,6 +70,15 @@ TEST(Log, ColumnsInAnyOrder_BlanksCrlfAndByteOrderMark_AreRead) {
   EXPECT_EQ(log.q(9, 0), 0.25);
   EXPECT_EQ(log.tau(0, 0), 1.5);
   EXPECT_EQ(log.ignored, std::vector<std::string>{"remark"});
+}
+
+// A double holds such a time to a quarter of a microsecond. The file has all its digits.
+TEST(Log, TimeSince1970_CountsFromTheFirstWholeSecond) {
+  const TemporaryFolder folder;
+  std::string text = "t,q1,tau1\n";
+  for (int k = 0; k < 10; ++k) text += fmt::format("1763980000.{:07},0,1\n", 1234567 + 2500 * k);
+  const Log log = ReadLog(folder.Write("log.csv", text), 2);
+  for (int k = 0; k < 10; ++k) EXPECT_NEAR(log.t[k], 0.1234567 + 0.00025 * k, 1e-12);
 }
 
 TEST(Log, GapsInTime_AreListed) {

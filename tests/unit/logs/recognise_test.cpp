@@ -53,6 +53,16 @@ TEST(Recognise, UnitsOfNames_AreCertain_OthersAreGuesses) {
   EXPECT_TRUE(has("[temp]\ncolumn = \"motorTemp{0}\"\n")) << map;
 }
 
+TEST(Recognise, NamesInQuotes_AreWrittenSoThatTheMapReadsThem) {
+  const TemporaryFolder folder;
+  std::string text = "\"time\",\"q1\",\"tau1\"\n";
+  for (int k = 0; k < 300; ++k) text += std::to_string(0.004 * k) + "," + std::to_string(0.01 * k) + ",3\n";
+  const auto path = folder.Write("log.csv", text);
+  const Log log = ReadLog(path, ReadChannelMap(folder.Write("map.toml", Recognise(LookAt(path, {}), "log", {}).map)));
+  EXPECT_EQ(log.samples(), 300);
+  EXPECT_EQ(log.q(7, 0), 0.07);
+}
+
 TEST(Recognise, TimeWithoutAUnit_HasTheOneThatGivesAnUsualRate) {
   const TemporaryFolder folder;
   for (const auto& [step, unit] : {std::pair{"0.004", "s"}, {"4", "ms"}, {"4000", "us"}, {"4000000", "ns"}}) {

@@ -189,6 +189,18 @@ TEST(Signals, CutOff_IsTheHighestThatKeepsEncoderNoiseBelowItsShare) {
   EXPECT_EQ(ChosenCutoff_Hz({0, 3.0}, inertia, 100), 40);
 }
 
+// Joint 2 is held by a brake. Its torque has no noise, and that asks nothing of joint 1, which moves it.
+TEST(Signals, CutOff_OfAJointBesideABrakedOne_IsItsOwn) {
+  const Log own = MakeLog({{0.3, 1.1, 2.7}}, Uniform(40, 250), 5e-6, 3.0);
+  Log both = own;
+  both.joints = 2;
+  both.q.conservativeResize(Eigen::NoChange, 2), both.tau.conservativeResize(Eigen::NoChange, 2);
+  both.q.col(1).setConstant(0.4), both.tau.col(1).setConstant(1.5);
+  const double alone_Hz = ChooseCutoffs_Hz(own, {40.0 * Eigen::MatrixXd::Identity(1, 1)})[0];
+  EXPECT_GT(alone_Hz, 21);
+  EXPECT_EQ(ChooseCutoffs_Hz(both, {(Eigen::Matrix2d() << 40, 8, 8, 5).finished()})[0], alone_Hz);
+}
+
 TEST(Signals, NoiseOfEncoderAndTorque_AreFoundUnderMotion) {
   const MultiSine motion{{0.3, 1.1, 2.7}};
   const double step = 2e-5;

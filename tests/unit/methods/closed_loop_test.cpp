@@ -107,7 +107,7 @@ TEST(ClosedLoop, WithoutAControlLawOrAReference_IsRefused) {
   EXPECT_THROW(LoopSimulator loop(arm.model()), io::InputError);
   SyntheticArm controlled(tests::TwoLinkWithControl(), 1);
   const Dataset d = controlled.Run(2, 2);
-  const ClosedLoop loop = MakeClosedLoop(controlled.model(), {});
+  const ClosedLoop loop = MakeClosedLoop(controlled.model());
   EXPECT_THROW(loop(d, tests::Truth(controlled)), io::InputError);
   const Problem without = MakeProblem(controlled.model(), {&d});
   EXPECT_THROW(InstrumentalVariable(without), io::InputError);

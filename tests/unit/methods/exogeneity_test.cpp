@@ -42,7 +42,7 @@ TEST(Exogeneity, NoiseOfTheTorqueAlone_FailsAsOftenAsTheLevelSays) {
   const Bench bench;
   const auto reference = ReferenceInstruments({&bench.clean});
   Problem problem = tests::ProblemOf(bench.arm, {&bench.clean});
-  problem.closed_loop = MakeClosedLoop(bench.arm.model(), {{"loop", bench.reference.s.q}});
+  problem.closed_loop = MakeClosedLoop(bench.arm.model());
   const auto simulated = SimulatedInstruments(problem, bench.start);  // an arm 30 % off
   for (const auto* instruments : {&reference, &simulated})
     for (const double correlation : {0.0, 0.9}) {
@@ -69,7 +69,7 @@ TEST(Exogeneity, NoiseOfTheDerivedAccelerations_FailsWithEveryKindOfInstrument) 
   for (int draw = 0; draw < kDraws; ++draw) {
     const Dataset d = tests::Measured(bench.arm, bench.reference, 3e-4, 1, 50 + draw);  // 7 rad/s^2 of noise in qdd
     Problem problem = tests::ProblemOf(bench.arm, {&d});
-    problem.closed_loop = MakeClosedLoop(bench.arm.model(), {{"loop", bench.reference.s.q}});
+    problem.closed_loop = MakeClosedLoop(bench.arm.model());
     const Exogeneity e = bench.Test(d, ReferenceInstruments({&d}));
     by_reference += !e.passed();
     by_simulation += !bench.Test(d, SimulatedInstruments(problem, bench.start)).passed();

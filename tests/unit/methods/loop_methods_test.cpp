@@ -22,7 +22,7 @@ TEST(InstrumentalVariable, NoiseInPosition_BiasesLeastSquaresAndNotTheInstrument
     const Dataset d = tests::Measured(arm, reference, 3e-4, 1, 50 + draw);
     Problem p = tests::ProblemOf(arm, {&d});
     p.covariance.resize(0, 0);  // (17) as printed: nobody knows anything
-    p.closed_loop = MakeClosedLoop(arm.model(), {{"loop", reference.s.q}});
+    p.closed_loop = MakeClosedLoop(arm.model());
     const Solution iv = InstrumentalVariable(p);
     EXPECT_TRUE(iv.converged) << iv.remark;
     EXPECT_LE(iv.iterations, 5);
@@ -42,7 +42,7 @@ TEST(InstrumentalVariable, WithThePrior_SolvesForStandardParametersToo) {
   const Dataset reference = arm.Run(10, 2);
   const Dataset d = tests::Measured(arm, reference, 1e-4, 1, 7);
   Problem p = tests::ProblemOf(arm, {&d});
-  p.closed_loop = MakeClosedLoop(arm.model(), {{"loop", reference.s.q}});
+  p.closed_loop = MakeClosedLoop(arm.model());
   const Solution iv = InstrumentalVariable(p);
   EXPECT_TRUE(iv.converged) << iv.remark;
   EXPECT_LT(tests::TorqueError(arm, reference, iv.z), 0.25);
@@ -64,7 +64,7 @@ TEST(InstrumentalVariable, OfAShortLogWithoutNoiseInPosition_IsTheBayesUpdateOfT
   const Dataset reference = arm.Run(2, 4);
   const Dataset d = tests::Measured(arm, reference, 0, 1, 5);
   Problem p = tests::ProblemOf(arm, {&d});
-  p.closed_loop = MakeClosedLoop(arm.model(), {{"loop", reference.s.q}});
+  p.closed_loop = MakeClosedLoop(arm.model());
   const Solution iv = InstrumentalVariable(p);
   EXPECT_TRUE(iv.converged) << iv.remark;
   MatrixXd covariance, ignored;
@@ -83,7 +83,7 @@ TEST(Didim, FindsTheParametersWithoutMeasuredPositions) {
   d.s.q.setConstant(1), d.s.qd.setZero(), d.s.qdd.setZero();  // what was measured must not matter
   Problem p = tests::ProblemOf(arm, {&d});
   p.covariance.resize(0, 0);
-  p.closed_loop = MakeClosedLoop(arm.model(), {{"loop", reference.s.q}});
+  p.closed_loop = MakeClosedLoop(arm.model());
   const Solution s = Didim(p);
   EXPECT_TRUE(s.converged) << s.remark;
   EXPECT_LT(tests::WorstDeviation(arm, s), 4);               // a dozen Gaussian errors pass 4 sd once in 1300 runs
@@ -98,7 +98,7 @@ TEST(Didim, ATorqueThatTheModelLacks_ShowsInTheEstimate) {  // planted
   d.tau.col(1) += 0.5 * d.s.qd.col(1).cwiseAbs2();
   Problem p = tests::ProblemOf(arm, {&d});
   p.covariance.resize(0, 0);
-  p.closed_loop = MakeClosedLoop(arm.model(), {{"loop", reference.s.q}});
+  p.closed_loop = MakeClosedLoop(arm.model());
   EXPECT_GT(tests::WorstDeviation(arm, Didim(p)), 4);
 }
 

@@ -52,6 +52,19 @@ TEST(HeldOut, SeveralLogs_AreOneRecordWithOneMean) {
   EXPECT_NEAR(e.full.nrmse[0], std::sqrt(0.5) / 10, 1e-4);  // alone each has no spread at all
 }
 
+// Joint 1 is that of Case(10, 2, 5), and a brake holds joint 2: its torque has no spread, so no error is a share of it.
+TEST(HeldOut, AJointWhoseTorqueNeverChanges_HasNoNrmse) {
+  Case c(10, 2, 5);
+  c.log.tau.conservativeResize(Eigen::NoChange, 2), c.log.moving.conservativeResize(Eigen::NoChange, 2);
+  c.predicted.conservativeResize(Eigen::NoChange, 2);
+  c.log.tau.col(1).setConstant(0.1), c.predicted.col(1).setConstant(0.4), c.log.moving.col(1).setZero();
+  const HeldOutError e = CompareHeldOut(c.log, c.predicted, 0);
+  EXPECT_TRUE(std::isnan(e.full.nrmse[1]));
+  const nlohmann::ordered_json json = ToJson(e);
+  EXPECT_NEAR(json.at("nrmse_mean").get<double>(), 0.2, 1e-3);
+  EXPECT_NEAR(json.at("r2_mean").get<double>(), 0.96, 1e-3);
+}
+
 TEST(HeldOut, ABandFromHalfTheSampleRateOn_IsRefused) {
   const Case c(10, 2, 5);
   EXPECT_THROW(CompareHeldOut(c.log, c.predicted, 125), io::InputError);

@@ -423,12 +423,19 @@ logs::Log RawLog(const TraceRecords& r, const codegen::Robot& robot, const Playe
   if (told) log.qref.resize(N, n), log.tauff.resize(N, n);
   log.flags.resize(N, n);
   VectorXd motor(n), current(n);
+  // Sixteenths of a count wrap at 2^32. The first one is taken as within 2^27 counts of the joint's zero, and from
+  // there on no two records are 2^27 counts apart.
+  std::vector<std::uint32_t> before(static_cast<std::size_t>(n));
+  std::vector<std::int64_t> sixteenths(static_cast<std::size_t>(n), 0);
   for (Eigen::Index i = 0; i < N; ++i) {
     const std::uint16_t* w = &r.words[inside[i] * r.record_words];
     log.t[i] = static_cast<double>(r.ticks[inside[i]] - first_tick) / robot.tick_rate_Hz;
     for (int j = 0; j < n; ++j) {
-      // 1/16 counts wrap at 2^32: signed, they reach +- 2^27 counts about zero, far beyond any joint's range
-      motor[j] = scale.counts_to_rad[j] * (static_cast<std::int32_t>(core::GetU32(w)) / 16.0 - scale.zero[j]);
+      const auto at = static_cast<std::size_t>(j);
+      const std::uint32_t now = core::GetU32(w), zero = 16 * static_cast<std::uint32_t>(std::llround(scale.zero[j]));
+      sixteenths[at] += static_cast<std::int32_t>(now - (i == 0 ? zero : before[at]));
+      before[at] = now;
+      motor[j] = scale.counts_to_rad[j] * static_cast<double>(sixteenths[at]) / 16;
       current[j] = scale.lsb_to_Nm[j] * static_cast<std::int32_t>(core::GetU32(w + 2)) / 16.0;
       w += 4;
       if (warm) log.temp(i, j) = core::GetF32(w), w += 2;
@@ -453,7 +460,8 @@ logs::Log SampleLog(const TraceRecords& r, const codegen::Robot& robot, const Pl
   for (MatrixXd* m : {&log.q, &log.qd, &log.qdd, &log.tau, &log.temp, &log.tauff}) m->resize(N, n);
   log.flags.resize(N, n);
   for (Eigen::Index i = 0; i < N; ++i) {
-    log.t[i] = static_cast<double>(r.ticks[inside[i]]) / robot.tick_rate_Hz;
+    const std::uint32_t since = r.ticks[inside[i]] - r.ticks[inside[0]];  // ticks wrap
+    log.t[i] = (static_cast<double>(r.ticks[inside[0]]) + since) / robot.tick_rate_Hz;
     const std::uint16_t* w = &r.words[inside[i] * r.record_words];
     for (int j = 0; j < n; ++j, w += controller::kSampleWordsPerJoint) {
       log.q(i, j) = core::GetF32(w), log.qd(i, j) = core::GetF32(w + 2), log.qdd(i, j) = core::GetF32(w + 4);

@@ -13,6 +13,7 @@
 #include "armcal/link/seal.hpp"
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_seal.hpp"
+#include "host_sim/client/writer_seat.hpp"
 
 namespace armcal::client {
 
@@ -23,11 +24,9 @@ namespace {
 constexpr std::uint16_t kFirstLayout = 1;  // word 2 of a table
 constexpr std::size_t kWordsAtOnce = 120;
 constexpr auto kCommitPoll = std::chrono::milliseconds(5);
-constexpr auto kPatience = std::chrono::seconds(60);      // twice the drive's own limit on a commit
-constexpr auto kSeatPatience = std::chrono::seconds(15);  // longer than a silent writer keeps its seat
-constexpr auto kSeatPoll = std::chrono::milliseconds(200);
-constexpr int kRounds = 5;    // a broken connection or a damaged word costs one
-constexpr int kReadings = 5;  // of what reads back differently
+constexpr auto kPatience = std::chrono::seconds(60);  // twice the drive's own limit on a commit
+constexpr int kRounds = 5;                            // a broken connection or a damaged word costs one
+constexpr int kReadings = 5;                          // of what reads back differently
 
 // The PC's part of bringing a table in force: by a save, or on trial.
 class Flash {
@@ -144,13 +143,7 @@ class Flash {
   }
 
   void TakeSeat() {
-    const auto deadline = std::chrono::steady_clock::now() + kSeatPatience;
-    for (;;) try {
-        return drive_.WriteValue<reg::kUnlock>(reg::kUnlockKey);
-      } catch (const RefusedError& error) {
-        if (error.status != core::Status::kSeatTaken || std::chrono::steady_clock::now() >= deadline) throw;
-        std::this_thread::sleep_for(kSeatPoll);
-      }
+    WhenSeatIsFree([&] { drive_.WriteValue<reg::kUnlock>(reg::kUnlockKey); });
   }
 
   // Once the table is sent, a refusal to read something does not mean that the table was refused.

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <thread>
 
+#include "host_sim/client/writer_seat.hpp"
+
 namespace armcal::client {
 
 namespace reg = link::reg;
@@ -73,7 +75,7 @@ std::size_t TraceReader::TakePage(TraceRecords& records) {
   records.channels = page.Get<reg::kTraceChannels>();
   Append(records, first_tick, count, page.Get<reg::kTraceGeneration>(), data.data());
   next_ = first + count;
-  drive_.WriteValue<reg::kTraceAcknowledge>(next_, trace_);
+  WhenSeatIsFree([&] { drive_.WriteValue<reg::kTraceAcknowledge>(next_, trace_); });
   return count;
 }
 
@@ -92,8 +94,10 @@ std::size_t TraceReader::TakeWindow(TraceRecords& records) {
   next.Set<reg::kTraceAcknowledge>(next_);
   const link::Span window = reg::kWindowBlock.Of(trace_);
   for (int look = 0;; ++look) {
-    const auto words = drive_.WriteThenRead(link::SpanOf(reg::kTraceAcknowledge).Of(trace_).first,
-                                            {next.data(), next.size()}, window.first, window.count, Patience::kShort);
+    const auto words = WhenSeatIsFree([&] {
+      return drive_.WriteThenRead(link::SpanOf(reg::kTraceAcknowledge).Of(trace_).first, {next.data(), next.size()},
+                                  window.first, window.count, Patience::kShort);
+    });
     const link::Words<reg::kWindowBlock> w(words.data());
     const std::uint32_t first = w.Get<reg::kWindowFirstRecord>(), first_tick = w.Get<reg::kWindowFirstTick>();
     const std::uint16_t count = w.Get<reg::kWindowCount>();

@@ -334,9 +334,8 @@ int RunScan(const DeviceOptions& o, ordered_json& said) {
     progress.Set(static_cast<double>(k + 1) / static_cast<double>(addresses.size()));
   }
   const bool stopped = InterruptGuard::interrupted();
-  if (found.empty())
-    throw client::LinkError(stopped ? "stopped before a drive answered"
-                                    : "no drive answered; the last failure was: " + last_failure);
+  if (found.empty() && stopped) fmt::print(stderr, "stopped before a drive answered\n");
+  if (found.empty() && !stopped) throw client::LinkError("no drive answered; the last failure was: " + last_failure);
   WriteJson(o.json, found);
   return stopped ? kPartial : kOk;
 }
@@ -393,8 +392,8 @@ void AddDevice(CLI::App& app, Action& action) {
   verb = app.add_subcommand("map", "print the register map of this version\nexample: armcal map --csv > registers.csv");
   auto* json =
       verb->add_option("--json", o->json, "as JSON, into this file, or without one to the terminal")->expected(0, 1);
-  verb->add_flag("--csv", o->csv, "as CSV")->excludes(json);
-  verb->add_flag("--md", o->markdown, "as the tables of SPEC.md")->excludes(json);
+  auto* csv = verb->add_flag("--csv", o->csv, "as CSV")->excludes(json);
+  verb->add_flag("--md", o->markdown, "as the tables of SPEC.md")->excludes(json)->excludes(csv);
   verb->callback([o, &action] { action = [o] { return RunMap(*o); }; });
 }
 

@@ -137,7 +137,8 @@ void AddRecord(CLI::App& app, Action& action) {
   auto o = std::make_shared<client::RecordOptions>();
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   verb->add_option("--robot", o->robot, "robot file or name")->required();
-  verb->add_option("--trajectory", o->trajectory, "trajectory of armcal excite, for a drive that plays it");
+  auto* trajectory =
+      verb->add_option("--trajectory", o->trajectory, "trajectory of armcal excite, for a drive that plays it");
   verb->add_option("--seconds", o->seconds,
                    "record for this many seconds whatever the arm does, instead of a trajectory")
       ->check(Between(1.0, 86400.0));
@@ -148,7 +149,8 @@ void AddRecord(CLI::App& app, Action& action) {
                    "also write the drive's processed samples, with the committed model's torque as tauff");
   verb->add_option("--speed", o->speed_percent, "percent of the trajectory's speed, for a first slow pass")
       ->capture_default_str()
-      ->check(Between(1, 100));
+      ->check(Between(1, 100))
+      ->needs(trajectory);
   verb->add_option("--decimation", o->decimation,
                    "ticks averaged into one record (default: the estimator's; 1 keeps gear ripple)")
       ->check(Between(1, 16));

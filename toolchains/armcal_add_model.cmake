@@ -73,10 +73,17 @@ function(armcal_add_model target)
     string(APPEND folder /${A_NAME})
   endif()
   file(GLOB records CONFIGURE_DEPENDS ${ARMCAL_CHECKOUT}/codegen/effects/*.toml)
+  # A robot file may name a URDF, from its own folder.
+  set(urdf)
+  file(STRINGS ${robot} named REGEX "^[ \t]*urdf[ \t]*=[ \t]*\"[^\"]+\"")
+  if(named MATCHES "\"([^\"]+)\"")
+    get_filename_component(folder_of_robot ${robot} DIRECTORY)
+    get_filename_component(urdf ${CMAKE_MATCH_1} ABSOLUTE BASE_DIR ${folder_of_robot})
+  endif()
   add_custom_command(OUTPUT ${folder}/model.hpp VERBATIM
     COMMAND ${CMAKE_COMMAND} -E env ARMCAL_HOME=${ARMCAL_CHECKOUT} ${tool} --robot ${robot} --out ${folder}
     COMMAND ${CMAKE_COMMAND} -E touch ${folder}/model.hpp
-    DEPENDS ${robot} ${records} ${tool} ${wait_for})
+    DEPENDS ${robot} ${urdf} ${records} ${tool} ${wait_for})
   add_custom_target(${target}_files DEPENDS ${folder}/model.hpp)
   add_library(${target} INTERFACE)
   add_dependencies(${target} ${target}_files)

@@ -59,10 +59,10 @@ void KeepVerdicts(const FleetOptions& o, const verdict::Verdicts& verdicts,
   if (o.database.empty()) return;
   std::vector<fleet::Entry> entries;
   for (const auto& [arm, verdict] : verdicts) {
-    fleet::Entry e{arm, o.date, arm, verdict.dump()};
     const auto named = log.find(arm);
     const std::string path = named != log.end() ? named->second : verdict.value("test", std::string());
-    if (std::filesystem::is_regular_file(path)) {
+    fleet::Entry e{arm, o.date, path.empty() ? arm : path, verdict.dump()};  // the name where the log is not here
+    if (std::filesystem::exists(path)) {                                     // a file, or a bag's folder
       e.hash = files::FileHash(path);
       if (e.date.empty()) e.date = Utc(ChangeTime(path));
     }

@@ -100,9 +100,12 @@ TEST(Fleet, HistoryNamesAPlantedChange_AtItsLog) {
   const fs::path folder = FreshFolder("fleet_history");
   const std::string database = (folder / "fleet.sqlite").string();
   for (int month = 1; month <= 9; ++month) {
-    const fs::path verdicts = folder / std::to_string(month), log = folder / (std::to_string(month) + ".csv");
+    const bool is_bag = month % 2 == 0;  // a folder of rosbag2
+    const fs::path verdicts = folder / std::to_string(month),
+                   log = folder / (std::to_string(month) + (is_bag ? "_bag" : ".csv"));
     fs::create_directories(verdicts);
-    std::ofstream(log) << month;
+    if (is_bag) fs::create_directories(log);
+    std::ofstream(is_bag ? log / "bag_0.mcap" : log) << month;
     for (const char* arm : {"left", "right"}) {
       const fs::path file = verdicts / (std::string(arm) + ".json");
       WriteVerdict(file, arm == std::string("left") && month >= 6 ? 14 : 10 + 0.05 * (month % 3), 0);

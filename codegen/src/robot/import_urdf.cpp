@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -34,13 +35,23 @@ std::string Short(double v) {
   return out;
 }
 
+// The shortest text that reads as the same number.
+std::string Exact(double v) {
+  char text[32];
+  std::string out(text, std::to_chars(text, text + sizeof text, v).ptr);
+  if (out.find_first_of(".e") == std::string::npos) out += ".0";
+  return out;
+}
+
+// The name of a C++ struct comes from it, so it begins with a letter.
 std::string Allowed(const std::string& name) {
   std::string out;
   for (const char c : name) {
     const char lower = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     out += std::isalnum(static_cast<unsigned char>(lower)) ? lower : '_';
   }
-  return out.empty() ? "arm" : out;
+  if (out.empty()) return "arm";
+  return std::islower(static_cast<unsigned char>(out[0])) ? out : "arm_" + out;
 }
 
 std::string Escaped(const std::string& text) {
@@ -217,9 +228,9 @@ ImportedRobot ImportUrdf(const UrdfChoice& asked, const std::string& name, const
                          "--fixed");
   }
   for (const std::string& line : MissingMeshes(chain)) out.said.push_back(line);
-  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  const std::filesystem::path folder = std::filesystem::absolute(file).lexically_normal().parent_path();
   const auto from_file = [&folder](const std::filesystem::path& path) {
-    return std::filesystem::absolute(path).lexically_proximate(folder).string();
+    return std::filesystem::absolute(path).lexically_normal().lexically_proximate(folder).string();
   };
   out.text = "# Made by armcal import. What is marked as guessed is not in the URDF: state it where you know it.\n";
   out.text += "name = \"" + Allowed(name) + "\"\nsource = " +
@@ -229,7 +240,7 @@ ImportedRobot ImportUrdf(const UrdfChoice& asked, const std::string& name, const
   if (!out.choice.fixed.empty()) {
     std::string list;
     for (const auto& [joint, position] : out.choice.fixed)
-      list += (list.empty() ? "" : ", ") + Escaped(joint) + " = " + Short(position);
+      list += (list.empty() ? "" : ", ") + Escaped(joint) + " = " + Exact(position);
     out.text += "fixed = { " + list + " }  # joints that are held, rad or m: parts of the body that carries them\n";
   }
   if (!asked.packages.empty()) {

@@ -1,7 +1,9 @@
 // robot - reads a robot file and checks every number.
 #include "codegen/src/robot/robot.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <numbers>
 
@@ -373,9 +375,9 @@ void ReadHead(const io::TomlReader& in, Robot& r) {
        "coupling",       "base_frame",   "tool_frame",   "identified",   "urdf",    "tip",      "fixed",
        "parameters",     "payload",      "ceilings",     "packages",     "capsule"});
   r.name = in.Text("name");
-  if (in.Has("name") &&
-      (r.name.empty() || r.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos))
-    in.Report("name", "lower-case letters, digits and _");
+  if (in.Has("name") && (r.name.empty() || !std::islower(static_cast<unsigned char>(r.name[0])) ||
+                         r.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos))
+    in.Report("name", "a lower-case letter, then lower-case letters, digits and _");
   r.title = in.Text("title", r.name);
   r.source = in.Text("source");
   const auto gravity = in.Numbers("gravity_mps2", 3);
@@ -441,7 +443,14 @@ Robot ReadRobot(const std::filesystem::path& path) {
   }
   const int n = r.joints();
   if (chain_known && (n < 1 || n > 7)) in.Report("joint", "1 to 7 [[joint]] tables");
-  if (chain_known && in.Has("coupling")) r.coupling = in.Table("coupling").Numbers("matrix", n * n);
+  if (chain_known && in.Has("coupling")) {
+    const io::TomlReader coupling = in.Table("coupling");
+    coupling.AllowOnly({"matrix"});
+    r.coupling = coupling.Numbers("matrix", n * n);
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    if (static_cast<int>(r.coupling.size()) == n * n && !Rows::Map(r.coupling.data(), n, n).fullPivLu().isInvertible())
+      coupling.Report("matrix", "a matrix that has an inverse");
+  }
   if (in.Has("base_frame")) root = ReadFrame(in.Table("base_frame"));
   base = root * base;
   if (in.Has("tool_frame")) flange = flange * ReadFrame(in.Table("tool_frame"));
@@ -461,6 +470,7 @@ Robot ReadRobot(const std::filesystem::path& path) {
     for (const io::TomlReader& use : in.Tables("effect")) r.effect.push_back(ReadEffectUse(use, n));
   if (chain_known && in.Has("control")) {
     const io::TomlReader control = in.Table("control");
+    control.AllowOnly({"structure", "rate_Hz", "kp_Nmprad", "kd_Nmsprad"});
     r.control.structure = control.Text("structure");
     r.control.rate_Hz = control.Positive("rate_Hz");
     r.control.kp_Nmprad = control.Numbers("kp_Nmprad", n);

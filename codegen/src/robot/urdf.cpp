@@ -518,6 +518,12 @@ UrdfChain ReadUrdf(const UrdfChoice& asked) {
   faults.ThrowIfAny();
   std::vector<JointKinematics> kinematics;
   const std::vector<Frame> frames = LayFrames(walk.axes, kinematics);
+  for (std::size_t i = 1; i < kinematics.size(); ++i)
+    if (std::abs(kinematics[i].d_m) > kLongest)
+      faults.Add(file + ": joint \"" + walk.axes[i].joint->name +
+                 "\": its axis is nearly parallel to a neighbour's, so their common normal lies " +
+                 Number(std::abs(kinematics[i].d_m)) + " m away; expected parallel axes (is pi rounded in an rpy?)");
+  faults.ThrowIfAny();
   UrdfChain chain;
   chain.part = walk.parts;
   chain.base_part = walk.base_parts;

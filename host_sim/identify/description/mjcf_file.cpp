@@ -321,6 +321,12 @@ Description ToMjcf(const DescribedArm& arm) {
   return d;
 }
 
+namespace {
+
+bool HasJoint(const XmlElement& body) { return body.Find("joint") != nullptr || body.Find("freejoint") != nullptr; }
+
+}  // namespace
+
 Description ToGivenMjcf(const DescribedArm& arm, const std::string& file, const std::string& text, bool merge) {
   XmlEdits edits(file, text);
   const GivenMjcf given(arm, file, text, edits.root());
@@ -329,12 +335,15 @@ Description ToGivenMjcf(const DescribedArm& arm, const std::string& file, const 
   Description d;
   for (std::size_t j = 0; j < arm.joint.size(); ++j) {
     const FileJoint& joint = given.joints()[j];
-    const Body rest = RestOf(arm.joint[j].body, base * PoseAtZero(arm.robot, j), joint, merge);
-    if (const std::string why = WhyNoRest(rest, joint, file); !why.empty()) faults.Add(why);
+    FileJoint kept = joint;  // merged: the link, and what has a joint of its own, because MuJoCo needs its mass
+    for (std::size_t k = kept.part.size(); merge && --k > 0;)
+      if (!HasJoint(*given.bodies(j)[k])) kept.part.erase(kept.part.begin() + static_cast<std::ptrdiff_t>(k));
+    const Body rest = RestOf(arm.joint[j].body, base * PoseAtZero(arm.robot, j), kept, false);
+    if (const std::string why = WhyNoRest(rest, kept, file); !why.empty()) faults.Add(why);
     edits.SetChild(given.body(j), "inertial", Inertial(rest).Text());
     edits.SetAttributes(given.joint(j), JointValues(arm.joint[j]));
     for (std::size_t k = 1; merge && k < joint.part.size(); ++k) {
-      if (!(joint.part[k].body.mass > 0)) continue;
+      if (!(joint.part[k].body.mass > 0) || HasJoint(*given.bodies(j)[k])) continue;
       edits.SetChild(*given.bodies(j)[k], "inertial", Inertial(Body{}).Text());
       d.left_out.push_back(fmt::format("inertial of {}: it is in {}", joint.part[k].link, joint.part[0].link));
     }

@@ -28,12 +28,22 @@ std::string Element(const std::string& name, const std::string& text) {
   return fmt::format("<{0}>{1}</{0}>", name, text);
 }
 
-// <pose>, <mass> and <inertia> of an <inertial>: name and content.
-std::vector<std::pair<std::string, std::string>> InertialElements(const Body& body) {
+// <pose>, <mass> and <inertia> of an <inertial>: name and content. quaternion: the rotation of the pose is one.
+std::vector<std::pair<std::string, std::string>> InertialElements(const Body& body, bool quaternion = false) {
   std::string inertia;
   const auto component = codegen::ToLink(body).inertia_kgm2;
   for (std::size_t k = 0; k < component.size(); ++k) inertia += Element(kInertiaName[k], Exact(component[k]));
-  return {{"pose", Exact(body.center) + " 0 0 0"}, {"mass", Exact(body.mass)}, {"inertia", inertia}};
+  return {{"pose", Exact(body.center) + (quaternion ? " 0 0 0 1" : " 0 0 0")},
+          {"mass", Exact(body.mass)},
+          {"inertia", inertia}};
+}
+
+// The pose of the link's <inertial> gives its rotation as a quaternion.
+bool HasQuaternion(const XmlElement& link, const std::string& text) {
+  const XmlElement* inertial = link.Find("inertial");
+  const XmlElement* pose = inertial == nullptr ? nullptr : inertial->Find("pose");
+  const XmlAttribute* format = pose == nullptr ? nullptr : pose->Attribute("rotation_format");
+  return format != nullptr && text.substr(format->begin, format->end - format->begin) == "quat_xyzw";
 }
 
 // The links and joints of the model that has the arm's joints.
@@ -227,7 +237,7 @@ Description ToGivenSdf(const DescribedArm& arm, const std::string& file, const s
     const Body rest = RestOf(arm.joint[j].body, base * PoseAtZero(arm.robot, j), joint, false);
     if (const std::string why = WhyNoRest(rest, joint, file, "mend what these weigh in the file"); !why.empty())
       faults.Add(why);
-    edits.SetChildren(given.link(j), "inertial", InertialElements(rest));
+    edits.SetChildren(given.link(j), "inertial", InertialElements(rest, HasQuaternion(given.link(j), text)));
     edits.SetChildren(*given.joint(j).Find("axis"), "dynamics",
                       {{"damping", Exact(arm.joint[j].viscous_Nmsprad)}, {"friction", Exact(arm.joint[j].coulomb_Nm)}});
   }

@@ -37,11 +37,17 @@ void Estimate(const codegen::EffectRecord& record, const std::vector<int>& joint
               const std::vector<codegen::EffectUse>& found, codegen::Robot& robot) {
   codegen::EffectUse use;
   use.effect = record.name;
-  for (const codegen::EffectUse& known : robot.effect)
-    if (known.effect == record.name &&
-        (known.joints == joints || (record.scope == codegen::EffectScope::kJoint &&
-                                    std::count(known.joints.begin(), known.joints.end(), joints[0]) > 0)))
-      use = known;
+  for (codegen::EffectUse& known : robot.effect) {
+    const bool of_joint = record.scope == codegen::EffectScope::kJoint &&
+                          std::count(known.joints.begin(), known.joints.end(), joints[0]) > 0;
+    if (known.effect != record.name || (known.joints != joints && !of_joint)) continue;
+    use = known;
+    if (of_joint) std::erase(known.joints, joints[0]);  // else it would be there twice, where a record may repeat
+    else known.effect.clear();
+  }
+  std::erase_if(robot.effect, [&](const codegen::EffectUse& known) {
+    return known.effect.empty() || (known.effect == record.name && known.joints.empty() && !joints.empty());
+  });
   for (const codegen::EffectUse& f : found)
     if (f.effect == record.name && f.joints == joints) use.nonlinear = f.nonlinear;
   use.joints = joints;

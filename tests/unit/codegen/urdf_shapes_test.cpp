@@ -177,5 +177,20 @@ TEST(Import, WritesWhereThePackagesLie_AndNamesMeshesThatAreNotThere) {
   EXPECT_EQ(robot.shape.back().file, folder / "desc/meshes/f.stl");
 }
 
+// The robot file may lie anywhere beside the URDF, and its name becomes a C++ name.
+TEST(Import, FindsTheUrdfFromTheRobotFilesOwnFolder) {
+  const files::test::TemporaryFolder folder;
+  fs::create_directories(folder / "here"), fs::create_directories(folder / "robots/mine");
+  const fs::path urdf = folder.Write("here/arm.urdf", kArm);
+  const auto begin = fs::current_path();
+  fs::current_path(folder / "here");
+  for (const char* file : {"arm.toml", "../robots/arm.toml", "../robots/mine/arm.toml", "./../here/arm.toml"}) {
+    const codegen::ImportedRobot imported = codegen::ImportUrdf({"arm.urdf", "", {}, {}}, "7dof-arm", file);
+    std::ofstream(file) << imported.text;
+    EXPECT_EQ(codegen::ReadRobot(file).name, "arm_7dof_arm") << file;
+  }
+  fs::current_path(begin);
+}
+
 }  // namespace
 }  // namespace armcal::tests

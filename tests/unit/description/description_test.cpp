@@ -394,6 +394,7 @@ TEST_F(Export, ToGivenMjcf_HasTheTorqueOfTheIdentifiedBodies_InTheFilesOwnFrames
     EXPECT_LT(Relative(Torques(tree, {}, true), Expected(true)), 1e-9);
     const double hand = tree.getSegment("hand")->second.segment.getInertia().getMass();
     EXPECT_EQ(hand, merge ? 0.0 : 0.8);
+    EXPECT_GT(tree.getSegment("finger")->second.segment.getInertia().getMass(), 0);  // MuJoCo moves it
   }
 }
 
@@ -463,6 +464,12 @@ TEST_F(Export, ToGivenSdf_WritesTheValuesOfAFileThatHadOthers) {
   given = std::regex_replace(given, std::regex("<damping>[^<]*</damping>"), "<damping/>");
   const std::string now = ToGivenSdf(arm_, "m.sdf", given).text;
   EXPECT_EQ(now, whole);
+  const std::string turned = std::regex_replace(whole, std::regex("(<inertial>\\s*)<pose>([^<]*) 0 0 0</pose>"),
+                                                "$1<pose rotation_format='quat_xyzw'>0 0 0 0 0 0 1</pose>");
+  ASSERT_NE(turned, whole);
+  EXPECT_EQ(ToGivenSdf(arm_, "m.sdf", turned).text,
+            std::regex_replace(whole, std::regex("(<inertial>\\s*)<pose>([^<]*) 0 0 0</pose>"),
+                               "$1<pose rotation_format='quat_xyzw'>$2 0 0 0 1</pose>"));
   for (const auto& [old, with, expected] : std::vector<std::array<const char*, 3>>{
            {"<joint name=\"lift\"", "<joint name=\"elbow\"", "no joint \"lift\""},
            {"<xyz>0 0 1</xyz>", "<xyz>0 1 1</xyz>", "rad away"},

@@ -65,6 +65,21 @@ TEST(Separate, LooksAtTheEffectAsItWasFound) {
   EXPECT_EQ(seen, 2);
 }
 
+// A ripple that the robot file has may be in the model many times. It is asked for itself, not once more beside itself:
+// two equal columns would have no motion that shows them.
+TEST(Separate, OfAnEffectThatTheRobotHas_AsksForThatOne) {
+  codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");
+  const codegen::Catalogue records = codegen::ReadCatalogue("codegen/effects");
+  codegen::EffectUse use;
+  use.effect = "torque_ripple", use.joints = {0, 1}, use.nonlinear = {{"k", 30}};
+  robot.effect.push_back(use);
+  EXPECT_TRUE(CanSeparate(robot, records, {"torque_ripple:2"}));
+  const Target target(robot, records, {"torque_ripple:2"});
+  int ripples = 0;
+  for (const auto& p : target.observation().model().table()) ripples += p.effect == "torque_ripple" && p.unit == "N*m";
+  EXPECT_EQ(ripples, 4);  // a cosine and a sine for each joint
+}
+
 // A search finds a motion for effects that are called separable, and finds none for the others.
 TEST(Separate, IsPromisedWhereASearchSucceeds) {
   const codegen::Robot robot = codegen::ReadRobot("codegen/robots/two_link.toml");

@@ -108,33 +108,6 @@ TEST(NextTerm, WhoseGainIsInOneFold_IsRefused) {
   }
 }
 
-// Beside a torque over both positions there is a smaller one that the surface cannot follow: over speed, or a fine wave
-// over one of the positions. The surface explains a part of what its own signals do, so the wave goes first. What reads
-// another signal is another effect, and the larger of two goes first.
-TEST(NextTerm, GoesBeforeASurfaceOfTwiceItsGain_IfItReadsTheSameSignals) {
-  struct Small {
-    const char* expression;
-    std::function<double(double q, double qd)> value;  // half to nine tenths of the surface's gain
-    bool goes_first;
-  };
-  for (const Small& small : {Small{"sin(25*q)", [](double q, double) { return 0.14 * std::sin(25 * q); }, true},
-                             Small{"sin(9*qd)", [](double, double qd) { return 0.12 * std::sin(9 * qd); }, false}}) {
-    tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 6);
-    const codegen::Catalogue records{{"small", ColumnRecord("small", small.expression)},
-                                     {"curve_two_positions", tests::Records().at("curve_two_positions")}};
-    Dataset log = arm.Run(60, 63);
-    for (int k = 0; k < log.samples(); ++k) {
-      const double q = log.s.q(k, 0), qd = log.s.qd(k, 0);
-      log.tau(k, 0) += 0.52 * std::sin(3 * q) * std::cos(3 * log.s.q(k, 1)) + small.value(q, qd);
-    }
-    Diagnosis::Work work(arm.model(), records, {&log});
-    Chosen next;
-    ASSERT_TRUE(Selector(work).Next({}, next));
-    EXPECT_EQ(next.candidate->record().name == "small", small.goes_first) << small.expression;
-    EXPECT_EQ(next.candidate->rows(), std::vector<int>{0});
-  }
-}
-
 // Half of the true speed. A curve over speed on the same joint fits what is wrong of it, so nothing says in which
 // direction it is wrong.
 TEST(Refinement, MovesAnUnknown_UnlessACurveOverItsSignalIsInTheModel) {

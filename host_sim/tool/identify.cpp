@@ -73,8 +73,7 @@ std::string RangesFromLeastSquares(calibration::Problem& problem) {
   constexpr double kDeviations = 10;
   calibration::Problem plain = problem;
   plain.covariance.resize(0, 0);
-  const char* const name = problem.model->nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse";
-  const calibration::Solution s = calibration::Solve(calibration::FindMethod(name), plain);
+  const calibration::Solution s = calibration::Solve(calibration::LeastSquaresFor(*plain.model), plain);
   const Eigen::VectorXd reach = kDeviations * s.covariance.diagonal().cwiseSqrt();
   problem.start = s.z;
   problem.lower = problem.lower.cwiseMax(s.z - reach), problem.upper = problem.upper.cwiseMin(s.z + reach);

@@ -6,6 +6,7 @@
 #include "codegen/src/generator/emit_text.hpp"
 #include "codegen/src/generator/state_path.hpp"
 #include "codegen/src/io/atomic_write.hpp"
+#include "codegen/src/io/number_text.hpp"
 
 namespace armcal::codegen {
 namespace {
@@ -83,7 +84,7 @@ void WriteMeaning(const EffectInstance& e, std::ostream& s) {
 std::string Meaning(const Model& m) {
   const Robot& r = m.robot();
   std::ostringstream s;
-  const auto number = [&s](double v) { s << NumberText(v) << " "; };
+  const auto number = [&s](double v) { s << io::NumberText(v) << " "; };
   s << r.name << "\n" << r.sign_law << " ";
   number(r.sign_width_radps);
   for (const double g : r.gravity_mps2) number(g);

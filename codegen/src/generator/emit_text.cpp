@@ -3,13 +3,14 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <set>
 #include <sstream>
 #include <stdexcept>
+
+#include "codegen/src/io/number_text.hpp"
 
 namespace armcal::codegen {
 
@@ -29,7 +30,7 @@ std::string TypeName(const std::string& robot) {  // er20_like -> Er20Like
 
 std::string Float(double value) {
   if (std::isinf(value)) return value > 0 ? "kInfinity" : "-kInfinity";
-  return NumberText(static_cast<double>(static_cast<float>(value))) + "f";
+  return io::NumberText(static_cast<double>(static_cast<float>(value))) + "f";
 }
 
 std::string List(const std::vector<std::string>& items) {
@@ -243,7 +244,7 @@ class Printer {
   static std::string Minus(const std::string& text) { return text[0] == '-' ? text.substr(1) : "-" + text; }
   std::string Operand(int i) {
     const Node& n = nodes_[i];
-    if (n.op == Op::kConstant) return "T(" + NumberText(n.value) + ")";
+    if (n.op == Op::kConstant) return "T(" + io::NumberText(n.value) + ")";
     if (n.op == Op::kInput) return input_(graph_.inputs()[n.a]);
     if (n.op == Op::kNegate) return Minus(Operand(n.a));
     return name_.at(i);
@@ -261,14 +262,6 @@ class Printer {
 };
 
 }  // namespace
-
-std::string NumberText(double value) {
-  char text[40];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, value);
-  std::string s(text, end);
-  if (s.find_first_of(".en") == std::string::npos) s += ".0";
-  return s;
-}
 
 std::string EmitStatements(const Graph& graph, const std::vector<Assignment>& assignments, const InputWriter& input,
                            Passport& passport) {

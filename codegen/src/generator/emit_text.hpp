@@ -11,8 +11,6 @@ namespace armcal::codegen {
 
 inline constexpr int kGeneratorVersion = 2;
 
-std::string NumberText(double value);  // shortest text that reads back to the same double
-
 struct Assignment {
   std::string target;  // "front[3]"
   Expr value;

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <map>
 #include <numbers>
 #include <string_view>
 
+#include "codegen/src/io/number_text.hpp"
 #include "codegen/src/robot/urdf.hpp"
 
 namespace armcal::codegen {
@@ -31,14 +31,6 @@ std::string Short(double v) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", v);
   std::string out = text;
-  if (out.find_first_of(".e") == std::string::npos) out += ".0";
-  return out;
-}
-
-// The shortest text that reads as the same number.
-std::string Exact(double v) {
-  char text[32];
-  std::string out(text, std::to_chars(text, text + sizeof text, v).ptr);
   if (out.find_first_of(".e") == std::string::npos) out += ".0";
   return out;
 }
@@ -240,7 +232,7 @@ ImportedRobot ImportUrdf(const UrdfChoice& asked, const std::string& name, const
   if (!out.choice.fixed.empty()) {
     std::string list;
     for (const auto& [joint, position] : out.choice.fixed)
-      list += (list.empty() ? "" : ", ") + Escaped(joint) + " = " + Exact(position);
+      list += (list.empty() ? "" : ", ") + Escaped(joint) + " = " + io::NumberText(position);
     out.text += "fixed = { " + list + " }  # joints that are held, rad or m: parts of the body that carries them\n";
   }
   if (!asked.packages.empty()) {

@@ -1,4 +1,4 @@
-// choice - picks the method by the model, and keeps a failure as a sentence.
+// choice - fits in rounds where columns read the load, and keeps a failure as a sentence.
 #include "host_sim/identify/choice/fit_model.hpp"
 
 #include "codegen/src/io/input_error.hpp"
@@ -10,15 +10,11 @@ namespace {
 
 constexpr int kRounds = 3;  // of a model with columns that read the load: the first one takes the load as zero
 
-const calibration::Method& MethodFor(const codegen::Model& model) {
-  return calibration::FindMethod(model.nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse");
-}
-
 }  // namespace
 
 calibration::Solution SolveInRounds(calibration::Problem problem) {
   const codegen::Model& model = *problem.model;
-  const calibration::Method& method = MethodFor(model);
+  const calibration::Method& method = calibration::LeastSquaresFor(model);
   const bool intervals = problem.intervals;
   const int rounds = model.depends_on_estimate() ? kRounds : 1;
   for (int round = 1;; ++round) {
@@ -35,7 +31,7 @@ ModelFit FitModel(const codegen::Model& model, std::vector<const calibration::Da
   problem.covariance.resize(0, 0);
   problem.stop = stop;
   ModelFit fit;
-  fit.method = MethodFor(model).title;
+  fit.method = calibration::LeastSquaresFor(model).title;
   try {
     const calibration::Solution solution = SolveInRounds(std::move(problem));
     if (solution.z.allFinite()) fit.z = solution.z;

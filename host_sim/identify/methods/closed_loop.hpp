@@ -8,7 +8,6 @@
 // sampled law's delay of half a period is left out.
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 

@@ -64,6 +64,10 @@ const Method& FindMethod(const std::string& name) {
   throw io::InputError("method \"" + name + "\": expected one of " + known);
 }
 
+const Method& LeastSquaresFor(const codegen::Model& model) {
+  return FindMethod(model.nonlinear() > 0 ? "variable_projection" : "weighted_pseudo_inverse");
+}
+
 Solution Solve(const Method& method, const Problem& problem) {
   const std::string name = std::string("method ") + method.name;
   if (!method.nonlinear && problem.model->nonlinear() > 0)

@@ -68,6 +68,8 @@ struct Method {
 const std::vector<Method>& Methods();
 // InputError that names the known ones.
 const Method& FindMethod(const std::string& name);
+// Least squares without a prior: weighted for a linear model, variable projection for a nonlinear one.
+const Method& LeastSquaresFor(const codegen::Model& model);
 // Runs a method. InputError, one line, where it does not take such a model or the problem lacks what it needs.
 Solution Solve(const Method& method, const Problem& problem);
 

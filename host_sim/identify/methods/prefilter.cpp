@@ -85,11 +85,8 @@ Solution FourierFitted(const Problem& problem) {
     remark += what;
     fitted.push_back(FourierFit(*problem.model, *log, period_s));
   }
-  const bool prior = problem.covariance.size() > 0, nonlinear = problem.model->nonlinear() > 0;
-  Solution s = Solve(FindMethod(prior       ? "map_barrier"
-                                : nonlinear ? "variable_projection"
-                                            : "weighted_pseudo_inverse"),
-                     Along(problem, fitted));
+  const bool prior = problem.covariance.size() > 0;
+  Solution s = Solve(prior ? FindMethod("map_barrier") : LeastSquaresFor(*problem.model), Along(problem, fitted));
   s.remark = remark + (s.remark.empty() ? "" : "; " + s.remark);
   s.seconds = CpuSeconds() - began;
   return s;

@@ -82,7 +82,6 @@ namespace {
 
 constexpr double kPositionNoise_rad = 1e-4;
 constexpr int kLoopDraws = 20;
-const char* const kLog = "closed loop";
 
 struct Contender {
   const char* method;
@@ -131,7 +130,7 @@ class Bench {
     Draw draw{codegen::Model(DrawPrior(arm_, error_, seed), settings_.records), {}};
     draw.log[kFiltered] = Measured(Filtered(wanted_.t, q), tau);
     draw.log[kPlain] = Measured(Differentiated(wanted_.t, q), tau);
-    for (calibration::Dataset& log : draw.log) log.source = kLog, log.reference = wanted_.q;
+    for (calibration::Dataset& log : draw.log) log.source = "closed loop", log.reference = wanted_.q;
     draw.log[kFourier] = calibration::FourierFit(draw.prior, draw.log[kPlain], period_s_);
     return draw;
   }

@@ -72,15 +72,15 @@ void Diagnosed::Judge(const logs::Log& log, const std::string& robot, const std:
 // What the terms leave at the samples of the training logs: [n] RMS where the joint moves.
 Eigen::VectorXd Diagnosed::LeftAtSamples() const {
   const diagnosis::Finding& finding = diagnosis->finding();
-  Eigen::VectorXd square = Eigen::VectorXd::Zero(model->joints());
-  double samples = 0;
+  Eigen::ArrayXd square = Eigen::ArrayXd::Zero(model->joints()), samples = square;
   for (const calibration::Dataset& log : whole_) {
     Eigen::MatrixXd left = log.tau - calibration::Predict(*model, log, finding.x, finding.declared.eta);
     for (const Eigen::MatrixXd& torque : diagnosis->TermTorque(log)) left -= torque;
-    square += log.samples() * calibration::Rms(log, left, true).cwiseAbs2();
-    samples += log.samples();
+    const Eigen::ArrayXd own = (log.moving.transpose() * log.scored).cast<double>();  // a joint may rest in a log
+    square += own * calibration::Rms(log, left, true).array().square();
+    samples += own;
   }
-  return (square / samples).cwiseSqrt();
+  return (square / samples.max(1)).sqrt();
 }
 
 void Diagnosed::WriteJson() {

@@ -68,7 +68,7 @@ std::string ChanceText(const Term& term) {
   const auto power = [](double log_chance) { return -log_chance / std::numbers::ln10; };
   const double rare = std::floor(power(term.log_chance));
   return fmt::format("noise alone gains as much in {} of 10^{:.0f} searches; the limit is one of 10^{:.0f}",
-                     rare > kMost ? "fewer than one" : "one", std::min(rare, kMost), power(kLogRare));
+                     rare > kMost ? "fewer than one" : "one", std::min(rare, kMost), power(term.log_limit));
 }
 
 void WriteTerms(Diagnosis::Work& w, Finding& finding) {
@@ -83,7 +83,7 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
     Repeat(c.candidate->unknowns(), c.eta.size(), t.unknowns);
     t.eta = c.eta;
     if (c.delay_s != 0) t.eta[static_cast<std::size_t>(c.candidate->delay())] += c.delay_s;
-    t.score = c.found.score, t.log_chance = c.found.log_chance;
+    t.score = c.found.score, t.log_chance = c.found.log_chance, t.log_limit = LogLimit(*t.record, *w.train[0]);
     t.folds = c.folds, t.also_fits = c.also_fits;
     t.rivals = c.rivals;
     t.training_only = c.candidate->is_event(), t.confirmed = t.in_fit = c.confirmed;
@@ -98,7 +98,11 @@ void WriteTerms(Diagnosis::Work& w, Finding& finding) {
   }
   finding.x = w.estimate.x;
   finding.sigma = w.estimate.sigma;
-  finding.innovation = w.estimate.innovation;
+  const Metric metric(w.rows, w.WhiteNoise());  // Deviations has left the rows of this fit
+  finding.innovation.setConstant(w.model.joints(), std::numeric_limits<double>::quiet_NaN());
+  for (int j = 0; j < w.model.joints(); ++j)
+    if (const RowIndex& index = w.rows.index[static_cast<std::size_t>(j)]; index.size() > 0)
+      finding.innovation[j] = FitNoise(index, metric.RawResidual(j)).innovation;
 }
 
 Diagnosis::Diagnosis(const codegen::Model& model, const codegen::Catalogue& catalogue,

@@ -50,6 +50,7 @@ struct Term {
   Eigen::MatrixXd covariance;  // of eta, then amplitude
   double score = 0;
   double log_chance = 0;               // natural logarithm of the chance that noise alone gains as much, at most
+  double log_limit = kLogRare;         // of that chance: a term with a larger one was not accepted
   Eigen::VectorXd folds;               // improvement of chi^2 out of fold
   std::vector<std::string> also_fits;  // kinds that this log cannot tell from it
   std::vector<Rival> rivals;           // the runner-up, then those of also_fits that are not it
@@ -76,7 +77,8 @@ struct Finding {
   std::vector<Term> terms;            // strongest first; empty: nothing is missing
   calibration::Fit declared;          // the declared model, fitted on train
   Eigen::VectorXd x;                  // filter coordinates and gains with the terms in
-  Eigen::VectorXd sigma, innovation;  // [n] residual and innovation standard deviation with the terms in
+  Eigen::VectorXd sigma, innovation;  // [n] residual and innovation standard deviation with the terms in; a joint at
+                                      // rest has no innovation: NaN
   std::vector<Limit> limits;          // by joint, then size
   Eigen::VectorXd smallest;           // [n] the median of a joint's limits; infinity: it has none
   std::vector<int> at_turns;          // joints whose rows near turns and at rest were fitted, too

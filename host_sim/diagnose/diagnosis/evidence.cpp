@@ -232,9 +232,12 @@ VectorXd OwnSignal(const Candidate& candidate, const Evidence& evidence, std::st
 bool HasEnough(const RowIndex& rows) { return rows.size() >= (rows.averaged() ? kFewAverages : kFewRows); }
 
 bool IsExcited(const Candidate& candidate, const Evidence& evidence) {
-  const int j = candidate.joints().empty() ? candidate.rows().back() : candidate.joints()[0];
+  const auto enough = [&](int j) { return HasEnough(evidence.index[static_cast<std::size_t>(j)]); };
+  // What belongs to no joint may show on any joint that it moves.
+  if (candidate.joints().empty()) return std::any_of(candidate.rows().begin(), candidate.rows().end(), enough);
+  const int j = candidate.joints()[0];
   const auto& joint = evidence.model->robot().joint[j];
-  if (!HasEnough(evidence.index[j])) return false;
+  if (!enough(j)) return false;
   for (const std::string& need : candidate.record().needs) {
     if (need == "low_speed" || need == "high_speed") {
       const VectorXd v = OwnSignal(candidate, evidence, "qd").cwiseAbs();

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "host_sim/diagnose/diagnosis/search.hpp"
+#include "host_sim/diagnose/diagnosis/selector.hpp"
 #include "host_sim/diagnose/diagnosis/work.hpp"
 
 namespace armcal::diagnosis {
@@ -18,14 +19,14 @@ constexpr double kTried = 10;       // members of a usual grid
 constexpr double kRounding = 1e-4;  // of a column's own square: so little beside the declared model is rounding
 
 // What a term must gain to be accepted.
-double Needed(Candidate& c, const std::vector<double>& eta, const Evidence& evidence) {
+double Needed(Candidate& c, const std::vector<double>& eta, const Evidence& evidence, double log_limit) {
   Found f;
   f.candidate = &c;
   f.tried = c.unknowns().empty() ? 1 : kTried;
   f.gain.rank = c.columns(eta);
   f.searched = static_cast<int>(c.unknowns().size());
   f.penalty = PenaltyOf(f.gain.rank + f.searched, c, evidence);
-  return std::max(GainOfChance(f, kLogRare), GainOfScore(f));
+  return std::max(GainOfChance(f, log_limit), GainOfScore(f));
 }
 
 }  // namespace
@@ -51,6 +52,7 @@ std::vector<Limit> DetectionLimits(Diagnosis::Work& w) {
       continue;
     const std::vector<double> eta = c->Initial();
     const Columns columns = GatherColumns(*c, w.evidence, eta);
+    const double needed = Needed(*c, eta, w.evidence, LogLimit(c->record(), *w.train[0]));
     Limit limit{&c->record(), c->joints(), c->rows()[0], std::numeric_limits<double>::infinity()};
     for (int k = 0; k < columns.count(); ++k) {
       const VectorXd a = VectorXd::Unit(columns.count(), k);
@@ -67,7 +69,7 @@ std::vector<Limit> DetectionLimits(Diagnosis::Work& w) {
       const auto at = static_cast<std::size_t>(largest);
       const double own = w.rows.index[at].size() * std::pow(size / noise[at].innovation, 2);
       if (!(seen > kRounding * own)) continue;
-      const double rms = size * std::sqrt(Needed(*c, eta, w.evidence) / seen);
+      const double rms = size * std::sqrt(needed / seen);
       if (rms < limit.rms_Nm) limit.rms_Nm = rms, limit.joint = largest;
     }
     out.push_back(limit);

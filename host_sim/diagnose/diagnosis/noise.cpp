@@ -95,7 +95,7 @@ NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
   std::vector<double> power{std::max(e.squaredNorm() / count, 1e-48)};  // what each order leaves
   noise.innovation = std::sqrt(std::max(power[0], 1e-24));
   const std::vector<std::pair<int, int>> stretches = Stretches(rows);
-  VectorXd ahead = e, back = e;  // what is left of a row by the rows before it, and by those after it
+  VectorXd ahead = e, back = e, past;  // what is left of a row by the rows before it, and by those after it
   std::vector<VectorXd> predictor{VectorXd()};
   double least = count * std::log(power[0]);
   int order = 0;
@@ -112,12 +112,14 @@ NoiseModel FitNoise(const RowIndex& rows, const VectorXd& e) {
     }
     if (pairs < kPairsOfALag * (m + 1) || squares <= 0) break;  // too few pairs tell nothing of a lag
     const double reflection = std::clamp(2 * product / squares, -kSurest, kSurest);
-    for (const auto& [begin, end] : stretches)
-      for (int k = end - 1; k > begin + m; --k) {
-        const double before = ahead[k];
-        ahead[k] -= reflection * back[k - 1];
-        back[k] = back[k - 1] - reflection * before;
-      }
+    for (const auto& [begin, end] : stretches) {
+      const int size = end - begin - m - 1;
+      if (size <= 0) continue;
+      auto later = ahead.segment(begin + m + 1, size);
+      past = back.segment(begin + m, size);
+      back.segment(begin + m + 1, size) = past - reflection * later;
+      later -= reflection * past;
+    }
     const VectorXd& shorter = predictor.back();
     VectorXd next(m + 1);
     for (int i = 0; i < m; ++i) next[i] = shorter[i] - reflection * shorter[m - 1 - i];

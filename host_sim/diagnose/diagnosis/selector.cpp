@@ -72,11 +72,9 @@ bool IsFiltered(const calibration::Dataset& log) {
   return !log.channel.empty() || (log.saved_Hz.size() && log.saved_Hz.array().isFinite().any());
 }
 
-// Neither noise nor one term too many explains the gain. A fault of a sensor imitates a little of many causes, and so
-// does what is not known of a filter.
+// Neither noise nor one term too many explains the gain.
 bool IsRare(const Found& f, const calibration::Dataset& log) {
-  const bool is_sensor = f.candidate->record().effect_class == codegen::EffectClass::kSensor;
-  return f.log_chance < (is_sensor || IsFiltered(log) ? kLogSurely : kLogRare) && f.score > 0;
+  return f.log_chance < LogLimit(f.candidate->record(), log) && f.score > 0;
 }
 
 // Of these rows alone: where one is left out a segment ends.
@@ -91,6 +89,11 @@ RowIndex Segments(const RowIndex& all, const std::vector<int>& kept) {
 }
 
 }  // namespace
+
+// A fault of a sensor imitates a little of many causes, and so does what is not known of a filter.
+double LogLimit(const codegen::EffectRecord& record, const calibration::Dataset& log) {
+  return record.effect_class == codegen::EffectClass::kSensor || IsFiltered(log) ? kLogSurely : kLogRare;
+}
 
 bool SharesJoint(const Candidate& a, const Candidate& b) {
   return std::any_of(a.rows().begin(), a.rows().end(),
@@ -388,41 +391,42 @@ bool Selector::AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& t
 
 // The derivation of speed and acceleration leaves errors that look like delay, elasticity or backlash. A real term
 // gains about as much when they are derived with a lower bandwidth. A term of high frequencies loses more: it must then
-// be acceptable there, too, and as large as before.
-bool Selector::StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Columns& columns,
-                                     const Gain& gain, const Metric& wide) {
-  if (!w_.narrow) return true;
+// be acceptable there, too, and as large as before. Says why it is not accepted; empty: it is.
+std::string Selector::WhyNotAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms,
+                                             const Columns& columns, const Gain& gain, const Metric& wide) {
+  if (!w_.narrow) return "";
   Diagnosis::Work& narrow = *w_.narrow;
   narrow.PrepareAsIn(w_, terms, *f.candidate);
   const Metric metric(narrow.rows, wide.noise());
   const Columns c = GatherColumns(*f.candidate, narrow.evidence, f.eta);
   const double left = metric.Try(c).gain;
-  if (left > kStays * gain.gain) return true;
-  return LogChance(f, left) < kLogSurely && left > kAsLarge * metric.Imitates(c, c, gain.amplitude).second &&
-         IsOfTheMotion(f, columns, gain.amplitude, wide);
+  if (left > kStays * gain.gain) return "";
+  if (LogChance(f, left) > kLogSurely || left < kAsLarge * metric.Imitates(c, c, gain.amplitude).second)
+    return "it does not keep its gain where speed and acceleration are derived with a lower bandwidth";
+  return WhyNotOfTheMotion(f, terms, columns, gain.amplitude, wide);
 }
 
-// The training logs minus the torque of a term, where a row is a sample.
-std::vector<calibration::Dataset> Selector::Without(const Columns& columns, const VectorXd& amplitude) const {
+// The training logs minus the torque of the terms so far and of one more.
+std::vector<calibration::Dataset> Selector::Without(const std::vector<const Chosen*>& terms, const Found& f,
+                                                    const VectorXd& amplitude) const {
   std::vector<calibration::Dataset> out;
-  for (const calibration::Dataset* log : w_.train) out.push_back(*log);
-  for (std::size_t r = 0; r < columns.joints.size(); ++r) {
-    const RowIndex& index = w_.evidence.index[static_cast<std::size_t>(columns.joints[r])];
-    if (index.averaged()) continue;
-    const VectorXd torque = columns.block[r] * amplitude;
-    for (int i = 0; i < index.size(); ++i)
-      out[static_cast<std::size_t>(index.dataset[static_cast<std::size_t>(i)])].tau(
-          index.sample[static_cast<std::size_t>(i)], columns.joints[r]) -= torque[i];
+  for (std::size_t log = 0; log < w_.train.size(); ++log) {
+    const Quantities& q = w_.evidence.logs[log];
+    out.push_back(*w_.train[log]);
+    MatrixXd& tau = out.back().tau;
+    for (std::size_t k = 0; k < terms.size(); ++k)
+      tau -= CandidateTorque(*terms[k]->candidate, q, terms[k]->eta, w_.estimate.amplitude[k]);
+    tau -= CandidateTorque(*f.candidate, q, f.eta, amplitude);
   }
   return out;
 }
 
 // The noise of the derivation is in the logs at every bandwidth, and what smooths it looks like elasticity. Far below
 // the bandwidth hardly any of it is left: a term must show along that motion, too. And where the noise biases the rows
-// of a joint, a term cannot be told from it: the term must show on the other joints. What the term itself explains is
-// not held against it.
-bool Selector::IsOfTheMotion(const Found& f, const Columns& columns, const VectorXd& amplitude,
-                             const Metric& wide) const {
+// of a joint, a term cannot be told from it: the term must show on the other joints. What the term itself and the other
+// terms explain is not held against it. Says why it is not accepted.
+std::string Selector::WhyNotOfTheMotion(const Found& f, const std::vector<const Chosen*>& terms, const Columns& columns,
+                                        const VectorXd& amplitude, const Metric& wide) const {
   const std::vector<calibration::Dataset> smooth = calibration::SmoothedInstruments(w_.train);
   Evidence along{&w_.model, {}, w_.evidence.index};
   const std::set<codegen::InputId> reads = w_.Reads({}, f.candidate);
@@ -430,10 +434,11 @@ bool Selector::IsOfTheMotion(const Found& f, const Columns& columns, const Vecto
     along.logs.push_back(MakeQuantities(w_.model, log, reads));
     Follow(w_.model, w_.arm, w_.estimate.x, w_.declared.eta, reads, along.logs.back());
   }
-  if (LogChance(f, wide.Try(GatherColumns(*f.candidate, along, f.eta)).gain) > kLogSurely) return false;
+  if (LogChance(f, wide.Try(GatherColumns(*f.candidate, along, f.eta)).gain) > kLogSurely)
+    return "along the slow part of the motion it does not show";
   VectorXd z(w_.model.columns() + w_.model.nonlinear());
   z << w_.estimate.x.head(w_.model.columns()), VectorXd::Map(w_.declared.eta.data(), w_.model.nonlinear());
-  const std::vector<calibration::Dataset> left = Without(columns, amplitude);
+  const std::vector<calibration::Dataset> left = Without(terms, f, amplitude);
   std::vector<const calibration::Dataset*> logs;
   for (const calibration::Dataset& log : left) logs.push_back(&log);
   const calibration::Exogeneity e = calibration::TestExogeneity(w_.model, logs, smooth, z);
@@ -443,7 +448,8 @@ bool Selector::IsOfTheMotion(const Found& f, const Columns& columns, const Vecto
     unbiased.joints.push_back(columns.joints[r]);
     unbiased.block.push_back(columns.block[r]);
   }
-  return !unbiased.joints.empty() && LogChance(f, wide.Try(unbiased).gain) < kLogSurely;
+  if (!unbiased.joints.empty() && LogChance(f, wide.Try(unbiased).gain) < kLogSurely) return "";
+  return "the noise of the derived motion is in the same rows, and the logs do not tell the two apart";
 }
 
 // Lag and delay of a torque channel are estimates. Where they are a little wrong, every step of the torque leaves an
@@ -574,8 +580,8 @@ bool Selector::Accept(const Grounds& grounds, const std::vector<const Chosen*>& 
     refused_[f.candidate] = why;
     return false;
   }
-  if (!StaysAtLowerBandwidth(f, terms, c, gain, metric)) {
-    refused_[f.candidate] = "it does not keep its gain where speed and acceleration are derived with a lower bandwidth";
+  if (const std::string why = WhyNotAtLowerBandwidth(f, terms, c, gain, metric); !why.empty()) {
+    refused_[f.candidate] = why;
     return false;
   }
   if (!ShowsInSliding(f, c, noise)) {

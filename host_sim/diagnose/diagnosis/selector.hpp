@@ -10,6 +10,9 @@ namespace armcal::diagnosis {
 
 class Grounds;  // what the candidates of one pass are tried on
 
+// The largest chance that noise alone gains as much, for which a term of this record is accepted on such a log.
+double LogLimit(const codegen::EffectRecord& record, const calibration::Dataset& log);
+
 // They have a torque on the same joint.
 bool SharesJoint(const Candidate& a, const Candidate& b);
 
@@ -38,11 +41,12 @@ class Selector {
   bool AlreadyIn(const Candidate& c, const std::vector<const Chosen*>& terms) const;
   // Best first: by score, but a named cause before a curve that explains little more.
   void Sort(std::vector<Found>& ranked);
-  bool StaysAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Columns& columns,
-                             const Gain& gain, const Metric& wide);
-  bool IsOfTheMotion(const Found& f, const Columns& columns, const Eigen::VectorXd& amplitude,
-                     const Metric& wide) const;
-  std::vector<calibration::Dataset> Without(const Columns& columns, const Eigen::VectorXd& amplitude) const;
+  std::string WhyNotAtLowerBandwidth(const Found& f, const std::vector<const Chosen*>& terms, const Columns& columns,
+                                     const Gain& gain, const Metric& wide);
+  std::string WhyNotOfTheMotion(const Found& f, const std::vector<const Chosen*>& terms, const Columns& columns,
+                                const Eigen::VectorXd& amplitude, const Metric& wide) const;
+  std::vector<calibration::Dataset> Without(const std::vector<const Chosen*>& terms, const Found& f,
+                                            const Eigen::VectorXd& amplitude) const;
   bool ShowsBesideChannel(const Found& f, const Columns& columns, const Metric& metric) const;
   bool ShowsInSliding(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const;
   bool ShowsWhereSignIsSteady(const Found& f, const Columns& columns, const std::vector<NoiseModel>& noise) const;

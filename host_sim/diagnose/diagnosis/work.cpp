@@ -306,12 +306,11 @@ void Diagnosis::Work::Solve(const std::vector<const Chosen*>& terms) {
       out.amplitude.push_back(v.segment(at, t->candidate->columns(t->eta)));
       at += t->candidate->columns(t->eta);
     }
-    out.sigma.resize(n), out.innovation.resize(n);
+    out.sigma.resize(n);
     for (int j = 0; j < n; ++j) {
       const VectorXd e = metric.RawResidual(j);
       out.sigma[j] =
           e.size() ? std::max(1e-12, std::sqrt(e.squaredNorm() / static_cast<double>(e.size()))) : declared.sigma[j];
-      out.innovation[j] = FitNoise(rows.index[j], e).innovation;
     }
     if (terms.empty()) {  // `before` and `after` are then the same fit
       out.x = declared.x;
@@ -545,11 +544,13 @@ void Diagnosis::Work::MakeCoordinates(int size) {
   rows.L.topLeftCorner(active, active) =
       calibration::CovarianceRoot(prior.covariance(declared.active, declared.active));
   // A term has no prior worth the name: a thousand times what one whitened unit in every row of it would need.
-  VectorXd seen = VectorXd::Zero(size);
-  for (int j = 0; j < model.joints(); ++j)
+  VectorXd seen = VectorXd::Zero(size), own = VectorXd::Zero(size);
+  for (int j = 0; j < model.joints(); ++j) {
     seen(rows.columns[j]) += rows.gram[j].diagonal() / (estimate.sigma[j] * estimate.sigma[j]);
+    own(rows.columns[j]).array() += static_cast<double>(rows.index[j].size());
+  }
   for (int i = active; i < size; ++i)
-    if (seen[i] > 0) rows.L(i, i) = 1e3 * std::sqrt(static_cast<double>(evidence.index[0].size()) / seen[i]);
+    if (seen[i] > 0) rows.L(i, i) = 1e3 * std::sqrt(own[i] / seen[i]);
 }
 
 }  // namespace armcal::diagnosis

@@ -50,7 +50,7 @@ struct Diagnosis::Work {
   struct Estimate {
     Eigen::VectorXd x;                       // filter columns and gains
     std::vector<Eigen::VectorXd> amplitude;  // per term
-    Eigen::VectorXd sigma, innovation;
+    Eigen::VectorXd sigma;
   };
   // Leaves the estimate.
   void Solve(const std::vector<const Chosen*>& terms);

@@ -65,9 +65,11 @@ void AddVerdict(report::Page& page, const ordered_json& json) {
   std::vector<std::string> causes;
   for (const ordered_json& term : json.at("terms"))
     causes.push_back(Words(term, "cause") + Words(term, "remark") + ". " + Words(term, "title") + ".");
-  if (json.at("verdict") == "effect") {
-    const auto sure = std::count_if(json["terms"].begin(), json["terms"].end(),
-                                    [](const ordered_json& term) { return Holds(term, "confirmed", true); });
+  // What is in the training log only says nothing about the arm.
+  const auto sure = std::count_if(json.at("terms").begin(), json["terms"].end(), [](const ordered_json& term) {
+    return Holds(term, "confirmed", true) && !Holds(term, "training_only", true);
+  });
+  if (sure > 0) {
     page.Box(report::Tone::kWarning, fmt::format("The model lacks {} effect{}", sure, sure == 1 ? "" : "s"), causes);
   } else if (causes.empty() && json.at("too_short").empty() && !Differs(json)) {
     std::string words =
@@ -192,6 +194,7 @@ void AddParameters(report::Page& page, const ordered_json& json) {
   page.Section("Parameters");
   report::Table found{{"cause", "parameter", "unit", "value", "95 % interval", ""}, {}};
   for (const ordered_json& term : json.at("terms")) {
+    if (Holds(term, "in_fit", false)) continue;
     std::string name = Words(term, "name");
     for (const auto& [parameter, value] : term.at("parameters").items()) {
       const double sd = term.at("parameter_sd").contains(parameter) ? NumberOf(term["parameter_sd"][parameter]) : 0;

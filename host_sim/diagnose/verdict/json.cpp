@@ -149,7 +149,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     for (const int joint : use.joints) term["joints"].push_back(joint + 1);
     term["unknowns"] = use.nonlinear;
     term["signals"] = Signals(t);
-    nlohmann::ordered_json parameters, deviations, units;
+    nlohmann::ordered_json parameters, deviations = nlohmann::ordered_json::object(), units;
     for (std::size_t k = 0; k < t.eta.size(); ++k) {
       parameters[t.unknowns[k].name] = t.eta[k], units[t.unknowns[k].name] = t.unknowns[k].unit;
       if (t.eta_sd[static_cast<Eigen::Index>(k)] > 0)
@@ -157,7 +157,9 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     }
     for (std::size_t c = 0; c < t.columns.size(); ++c) {
       const std::string& name = t.columns[c].name;
-      parameters[name] = t.amplitude[c], deviations[name] = t.sd[c], units[name] = t.columns[c].unit;
+      units[name] = t.columns[c].unit;
+      if (t.in_fit) parameters[name] = t.amplitude[c], deviations[name] = t.sd[c];
+      else parameters[name] = nullptr;
     }
     term["parameters"] = parameters;
     term["parameter_sd"] = deviations;
@@ -165,6 +167,7 @@ nlohmann::ordered_json DiagnosisJson(const DiagnosisView& v) {
     term["eta"] = t.eta, term["amplitude"] = ToList(t.amplitude), term["covariance"] = ToJson(t.covariance);
     term["also_fits"] = t.also_fits;
     term["confirmed"] = t.confirmed;
+    term["in_fit"] = t.in_fit;
     if (t.refuted) term["refuted"] = RefutedJson(*t.refuted);
     if (!t.unconfirmed.empty()) term["unconfirmed"] = t.unconfirmed;
     term["marks"] = MarksJson(t);

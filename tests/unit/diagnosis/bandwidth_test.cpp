@@ -65,6 +65,22 @@ TEST(SecondBandwidth, RefusesWhatOnlyTheNoiseOfTheDerivationShows) {
   EXPECT_EQ(logs.Said(wide, {&narrow}), "");
 }
 
+// Two effects on one joint. The narrow log has slow rows alone: friction at low speed keeps its gain there, the ripple
+// does not. Instruments below 0.3 Hz lose a part of the true motion. What friction does along that part is no noise.
+TEST(SecondBandwidth, KeepsASmallTermBesideALargeOne) {
+  tests::SyntheticArm arm(codegen::ReadRobot("codegen/robots/two_link.toml"), 9);
+  Dataset wide = arm.Run(40, 93, [](const tests::State& s) {
+    if (s.joint != 0) return 0.0;
+    return 2 / (1 + std::pow(s.qd / 0.25, 2)) * (s.qd > 0 ? 1 : -1) + 0.3 * std::cos(7 * s.q);
+  });
+  wide.cutoff_Hz.setConstant(2, 1.5);
+  Dataset narrow = wide;
+  const double slow = 0.4 * wide.s.qd.col(0).cwiseAbs().maxCoeff();
+  narrow.used.col(0).array() *= (wide.s.qd.col(0).array().abs() < slow).cast<int>();
+  const std::string said = Logs().Said(wide, {&narrow});
+  EXPECT_NE(said.find("torque_ripple"), said.npos) << said;
+}
+
 // Lag and delay of both joints, of which the diagnosis is told a little less: at each turn that leaves a peak.
 TEST(TorqueChannel, ThatIsALittleWrong_IsNoFrictionAtTurns) {
   const Logs logs;

@@ -174,6 +174,29 @@ TEST(Diagnosis, CoulombLevelsThatDiffer_AreNamedAtTheirJoint) {
   EXPECT_NEAR(c.finding().terms[0].amplitude[0], 0.2, 4 * c.finding().terms[0].sd[0]);
 }
 
+// Joints are often moved one after the other.
+TEST(Diagnosis, WhereTheFirstJointStands_TheEffectOfAnotherIsFoundWithItsSize) {
+  SyntheticArm arm(TwoLink(), 3);
+  constexpr double kSize_Nm = 0.4;
+  const Dataset log = arm.Run(20, 30, Ripple(2, kSize_Nm, 37.3), 0.5, {0});
+  const Diagnosis diagnosis(arm.model(), tests::Records(), {&log});
+  ASSERT_FALSE(diagnosis.finding().terms.empty());
+  const Term& t = diagnosis.finding().terms[0];
+  EXPECT_EQ(t.record->name, "torque_ripple");
+  EXPECT_EQ(t.joints, std::vector<int>{1});
+  EXPECT_TRUE(t.confirmed) << t.unconfirmed;
+  EXPECT_NEAR(t.amplitude.head(2).norm(), kSize_Nm, 0.1 * kSize_Nm);
+}
+
+TEST(Diagnosis, WhereTheLastJointStands_ADelayOfTheWholeArmIsFound) {
+  SyntheticArm arm(TwoLink(), 9);
+  const Dataset log = calibration::Delayed(arm.Run(20, 90, {}, 0.5, {1}), 0.008);
+  const Diagnosis diagnosis(arm.model(), tests::Records(), {&log});
+  ASSERT_EQ(diagnosis.finding().terms.size(), 1U);
+  EXPECT_EQ(diagnosis.finding().terms[0].record->name, "time_delay");
+  EXPECT_TRUE(std::isnan(diagnosis.finding().innovation[1]));
+}
+
 TEST(Diagnosis, RippleOfUnknownFrequency_IsNamedWithItsFrequency) {
   for (const double k : {37.3, 530.0}) {  // the second: twice a turn of a motor behind 1:265
     Case c(Ripple(1, 0.4, k), 3);

@@ -108,7 +108,7 @@ class CdrWalk {
     for (std::size_t k = Count(field); k > 0; --k) {
       const Bytes name = TakeText();
       names.push_back(name);
-      (out_.shape += name) += '\n';
+      out_.AddToShape(name);
       if (names.size() > kLongestArray) throw io::InputError("a message has more than 256 names");
     }
     return names;

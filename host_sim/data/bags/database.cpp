@@ -16,19 +16,26 @@ class Database {
   Database(const std::string& path, Bytes file) {
     sqlite3* made = nullptr;
     // A database that its writer has closed is read as it lies; one with a journal beside it needs the journal.
-    std::error_code none;
-    const bool journal =
-        std::filesystem::exists(path + "-wal", none) && !std::filesystem::is_empty(path + "-wal", none);
+    const auto has = [&path](const char* end) {
+      std::error_code none;
+      return std::filesystem::exists(path + end, none) && !std::filesystem::is_empty(path + end, none);
+    };
+    const bool journal = has("-wal") || has("-journal");
     const std::string name = path.empty() ? ":memory:" : "file:" + Escaped(path) + (journal ? "" : "?immutable=1");
     const int access = path.empty() ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY | SQLITE_OPEN_URI;
     const int code = sqlite3_open_v2(name.c_str(), &made, access, nullptr);
     database_.reset(made);
     if (code != SQLITE_OK) Fail();
-    if (path.empty() &&
-        sqlite3_deserialize(made, "main", reinterpret_cast<unsigned char*>(const_cast<char*>(file.data())),
-                            static_cast<sqlite3_int64>(file.size()), static_cast<sqlite3_int64>(file.size()),
-                            SQLITE_DESERIALIZE_READONLY) != SQLITE_OK)
-      Fail();
+    if (path.empty()) {
+      unpacked_ = Bytes(file);
+      // SQLite reads no database in memory whose header says that it has a write-ahead log: bytes 18 and 19 are 2.
+      constexpr std::size_t kVersions = 18;
+      if (unpacked_.size() > kVersions + 1) unpacked_[kVersions] = unpacked_[kVersions + 1] = 1;
+      const auto size = static_cast<sqlite3_int64>(unpacked_.size());
+      if (sqlite3_deserialize(made, "main", reinterpret_cast<unsigned char*>(unpacked_.data()), size, size,
+                              SQLITE_DESERIALIZE_READONLY) != SQLITE_OK)
+        Fail();
+    }
     sqlite3_db_config(made, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     sqlite3_db_config(made, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   }
@@ -62,6 +69,7 @@ class Database {
                                      database_ ? sqlite3_errmsg(database_.get()) : "no memory"));
   }
 
+  std::string unpacked_;  // outlives the database
   files::Sqlite database_;
 };
 

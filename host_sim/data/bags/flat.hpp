@@ -21,6 +21,8 @@ struct Flat {
   std::vector<std::string> name;  // of each value, without the topic; empty unless they were asked for
   std::int64_t stamp_ns = 0;      // header.stamp; 0: there is none
 
+  // With its length, so that no other texts give the same shape.
+  void AddToShape(std::string_view text) { ((shape += std::to_string(text.size())) += ':') += text; }
   void Clear() {
     value.clear(), shape.clear(), name.clear();
     stamp_ns = 0;

@@ -61,7 +61,7 @@ class JsonWalk {
     if (list != nullptr) {
       for (const Json& name : *list) {
         own.names.push_back(name.get_ref<const std::string&>());
-        (out_.shape += own.names.back()) += '\n';
+        out_.AddToShape(own.names.back());
       }
       own.path = path.size();
       scope = &own;
@@ -77,7 +77,7 @@ class JsonWalk {
 
   void Member(const std::string& key, const Json& value, const std::string& path, const Scope& scope, bool map,
               int depth) {
-    (out_.shape += key) += ' ';
+    out_.AddToShape(key);
     if (IsNumber(value)) {
       Add(value, named_ ? path + "/" + key : "");
     } else if (value.is_object()) {

@@ -48,7 +48,17 @@ void TopicTable::Decode(Bytes message, bool named) {
   else ReadCdr(definition_, message, named, flat_);
 }
 
-std::size_t TopicTable::AddColumn(const std::string& name) {
+// Of this recording, all topics together.
+void TopicTable::Count(std::size_t more, std::size_t& numbers) {
+  numbers += more;
+  if (numbers > kMostNumbers)
+    throw io::InputError(
+        fmt::format("holds more than {} numbers; split the log, or ask for fewer columns", kMostNumbers));
+}
+
+// Messages before this one have NaN in it.
+std::size_t TopicTable::AddColumn(const std::string& name, std::size_t& numbers) {
+  Count(recorded_ns_.size(), numbers);
   if (names_.size() == kMostColumnsOfTopic)
     throw io::InputError(fmt::format("it has more than {} columns", kMostColumnsOfTopic));
   names_.push_back(name);
@@ -57,7 +67,7 @@ std::size_t TopicTable::AddColumn(const std::string& name) {
 }
 
 // The columns of the values in flat_. Messages of one shape share them.
-const std::vector<int>& TopicTable::Places(Bytes message) {
+const std::vector<int>& TopicTable::Places(Bytes message, std::size_t& numbers) {
   if (!column_.empty() && flat_.shape == last_shape_) return last_place_;
   Decode(message, true);
   last_shape_ = flat_.shape;
@@ -69,7 +79,7 @@ const std::vector<int>& TopicTable::Places(Bytes message) {
     auto [at, fresh] = column_.try_emplace(name, -1);
     if (fresh && column_.size() > kMostColumnsOfTopic)
       throw io::InputError(fmt::format("it has more than {} columns", kMostColumnsOfTopic));
-    if (fresh && wanted_(name)) at->second = static_cast<int>(AddColumn(name));
+    if (fresh && wanted_(name)) at->second = static_cast<int>(AddColumn(name, numbers));
     else if (fresh) ignored_.push_back(name);
     last_place_.push_back(at->second);
   }
@@ -85,7 +95,7 @@ void TopicTable::Add(const Message& message, std::size_t& numbers) {
       data = unpacked_;
     }
     Decode(data, false);
-    const std::vector<int>& place = Places(data);
+    const std::vector<int>& place = Places(data, numbers);
     for (std::vector<double>& column : values_) column.push_back(NAN);
     for (std::size_t k = 0; k < place.size(); ++k)
       if (place[k] >= 0) values_[static_cast<std::size_t>(place[k])].back() = flat_.value[k];
@@ -94,10 +104,7 @@ void TopicTable::Add(const Message& message, std::size_t& numbers) {
   } catch (const io::InputError& error) {
     throw io::InputError(fmt::format("topic {}, message {}: {}", topic_.name, recorded_ns_.size() + 1, error.what()));
   }
-  numbers += values_.size();
-  if (numbers > kMostNumbers)
-    throw io::InputError(
-        fmt::format("holds more than {} numbers; split the log, or ask for fewer columns", kMostNumbers));
+  Count(values_.size(), numbers);
 }
 
 // Some programs leave the stamp out, or never change it.

@@ -27,8 +27,9 @@ class TopicTable {
 
  private:
   void Decode(Bytes message, bool named);
-  const std::vector<int>& Places(Bytes message);
-  std::size_t AddColumn(const std::string& name);
+  const std::vector<int>& Places(Bytes message, std::size_t& numbers);
+  std::size_t AddColumn(const std::string& name, std::size_t& numbers);
+  static void Count(std::size_t more, std::size_t& numbers);
   bool StampsServe() const;
 
   Topic topic_;

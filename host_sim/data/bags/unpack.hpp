@@ -7,8 +7,9 @@
 
 namespace armcal::bags {
 
-// No log shrinks to less than 1/256 of its size; LZ4 cannot do it at all. What claims more is made to fill the memory.
-constexpr std::size_t kExpansion = 256, kExpansionFree_bytes = std::size_t{1} << 20;
+// A constant channel or a black picture shrinks to almost nothing, but no whole log shrinks to less than 1/256 of its
+// size; LZ4 cannot do it at all. What is large and claims more is made to fill the memory.
+constexpr std::size_t kExpansion = 256, kExpansionFree_bytes = std::size_t{64} << 20;
 constexpr std::size_t MostBytes(std::size_t packed) { return kExpansion * packed + kExpansionFree_bytes; }
 
 // Replaces `out` by the `size` bytes that an LZ4 frame or a zstd frame unpacks to. InputError, without a file name: the

@@ -33,7 +33,8 @@ std::string UnpackZstd(Bytes packed) {
   ZSTD_inBuffer in{packed.data(), packed.size(), 0};
   while (in.pos < in.size || hint != 0) {
     if (done == out.size()) out.resize(std::min(most, std::max<std::size_t>(std::size_t{1} << 16, 2 * done)));
-    if (done == out.size()) throw io::InputError("it grows to more than 256 times its size, which no log does");
+    if (done == out.size())
+      throw io::InputError("it grows to more than 64 MB and 256 times its size, which no log does");
     ZSTD_outBuffer room{out.data(), out.size(), done};
     const std::size_t before = in.pos;
     hint = ZSTD_decompressStream(context.get(), &room, &in);

@@ -158,14 +158,20 @@ class MapReader {
     if (node == nullptr) return std::vector<T>(joints_, otherwise);
     const std::string where = key + "." + name;
     const std::string kind = std::is_same_v<T, double> ? "number" : "text";
-    if (const auto one = node->value<T>()) return std::vector<T>(joints_, *one);
+    const auto value_of = [&](const toml::node& of) {
+      const auto value = of.value<T>();
+      if constexpr (std::is_same_v<T, double>)
+        if (value && !std::isfinite(*value)) Fail(where, "expected a finite number");
+      return value;
+    };
+    if (const auto one = value_of(*node)) return std::vector<T>(joints_, *one);
     const toml::array* list = node->as_array();
     if (list == nullptr || list->size() != joints_) {
       Fail(where, "expected one " + kind + " or a list of " + std::to_string(joints_));
     }
     std::vector<T> values;
     for (const toml::node& item : *list) {
-      const auto value = item.value<T>();
+      const auto value = value_of(item);
       if (!value) Fail(where, "expected a list of " + kind + "s");
       values.push_back(*value);
     }

@@ -2,6 +2,8 @@
 #include "host_sim/data/logs/log.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <optional>
 
 #include "codegen/src/io/input_error.hpp"
@@ -150,7 +152,9 @@ Log MakeLog(RawLog raw, int min_samples) {
       ChooseSamples({log.t, log.q, log.tau, raw.missing, log.source, raw.time_column, raw.columns, raw.first_line});
   for (Eigen::MatrixXd* block : {&log.q, &log.tau, &log.qd, &log.qdd, &log.qref, &log.tauff, &log.ext, &log.temp})
     if (block->size() > 0) *block = (*block)(samples.row, Eigen::all).eval();
-  if (raw.flags.size() > 0) log.flags = raw.flags(samples.row, Eigen::all).cast<int>();
+  // A word of 32 bits may be written with or without a sign.
+  const auto bits = [](double flag) { return static_cast<int>(static_cast<std::uint32_t>(std::llrint(flag))); };
+  if (raw.flags.size() > 0) log.flags = raw.flags(samples.row, Eigen::all).unaryExpr(bits);
   log.t = samples.t;
   log.notes.insert(log.notes.end(), samples.notes.begin(), samples.notes.end());
   log.line.resize(log.samples());

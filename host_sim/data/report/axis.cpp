@@ -8,6 +8,8 @@
 
 namespace armcal::report {
 
+constexpr double kEqual = 1e-12;  // of a value
+
 Axis::Axis(const std::vector<double>& values, bool logarithmic, bool include_zero) : logarithmic_(logarithmic) {
   double low = INFINITY, high = -INFINITY;
   for (const double v : values) {
@@ -18,7 +20,9 @@ Axis::Axis(const std::vector<double>& values, bool logarithmic, bool include_zer
   if (low > high) low = logarithmic ? 0.1 : 0, high = 1;
   if (logarithmic) low = std::log10(low), high = std::log10(high);
   if (include_zero) low = std::min(low, 0.0), high = std::max(high, 0.0);
-  if (high == low) low -= std::max(0.5, 0.05 * std::abs(low)), high += std::max(0.5, 0.05 * std::abs(high));
+  // What differs in its last digits only is drawn as equal.
+  if (high - low <= kEqual * std::max(std::abs(low), std::abs(high)))
+    low -= std::max(0.5, 0.05 * std::abs(low)), high += std::max(0.5, 0.05 * std::abs(high));
   const double margin = 0.04 * (high - low);
   low_ = include_zero && low == 0 ? 0 : low - margin;
   high_ = include_zero && high == 0 ? 0 : high + margin;
@@ -31,7 +35,8 @@ void Axis::LinearTicks(int wanted) {
   const double decade = std::pow(10, std::floor(std::log10(raw)));
   const double share = raw / decade;
   step_ = decade * (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10);
-  for (double k = std::ceil(low_ / step_); k * step_ <= high_ + 1e-9 * step_; ++k) ticks_.push_back(k * step_);
+  const double first = std::ceil(low_ / step_);
+  for (int k = 0; (first + k) * step_ <= high_ + 1e-9 * step_; ++k) ticks_.push_back((first + k) * step_);
 }
 
 void Axis::DecadeTicks() {

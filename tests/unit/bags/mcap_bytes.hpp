@@ -3,6 +3,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -35,6 +36,25 @@ inline std::string Chunk(const std::string& records, std::uint32_t checksum) {
 inline std::string Chunk(const std::string& records) {
   return Chunk(records, static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(records.data()),
                                                          static_cast<unsigned>(records.size()))));
+}
+
+// A zstd frame by hand: these bytes as they are, then one byte many times. (RFC 8878)
+inline std::string ZstdFrame(const std::string& bytes, std::size_t times = 0, char repeated = 0) {
+  constexpr std::size_t kBlock = 1 << 16;
+  std::string blocks, frame("\x28\xB5\x2F\xFD\xA0", 5);
+  std::size_t last = 0;
+  const auto add = [&](std::uint32_t type, std::size_t size, const std::string& content) {
+    last = blocks.size();
+    blocks += Int(static_cast<std::uint32_t>(type << 1 | size << 3)).substr(0, 3) + content;
+  };
+  for (std::size_t at = 0; at < bytes.size(); at += kBlock) {
+    const std::string part = bytes.substr(at, kBlock);
+    add(0, part.size(), part);
+  }
+  for (std::size_t left = times; left > 0; left -= std::min(left, kBlock))
+    add(1, std::min(left, kBlock), std::string(1, repeated));
+  blocks[last] = static_cast<char>(blocks[last] | 1);
+  return frame + Int(static_cast<std::uint32_t>(bytes.size() + times)) + blocks;
 }
 
 inline std::string Header() { return Record(1, Text("") + Text("")); }

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "host_sim/data/bags/recording.hpp"
 #include "tests/unit/bags/mcap_bytes.hpp"
 #include "tests/unit/files/temporary_folder.hpp"
@@ -164,6 +166,27 @@ TEST_F(Mcap, TopicThatNobodyAskedFor_MayHoldAnything) {
   const std::string frame = Record(5, Int<std::uint16_t>(8) + std::string(20, '\0') + "frame");
   EXPECT_EQ(ErrorFor(File(Schema() + Channel() + other + frame + Three())), "");
   EXPECT_EQ(rows(), 3);
+}
+
+// Six megabytes of one colour.
+TEST_F(Mcap, APictureThatPacksToAlmostNothing_TakesNothingFromTheOtherTopics) {
+  constexpr std::size_t kPixels = 6'000'000;
+  const std::string other =
+      Record(4, Int<std::uint16_t>(8) + Int<std::uint16_t>(0) + Text("/video") + Text("cdr") + Text(""));
+  const std::string head = Int<std::uint16_t>(8) + std::string(20, '\0'),
+                    records = other + std::string(1, '\5') + Int(std::uint64_t{head.size() + kPixels}) + head;
+  const std::string chunk = Packed(ZstdFrame(records, kPixels, 'a'), "zstd", records.size() + kPixels);
+  ASSERT_EQ(ErrorFor(File(Schema() + Channel() + chunk + Three())), "");
+  EXPECT_EQ(rows(), 3);
+}
+
+TEST_F(Mcap, JsonMessagesOfOneTextAndOtherKeys_KeepTheirNumbersApart) {
+  const auto error = ErrorFor(File(Schema("jsonschema", "{}") + Channel("json") +
+                                   MessageOf(0, R"({"x": 1, "b": "text"})") + MessageOf(1, R"({"x 1b": "text"})")));
+  ASSERT_EQ(error, "");
+  ASSERT_EQ(rows(), 2);
+  EXPECT_EQ(last_.streams[0].values(0, 0), 1);
+  EXPECT_TRUE(std::isnan(last_.streams[0].values(1, 0)));
 }
 
 TEST_F(Mcap, LongArrays_AreNoColumns) {

@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "host_sim/data/bags/recording.hpp"
+#include "host_sim/data/bags/unpack.hpp"
 #include "host_sim/data/files/csv.hpp"
+#include "tests/unit/bags/mcap_bytes.hpp"
 #include "tests/unit/files/temporary_folder.hpp"
 
 namespace armcal::bags {
@@ -67,6 +69,16 @@ TEST(Recordings, JointStatesInChangingOrder_AreThoseOfTheDrive) {
     EXPECT_EQ(recording.notes, std::vector<std::string>{"/joint_states: time is header.stamp"});
     EXPECT_EQ(recording.topics, std::vector<std::string>{"/joint_states (sensor_msgs/msg/JointState)"});
   }
+}
+
+// rosbag2 may write with a write-ahead log. After it has closed the file, the header still says so.
+TEST(Recordings, ADatabaseWithAWriteAheadLog_IsReadWhenItIsPacked) {
+  const TemporaryFolder folder;
+  std::string bytes = UnpackZstd(files::test::ReadBytes(kFolder / "plain.db3.zst"));
+  bytes[18] = bytes[19] = 2;
+  const Recording recording =
+      ReadRecording(folder.Write("wal.db3.zst", test::ZstdFrame(bytes)), {kJointStates, {}, false});
+  ExpectDrive(StreamOf(recording, "/joint_states"), kJointStates);
 }
 
 TEST(Recordings, ColumnsThatNobodyAskedFor_AreNamed) {

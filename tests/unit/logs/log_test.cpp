@@ -40,6 +40,17 @@ Log SixJoints(Eigen::Index samples) {
   return log;
 }
 
+// A status word of 32 bits, as a program writes it that knows no sign: bit 31, saturated, and bit 0.
+TEST(Log, AWordOfFlags_KeepsItsBits) {
+  const TemporaryFolder folder;
+  std::string text = "t,q1,tau1,flag1\n";
+  for (int k = 0; k < 9; ++k)
+    text += std::to_string(0.004 * k) + ",0.1,1," + (k == 4 ? "2147483653" : "-2147483643") + "\n";
+  const Log log = ReadLog(folder.Write("log.csv", text), 2);
+  ASSERT_EQ(log.flags.rows(), 9);
+  for (int k = 0; k < 9; ++k) EXPECT_EQ(log.flags(k, 0) & 7, 5) << k;
+}
+
 TEST(Log, WrittenAndRead_IsTheSameToNineDigits) {
   const TemporaryFolder folder;
   const Log log = SixJoints(500);

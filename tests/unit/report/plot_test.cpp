@@ -36,6 +36,15 @@ double Top(const std::string& svg) {
   return top;
 }
 
+// Two logs may give one parameter but for its last digit.
+TEST(Axis, OfValuesThatDifferInTheirLastDigit_HasFewTicks) {
+  for (const double value : {0.5, -3e9, 1e-12}) {
+    const Axis axis({value, std::nextafter(value, 2 * value)}, false, false);
+    EXPECT_GE(axis.ticks().size(), 2U);
+    EXPECT_LE(axis.ticks().size(), 12U);
+  }
+}
+
 TEST(Plot, LongLine_IsThinnedAndKeepsASingleSamplePeak) {
   Plot plot = Line(100000);
   plot.series[0].y[54321] = 10;

@@ -205,5 +205,16 @@ TEST(LongAcceptedTables, OfModelsDiagnosedFromMeasuredLogs) {
   diagnosed("kuka_kr300", records, (measured / "kr300_benchmark" / "val04.csv.gz").string(), "", {"--turns"});
 }
 
+// What an effect on standby costs is told by leaving it out; the ceilings of its parameters then name nothing.
+TEST(Generate, OfAStandbyEffectWithACeilingOfItsOwn_SaysWhatItCosts) {
+  const fs::path folder = FreshFolder("standby_ceiling");
+  const std::string robot = (folder / "arm.toml").string();
+  std::ofstream(robot) << ReadText("codegen/robots/er20_like.toml")
+                       << "\n[ceilings]\nparameter = { \"torque_offset.To3\" = [-20, 20] }\n";
+  const Outcome o = Tool({"generate", "--robot", robot, "--out", (folder / "model").string()});
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.out.find("standby: torque_offset: "), std::string::npos) << o.out;
+}
+
 }  // namespace
 }  // namespace armcal::tests

@@ -19,6 +19,7 @@ void PrintStandby(const Model& model, const Passport& with) {
     if (use.state != "standby") continue;
     Robot robot = model.robot();
     robot.effect.erase(robot.effect.begin() + static_cast<std::ptrdiff_t>(k));
+    robot.ceilings.parameter.clear();  // they may name what is left out, and cost nothing
     const Model without(robot, LoadCatalogue());
     const Passport less = Emit(without).passport;
     const int columns = model.columns() - without.columns();

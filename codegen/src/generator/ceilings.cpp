@@ -198,6 +198,22 @@ void ApplyOwnBounds(const Model& m, Ceilings& c) {
   }
 }
 
+// The file's own limits and noise must be allowed by its [ceilings].
+void CheckJoints(const Robot& r) {
+  const CeilingSettings& s = r.ceilings;
+  const auto require = [&r](bool fits, const char* key, int joint, const std::string& what) {
+    if (!fits)
+      throw io::InputError(r.path + ": ceilings." + key + ": joint " + std::to_string(joint + 1) + ": " + what +
+                           " of the file lies outside");
+  };
+  require(s.torque_scale[0] <= 1 && 1 <= s.torque_scale[1], "torque_scale", 0, "the scale 1");
+  for (int j = 0; j < r.joints(); ++j) {
+    const Joint& joint = r.joint[static_cast<std::size_t>(j)];
+    require(joint.torque_limit_Nm <= Own(s.torque_Nm, j, joint.torque_limit_Nm), "torque_Nm", j, "the torque limit");
+    require(joint.torque_noise_Nm <= Own(s.noise_Nm, j, INFINITY), "noise_Nm", j, "the torque noise");
+  }
+}
+
 }  // namespace
 
 Ceilings MakeCeilings(const Model& m) {
@@ -212,6 +228,7 @@ Ceilings MakeCeilings(const Model& m) {
   for (int k = m.body_parameters(); k < m.parameters(); ++k)
     c.parameter.push_back(k < m.parameters() - m.nonlinear() ? OfColumn(m, m.table()[k]) : OfUnknown(m.table()[k]));
   ApplyOwnBounds(m, c);
+  CheckJoints(m.robot());
   FindFriction(m, c);
   for (int k = 0; k < m.parameters(); ++k)
     if (const TableParameter& p = m.table()[k]; p.mean < c.parameter[k].low || p.mean > c.parameter[k].high)

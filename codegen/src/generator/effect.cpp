@@ -15,6 +15,7 @@ namespace {
 constexpr const char* kClassWords[] = {"static", "stateful", "run_state", "sensor"};
 constexpr const char* kScopeWords[] = {"joint", "pair", "arm", "body"};
 constexpr const char* kSearchWords[] = {"linear", "profile", "spectral", "spline", "onset", "window", "shared", "none"};
+constexpr const char* kScaleWords[] = {"linear", "log"};
 constexpr const char* kActWords[] = {"", "gain", "delay", "censor"};
 
 std::string ExpressionText(const io::TomlReader& in, std::string_view key, const std::string& otherwise) {
@@ -141,7 +142,7 @@ EffectRecord ReadEffect(const std::filesystem::path& path) {
     p.upper = ExpressionText(t, "upper", "");
     p.initial = ExpressionText(t, "initial", "");
     if (p.lower.empty() || p.upper.empty() || p.initial.empty()) t.Fail("lower", "lower, upper and initial");
-    p.logarithmic = t.Text("scale", "linear") == "log";
+    p.logarithmic = ReadChoice(t, "scale", t.Text("scale", "linear"), kScaleWords) == 1;
     r.nonlinear.push_back(p);
   }
   for (const io::TomlReader& t : in.Tables("state")) r.state.push_back(ReadState(t));

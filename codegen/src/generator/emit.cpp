@@ -75,6 +75,7 @@ void WriteMeaning(const EffectInstance& e, std::ostream& s) {
     s << "\n" << p.name;
     for (const auto& [row, text] : p.rows) s << " " << row << ": " << text;
   }
+  for (const auto& [name, value] : e.constants) s << "\n" << name << " = " << io::NumberText(value);
   s << "\n";
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
@@ -29,7 +30,7 @@ std::string TypeName(const std::string& robot) {  // er20_like -> Er20Like
 }
 
 std::string Float(double value) {
-  if (std::isinf(value)) return value > 0 ? "kInfinity" : "-kInfinity";
+  if (std::abs(value) > std::numeric_limits<float>::max()) return value > 0 ? "kInfinity" : "-kInfinity";
   return io::NumberText(static_cast<double>(static_cast<float>(value))) + "f";
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 #include "codegen/src/generator/derivative.hpp"
 #include "codegen/src/generator/expression.hpp"
@@ -51,7 +52,8 @@ class Names {
   int row = 0;        // the joint whose row is being written
   std::string index;  // text of the array index i
   std::map<std::string, Expr> unknowns;
-  std::map<std::string, Expr> states;  // name -> new value; in its own step the old one
+  std::map<std::string, Expr> states;       // name -> new value; in its own step the old one
+  std::map<std::string, double> constants;  // of the robot file, which were read
 
   Scope scope() {
     const auto sgn = [this](Expr x) {
@@ -90,15 +92,19 @@ class Names {
       const auto equals = line.find('=');
       std::string defined = line.substr(0, equals);
       while (!defined.empty() && defined.back() == ' ') defined.pop_back();
-      if (equals != std::string::npos && defined == name && indices.empty())
-        return value = ParseExpression(g_, line.substr(equals + 1), scope(), record_.path + ": let " + name), true;
+      if (equals == std::string::npos || defined != name || !indices.empty()) continue;
+      if (!open_.insert(name).second) throw io::InputError(record_.path + ": let " + name + ": it reads itself");
+      value = ParseExpression(g_, line.substr(equals + 1), scope(), record_.path + ": let " + name);
+      open_.erase(name);
+      return true;
     }
     if (const QuantityInfo* info = FindWord(name)) return ReadQuantity(*info, indices, value);
     int joint = 0;
     if (!JointOf(indices, joint)) return false;
     double constant = 0;
-    if (RobotConstant(robot_, joint, name, constant)) return value = g_.Constant(constant), true;
-    return false;
+    if (!RobotConstant(robot_, joint, name, constant)) return false;
+    if (name != "pi") constants[name + std::to_string(joint + 1)] = constant;
+    return value = g_.Constant(constant), true;
   }
   // Text of an index: "i" is that of an array parameter.
   const std::string& OrIndex(const std::string& text) const { return text == "i" ? index : text; }
@@ -138,6 +144,8 @@ class Names {
         if (indices.size() != 1 || !AxisOf(OrIndex(indices[0]), id.parameter)) return false;
         break;
     }
+    if (info.quantity == Quantity::kFlangePosition)
+      constants[std::string("base_") + "xyz"[id.parameter]] = robot_.base_xyz_m[static_cast<std::size_t>(id.parameter)];
     value = quantities_(id);
     return true;
   }
@@ -147,6 +155,7 @@ class Names {
   const Robot& robot_;
   const std::vector<int>& joints_;
   const QuantitySource& quantities_;
+  std::set<std::string> open_;  // lets that are being read
 };
 
 double ConstantValue(Graph& g, const std::string& text, const Robot& robot, const std::vector<int>& joints,
@@ -283,6 +292,7 @@ EffectInstance Instantiate(Graph& g, const EffectRecord& record, const Robot& ro
   }
   if (record.effect_class == EffectClass::kStatic && g.states().size() > states_before)
     throw io::InputError(record.path + ": class: expected \"stateful\", since an expression has memory");
+  out.constants = std::move(names.constants);
   return out;
 }
 

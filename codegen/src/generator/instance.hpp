@@ -34,6 +34,7 @@ struct EffectInstance {
   std::vector<EffectColumn> columns;
   std::vector<EffectUnknown> unknowns;
   std::vector<Expr> settled;  // each 1 once its state no longer remembers how it started, 0 before; empty: always
+  std::map<std::string, double> constants;  // of the robot file, which rows and states read: "speed_limit3"
 };
 
 // The value of a quantity of QuantityTable, wherever an effect reads one: a graph input (host, whole logs) or an

@@ -7,6 +7,7 @@
 
 #include "codegen/src/generator/derivative.hpp"
 #include "codegen/src/generator/dynamics.hpp"
+#include "codegen/src/io/faults.hpp"
 #include "codegen/src/io/input_error.hpp"
 
 namespace armcal::codegen {
@@ -109,14 +110,40 @@ Expr Model::QuantityOf(const InputId& id) {
   }
 }
 
+namespace {
+// The values that a robot file gives have names of the record's parameters.
+void CheckNames(const std::string& where, const EffectUse& use, const EffectInstance& effect) {
+  std::vector<std::string> linear, nonlinear;
+  for (const EffectColumn& c : effect.columns) linear.push_back(c.key);
+  for (const EffectUnknown& u : effect.unknowns) nonlinear.push_back(u.key);
+  const auto check = [&](const char* table, const std::map<std::string, double>& values,
+                         const std::vector<std::string>& known) {
+    for (const auto& [name, value] : values) {
+      if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+      const std::string nearest = io::Nearest(name, known);
+      std::string all;
+      for (const std::string& each : known) all += (all.empty() ? "" : ", ") + each;
+      throw io::InputError(where + "." + table + "." + name + ": " +
+                           (!nearest.empty() ? "expected " + nearest
+                            : known.empty()  ? "the record has no such parameters"
+                                             : "expected one of " + all));
+    }
+  };
+  check("mean", use.mean, linear);
+  check("nonlinear", use.nonlinear, nonlinear);
+}
+}  // namespace
+
 void Model::AddEffects(const Catalogue& catalogue) {
   const auto quantities = [this](const InputId& id) { return QuantityOf(id); };
   std::vector<EffectUse> uses = robot_.effect;
   EffectUse law;
   law.effect = kFrictionLaw;
   for (int j = 0; j < joints(); ++j) {
+    // On standby, a law that takes its place is off.
     const bool replaced = std::any_of(uses.begin(), uses.end(), [&](const EffectUse& use) {
-      return FindRecord(catalogue, robot_.path, use.effect).replaces == kFrictionLaw && Contains(use.joints, j);
+      return use.state != "standby" && FindRecord(catalogue, robot_.path, use.effect).replaces == kFrictionLaw &&
+             Contains(use.joints, j);
     });
     if (!replaced) law.joints.push_back(j);
   }
@@ -145,10 +172,11 @@ void Model::AddEffects(const Catalogue& catalogue) {
       }
       if (known < effect_.size()) {
         use_[known] = use;
-        continue;
+      } else {
+        effect_.push_back(Instantiate(*graph_, record, robot_, set, quantities, ordinal));
+        use_.push_back(use);
       }
-      effect_.push_back(Instantiate(*graph_, record, robot_, set, quantities, ordinal));
-      use_.push_back(use);
+      CheckNames(where, use, effect_[known]);
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cctype>
+#include <cstdint>
 #include <fstream>
 #include <numbers>
 
@@ -50,7 +51,9 @@ Motor ReadMotor(const io::TomlReader& in, bool prismatic) {
   motor.AllowOnly(
       {"gear_ratio", "current_A_per_lsb", "torque_constant_NmpA", "torque_constant_tolerance", "rotor_inertia_kgm2"});
   m.counts_per_turn = encoder.Positive("counts_per_turn");
-  m.zero_counts = static_cast<int>(encoder.Number("zero_counts", 0));
+  constexpr std::int64_t kWord = std::int64_t{1} << 32;  // an encoder may be read with or without a sign
+  m.zero_counts =
+      static_cast<std::int32_t>(static_cast<std::uint32_t>(encoder.Integer("zero_counts", -kWord / 2, kWord - 1, 0)));
   m.gear_ratio = motor.Number("gear_ratio");
   if (m.gear_ratio == 0)
     motor.Report("gear_ratio", prismatic ? "motor radians per metre, not zero" : "a ratio, not zero");
@@ -101,7 +104,7 @@ void ReadDrive(const io::TomlReader& in, Joint& j, const std::string& unlimited)
   const std::pair<const char*, const char*> friction[] = {{"Fc", prismatic ? "coulomb_N" : "coulomb_Nm"},
                                                           {"Fv", prismatic ? "viscous_Nspm" : "viscous_Nmsprad"}};
   for (const auto& [name, key] : friction) {
-    j.nominal[name] = in.Number(key, j.nominal[name]);
+    j.nominal[name] = in.NotNegative(key, j.nominal[name]);
     if (in.Has(key)) j.wide.erase(name);
   }
   j.has_motor = in.Has("motor");
@@ -361,10 +364,10 @@ void ReadPrior(const io::TomlReader& in, Robot& r) {
   }
   const io::TomlReader prior = in.Table("prior");
   prior.AllowOnly({"link_relative_sd", "center_floor_m", "inertia_floor_ratio", "friction_relative_sd"});
-  r.link_relative_sd = prior.Number("link_relative_sd", r.link_relative_sd);
-  r.center_floor_m = prior.Number("center_floor_m", r.center_floor_m);
-  r.inertia_floor_ratio = prior.Number("inertia_floor_ratio", r.inertia_floor_ratio);
-  r.friction_relative_sd = prior.Number("friction_relative_sd", r.friction_relative_sd);
+  r.link_relative_sd = prior.NotNegative("link_relative_sd", r.link_relative_sd);
+  r.center_floor_m = prior.NotNegative("center_floor_m", r.center_floor_m);
+  r.inertia_floor_ratio = prior.NotNegative("inertia_floor_ratio", r.inertia_floor_ratio);
+  r.friction_relative_sd = prior.NotNegative("friction_relative_sd", r.friction_relative_sd);
 }
 
 // What stands before the joints.
@@ -379,6 +382,8 @@ void ReadHead(const io::TomlReader& in, Robot& r) {
                          r.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos))
     in.Report("name", "a lower-case letter, then lower-case letters, digits and _");
   r.title = in.Text("title", r.name);
+  if (std::any_of(r.title.begin(), r.title.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }))
+    in.Report("title", "one line of text");
   r.source = in.Text("source");
   const auto gravity = in.Numbers("gravity_mps2", 3);
   std::copy(gravity.begin(), gravity.end(), r.gravity_mps2.begin());
@@ -387,9 +392,8 @@ void ReadHead(const io::TomlReader& in, Robot& r) {
   if (r.sign_law == "tanh")
     r.sign_width_radps = in.Has("sign_width_mps") ? in.Positive("sign_width_mps") : in.Positive("sign_width_radps");
   r.tick_rate_Hz = in.Number("tick_rate_Hz", 1000);
-  const double ticks = in.Number("sample_ticks", 8);
-  if (r.tick_rate_Hz <= 0 || ticks < 1 || ticks > 64) in.Report("sample_ticks", "1..64 at a positive tick_rate_Hz");
-  else if (std::isfinite(ticks)) r.sample_ticks = static_cast<int>(ticks);
+  if (r.tick_rate_Hz <= 0) in.Report("tick_rate_Hz", "a number above zero");
+  r.sample_ticks = static_cast<int>(in.Integer("sample_ticks", 1, 64, 8));
   ReadPrior(in, r);
   if (!in.Has("urdf"))
     for (const char* key : {"tip", "fixed", "packages"})

@@ -186,7 +186,7 @@ class TableBuild {
     if (table_->schema != Model::kSchema) return core::Status::kWrongSchema;
     for (int link = 0; link < Model::kJoints; ++link) {
       float body[kBlock];
-      for (int k = 0; k < kBlock; ++k) body[k] = table_->parameter[link * kBlock + k].mean;
+      for (int k = 0; k < kBlock; ++k) body[k] = internal::Amplitude(table_->parameter[link * kBlock + k]);
       if (!physical::CanExist(body)) return core::Status::kUnphysical;
     }
     for (int k = 0; k < Model::kBodyParameters; ++k) {

@@ -132,7 +132,9 @@ void Device::FillWriting(Words<reg::kWritingBlock>& w) {
   const std::uint32_t writer = map_.sessions().writer();
   const bool there = writer != Sessions::kNobody && map_.sessions().IsPresent(writer);
   w.Set<reg::kWriterSeat>(static_cast<std::uint16_t>(Seated() ? 1 : there ? 2 : 0));
-  w.Set<reg::kSaveWait>(static_cast<std::uint16_t>((transaction_.save_wait_ms() + 999) / 1000));
+  constexpr std::uint32_t kLongest_s = 65535;  // of a register
+  const std::uint32_t wait_s = (transaction_.save_wait_ms() + 999) / 1000;
+  w.Set<reg::kSaveWait>(static_cast<std::uint16_t>(wait_s < kLongest_s ? wait_s : kLongest_s));
 }
 
 void Device::FillTable(Words<reg::kTableBlock>& w) {

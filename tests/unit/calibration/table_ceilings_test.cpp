@@ -164,6 +164,11 @@ TEST(TableCeilings, ARobotFile_MaySetItsOwn_AndTheSchemaStays) {
   EXPECT_NE(refusal("torque = [1.0]\n").find("ceilings.torque"), std::string::npos);
   EXPECT_NE(refusal("parameter = { m9 = [0, 1] }\n").find("ceilings.parameter.m9"), std::string::npos);
   EXPECT_NE(refusal("parameter = { m1 = [0, 1] }\n").find("m1: the model's own value"), std::string::npos);
+  EXPECT_NE(refusal("torque_Nm = [100.0, 10.0]\n").find("ceilings.torque_Nm: joint 2: the torque limit of the file"),
+            std::string::npos);
+  EXPECT_NE(refusal("noise_Nm = [0.01, 1.0]\n").find("ceilings.noise_Nm: joint 1: the torque noise of the file"),
+            std::string::npos);
+  EXPECT_NE(refusal("torque_scale = [1.1, 1.2]\n").find("ceilings.torque_scale"), std::string::npos);
   EXPECT_NE(refusal("parameter = { m1 = [1, 0] }\n").find("ceilings.parameter.m1"), std::string::npos);
 }
 

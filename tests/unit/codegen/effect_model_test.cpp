@@ -4,7 +4,9 @@
 
 #include <random>
 
+#include "codegen/src/generator/emit.hpp"
 #include "codegen/src/generator/model.hpp"
+#include "codegen/src/io/input_error.hpp"
 #include "tests/unit/codegen/effect_run.hpp"
 #include "tests/unit/codegen/kdl_arm.hpp"
 
@@ -231,6 +233,60 @@ TEST(EffectsInAModel, ALawThatReplaces_StandsAlone) {
     EXPECT_EQ(fc, 5) << name;
     EXPECT_GT(own, 2) << name;
   }
+}
+
+// Compiled in and off: the joint keeps its friction until a table switches the law on.
+TEST(EffectsInAModel, ALawOnStandby_LeavesCoulombAndViscousFriction) {
+  for (const auto& [name, record] : Records()) {
+    if (record.replaces.empty()) continue;
+    codegen::EffectUse off = Use(name, {3});
+    off.state = "standby";
+    WithEffect arm(off);
+    double friction = 0;
+    for (const auto& p : arm.model().table())
+      if (p.effect == record.replaces && p.joint == 3) friction += p.mean;
+    EXPECT_GT(friction, 0) << name;
+  }
+}
+
+TEST(EffectsInAModel, ValuesOfUnknownNames_AreRefusedWithTheNearest) {
+  const auto error = [](const codegen::EffectUse& use) -> std::string {
+    try {
+      WithEffect arm(use);
+      return "";
+    } catch (const io::InputError& e) {
+      return e.what();
+    }
+  };
+  codegen::EffectUse ripple = Use("torque_ripple", {2});
+  ripple.nonlinear["k"] = 20;
+  EXPECT_EQ(error(ripple), "");
+  ripple.nonlinear["kk"] = 20;
+  EXPECT_NE(error(ripple).find("effect.torque_ripple.nonlinear.kk: expected k"), std::string::npos) << error(ripple);
+  codegen::EffectUse offset = Use("torque_offset", {2});
+  offset.mean["Tq"] = 1;
+  EXPECT_NE(error(offset).find("effect.torque_offset.mean.Tq: expected "), std::string::npos) << error(offset);
+  offset.mean.clear(), offset.nonlinear["k"] = 1;
+  EXPECT_NE(error(offset).find("the record has no such parameters"), std::string::npos) << error(offset);
+}
+
+// What a column means hangs on the robot's numbers that its law reads, and on no others.
+TEST(EffectsInAModel, Schema_ChangesWithTheNumbersThatALawReads) {
+  const auto schema = [](const std::string& effect, const std::vector<int>& joints, const auto& change) {
+    codegen::Robot robot = codegen::ReadRobot("codegen/robots/er20_like.toml");
+    robot.effect = {Use(effect, joints)};
+    change(robot);
+    return codegen::Schema(codegen::Model(robot, Records()));
+  };
+  const auto same = [](codegen::Robot&) {};
+  const auto faster = [](codegen::Robot& r) { r.joint[2].speed_limit_radps *= 2; };
+  const auto other = [](codegen::Robot& r) { r.joint[4].speed_limit_radps *= 2; };
+  const auto higher = [](codegen::Robot& r) { r.base_xyz_m[2] += 1; };
+  EXPECT_NE(schema("friction_table", {2}, faster), schema("friction_table", {2}, same));
+  EXPECT_EQ(schema("friction_table", {2}, other), schema("friction_table", {2}, same));
+  EXPECT_EQ(schema("torque_offset", {2}, faster), schema("torque_offset", {2}, same));
+  EXPECT_NE(schema("flange_hose", {}, higher), schema("flange_hose", {}, same));
+  EXPECT_EQ(schema("torque_offset", {2}, higher), schema("torque_offset", {2}, same));
 }
 
 }  // namespace

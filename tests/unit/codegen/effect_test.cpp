@@ -222,6 +222,11 @@ TEST_F(BadFile, RecordWithMemoryOrSensor_IsRefusedWithItsKey) {
   ExpectError(use(record("sensor", "apply = { how = \"guess\", by = \"a\" }\n", "1")), "gain, delay, censor");
   ExpectError(use(record("static", "search = { how = \"luck\" }\n", "1")), "search");
   ExpectError(use(record("dynamic", "", "1")), "class");
+  ExpectError(use(record("static", "let = [\"qd = abs(qd)\"]\n", "qd")), "let qd: it reads itself");
+  ExpectError(use(record("static", "let = [\"u = v\", \"v = u + 1\"]\n", "u")), "it reads itself");
+  EXPECT_NO_THROW(use(record("static", "let = [\"u = v*v\", \"v = abs(qd)\"]\n", "u + v"))());
+  const std::string scale = "[[nonlinear]]\nname = \"T\"\nunit = \"s\"\nlower = 1\nupper = 3\ninitial = 2\nscale = ";
+  ExpectError(use(record("static", scale + "\"logarithmic\"", "qd*T")), "scale: expected one of linear, log");
 }
 
 TEST_F(BadFile, Robot_IsRefusedWithFileAndKey) {

@@ -122,6 +122,15 @@ TEST_F(RobotFile, WithoutAFault_IsRead) {
   Expect("arm.toml", {});
 }
 
+// The counts of an encoder may wrap: one position, two ways to write it.
+TEST_F(RobotFile, AnEncodersZero_MayBeReadWithOrWithoutASign) {
+  for (const char* zero : {"3000000000", "-1294967296"}) {
+    Write("good.toml", kGood,
+          {{"counts_per_turn = 65536", std::string("counts_per_turn = 65536, zero_counts = ") + zero}});
+    EXPECT_EQ(codegen::ReadRobot(folder_ / "good.toml").joint[0].motor.zero_counts, -1294967296);
+  }
+}
+
 TEST_F(RobotFile, OfDhRows_SaysAllFaultsAtOnce) {
   const std::vector<std::pair<std::vector<Change>, std::vector<std::string>>> cases = {
       {{{"name = \"pan_tilt\"\n", ""}}, {".toml: name: missing, expected a string"}},
@@ -162,6 +171,14 @@ TEST_F(RobotFile, OfDhRows_SaysAllFaultsAtOnce) {
          "\"slide\""}},
        {"effect[1].state: expected \"estimated\"", "effect[1].joints: expected joint numbers 1..2"}},
       {{{"d_m = 0.30", "d_m = 0,30"}}, {".toml: line 10, column"}},
+      {{{"counts_per_turn = 65536", "counts_per_turn = 65536, zero_counts = 5000000000"}},
+       {"joint[1].encoder.zero_counts: expected an integer from -2147483648 to 4294967295"}},
+      {{{"motor = {", "coulomb_Nm = -1.0\nviscous_Nmsprad = -2.0\nmotor = {"}},
+       {"joint[1].coulomb_Nm: expected", "joint[1].viscous_Nmsprad: expected"}},
+      {{{"dh = \"modified\"", "dh = \"modified\"\nsample_ticks = 8.9\ntitle = \"\"\"two\nlines\"\"\""}},
+       {"sample_ticks: expected an integer from 1 to 64", "title: expected one line of text"}},
+      {{{"dh = \"modified\"", "dh = \"modified\"\nprior = { link_relative_sd = -0.3 }"}},
+       {"prior.link_relative_sd: expected"}},
   };
   int number = 0;
   for (const auto& [changes, expected] : cases) {

@@ -144,6 +144,9 @@ TEST_F(AdoptedTableTest, Refusal_LeavesItByteForByte) {
   table.parameter[10].mean = -0.1f;
   EXPECT_EQ(Build(), Status::kUnphysical);
   table = good;
+  table.parameter[4].state = ParameterState::kStandby;  // off: a body without its inertia about x
+  EXPECT_EQ(Build(), Status::kUnphysical);
+  table = good;
   table.parameter[11].sd = 1e30f;
   EXPECT_EQ(Build(), Status::kNotFinite);
   std::memcpy(after.data(), adopted.get(), sizeof *adopted);

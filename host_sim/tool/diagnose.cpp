@@ -122,6 +122,7 @@ namespace {
 int RunOneDiagnosis(const DiagnoseOptions& o) {
   if (o.robot.empty() || o.train.empty() || o.test.empty())
     throw io::InputError("expected --robot, --train and --test, or --batch, or --splits, or --summary");
+  TryFleet(o.fleet);
   const auto run = RunDiagnosis(o);
   KeepVerdicts(o.fleet, {{o.fleet.arm.empty() ? run->model->robot().name : o.fleet.arm, run->json}});
   return kOk;

@@ -283,6 +283,7 @@ void AddBatchOptions(CLI::App& verb, BatchOptions& b) {
 
 int RunBatch(const DiagnoseOptions& one, const BatchOptions& batch) {
   Check(one, batch);
+  TryFleet(one.fleet);
   if (!batch.splits.empty()) return RunSplits(one, batch);
   const verdict::Verdicts verdicts = batch.summary.empty()
                                          ? DiagnoseAll(Part(FindCases(batch.folder, one.robot), batch.part), one, batch)

@@ -44,9 +44,7 @@ void AddEvaluate(CLI::App& app, Action& action) {
   AddGivenOptions(*verb, o->given);
   verb->add_option("logs", o->logs, "log(s) to predict")->required();
   AddLogFormat(*verb, o->format);
-  verb->add_option("--band", o->band_Hz,
-                   "also compare in the band below this frequency (Hz): torque and prediction through the same "
-                   "zero-phase filter");
+  AddBand(*verb, o->band_Hz);
   AddCutoff(*verb, o->cutoff_Hz);
   verb->add_option("--json", o->json, "write everything here");
   verb->callback([o, &action] { action = [o] { return RunEvaluate(*o); }; });

@@ -61,8 +61,9 @@ void KeepVerdicts(const FleetOptions& o, const verdict::Verdicts& verdicts,
   for (const auto& [arm, verdict] : verdicts) {
     const auto named = log.find(arm);
     const std::string path = named != log.end() ? named->second : verdict.value("test", std::string());
-    fleet::Entry e{arm, o.date, path.empty() ? arm : path, verdict.dump()};  // the name where the log is not here
-    if (std::filesystem::exists(path)) {                                     // a file, or a bag's folder
+    fleet::Entry e{arm, o.date, path.empty() ? arm : path, verdict.dump(),  // the name where the log is not here
+                   verdict::Failed(verdict)};
+    if (std::filesystem::exists(path)) {  // a file, or a bag's folder
       e.hash = files::FileHash(path);
       if (e.date.empty()) e.date = Utc(ChangeTime(path));
     }

@@ -21,7 +21,7 @@ void AddFleetOptions(CLI::App& verb, FleetOptions& o, const std::string& what, c
 // For the verbs that change or judge a drive.
 void AddDriveFleetOptions(CLI::App& verb, FleetOptions& o, const std::string& what);
 
-// Nothing without --db. So a database that cannot be written is named before a drive is changed.
+// Nothing without --db. So a database that cannot be written is named before a long run, and before a drive is changed.
 void TryFleet(const FleetOptions& o);
 
 // Nothing without --db. The names of the verdicts are those of the arms. log: held-out logs by arm; for others the

@@ -417,9 +417,7 @@ void AddIdentify(CLI::App& app, Action& action) {
       "another method than the weighted fit with prior: a name of the survey's, see docs; auto: instrumental "
       "variables where the regressors are not free of the torque's error and the control law is known");
   verb->add_option("--table-out", o->table, "parameter table to write");
-  verb->add_option(
-      "--band", o->band_Hz,
-      "also compare in the band below this frequency (Hz): residual and torque through the same zero-phase filter");
+  AddBand(*verb, o->band_Hz);
   AddCutoff(*verb, o->cutoff_Hz);
   verb->add_flag("--force", o->force, "let parameters move that the data hardly determine");
   verb->add_option("--json", o->json, "write everything here");

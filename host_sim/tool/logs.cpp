@@ -45,17 +45,30 @@ void AddLogFormat(CLI::App& verb, LogFormat& format) {
   AddMessages(verb, format.messages)->needs(channels);
 }
 
-void AddCutoff(CLI::App& verb, double& cutoff_Hz) {
-  const auto read = [&cutoff_Hz](const std::string& text) {
+namespace {
+// The longest log is shorter than a period of a lower one.
+constexpr double kLowest_Hz = 1e-6;
+
+void AddFrequency(CLI::App& verb, const std::string& option, double& value_Hz, const std::string& help) {
+  const auto read = [option, &value_Hz](const std::string& text) {
     const char* end = text.data() + text.size();
-    const auto [rest, error] = std::from_chars(text.data(), end, cutoff_Hz);
-    if (error != std::errc() || rest != end || !std::isfinite(cutoff_Hz) || cutoff_Hz <= 0)
-      throw io::InputError("--cutoff " + text + ": expected a frequency above 0 Hz");
+    const auto [rest, error] = std::from_chars(text.data(), end, value_Hz);
+    if (error != std::errc() || rest != end || !std::isfinite(value_Hz) || value_Hz < kLowest_Hz)
+      throw io::InputError(option + " " + text + ": expected a frequency above 0 Hz");
   };
-  verb.add_option_function<std::string>(
-          "--cutoff", read,
-          "derive speed and acceleration below this frequency (Hz); default: chosen from the noise of the log")
-      ->type_name("HZ");
+  verb.add_option_function<std::string>(option, read, help)->type_name("HZ");
+}
+}  // namespace
+
+void AddCutoff(CLI::App& verb, double& cutoff_Hz) {
+  AddFrequency(verb, "--cutoff", cutoff_Hz,
+               "derive speed and acceleration below this frequency (Hz); default: chosen from the noise of the log");
+}
+
+void AddBand(CLI::App& verb, double& band_Hz) {
+  AddFrequency(verb, "--band", band_Hz,
+               "also compare in the band below this frequency (Hz): torque and prediction through the same zero-phase "
+               "filter");
 }
 
 }  // namespace armcal::tool

@@ -49,5 +49,7 @@ CLI::Option* AddMessages(CLI::App& verb, std::vector<std::string>& messages);
 
 // Adds --cutoff. Anything but a frequency is refused in one line.
 void AddCutoff(CLI::App& verb, double& cutoff_Hz);
+// Adds --band, likewise.
+void AddBand(CLI::App& verb, double& band_Hz);
 
 }  // namespace armcal::tool

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/report/table.hpp"
@@ -110,7 +111,8 @@ double Quantile(std::vector<double> v, double share) {
   std::sort(v.begin(), v.end());
   const double at = share * static_cast<double>(v.size() - 1);
   const auto k = static_cast<std::size_t>(at);
-  return k + 1 < v.size() ? v[k] + (at - static_cast<double>(k)) * (v[k + 1] - v[k]) : v[k];
+  const double share_of_next = at - static_cast<double>(k);
+  return share_of_next > 0 ? v[k] + share_of_next * (v[k + 1] - v[k]) : v[k];  // the next one may be infinite
 }
 
 // Refits on blocks drawn anew: how much of the free run's error is luck of the training record.
@@ -123,9 +125,13 @@ void Refits(const ReplayOptions& o, const codegen::Model& model, const std::vect
     settings.resample = true, settings.segment_s = refined.segment_s;
     settings.seed += static_cast<std::uint64_t>(k) + 1;
     const replay::Refined again = replay::Refine(model, training, fit, settings);
-    for (const replay::Record& log : logs)
+    for (const replay::Record& log : logs) {
+      const replay::PositionError e =
+          replay::Replay(model, log, ParametersOf(model, again.x, again.eta), o.start_samples, o.step_s);
+      const bool ran_away = again.agree == 0 || e.ran_away_s > 0;
       rms[static_cast<std::size_t>(k)].push_back(
-          replay::Replay(model, log, ParametersOf(model, again.x, again.eta), o.start_samples, o.step_s).rms);
+          ran_away ? Eigen::VectorXd::Constant(e.rms.size(), std::numeric_limits<double>::infinity()) : e.rms);
+    }
   });
   for (std::size_t l = 0; l < logs.size(); ++l) {
     report::Table t{{"joint", "unit", "median rms", "90 %", "largest"},
@@ -141,6 +147,10 @@ void Refits(const ReplayOptions& o, const codegen::Model& model, const std::vect
       row["rms"].push_back(values);
     }
     fmt::print("{}", report::Text(t));
+    const auto ran_away =
+        std::count_if(rms.begin(), rms.end(), [l](const auto& refit) { return std::isinf(refit[l][0]); });
+    row["ran_away"] = ran_away;
+    if (ran_away > 0) fmt::print("{} of them ran away; they count as an infinite error\n", ran_away);
     json["refits"].push_back(row);
   }
 }

@@ -299,6 +299,10 @@ TEST_F(Mistakes, InOtherVerbsThatReadLogs) {
     mistakes.push_back({"identify --robot er20_like --train {}/good.csv --cutoff " + cutoff,
                         {"--cutoff " + cutoff},
                         {"expected a frequency above 0 Hz"}});
+  for (const std::string band : {"-20", "nan", "1e-300"})
+    mistakes.push_back({"evaluate --robot er20_like {}/good.csv --band " + band,
+                        {"--band " + band},
+                        {"expected a frequency above 0 Hz"}});
   MakeAll(mistakes);
 }
 

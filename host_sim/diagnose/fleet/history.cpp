@@ -53,8 +53,12 @@ void AddNumbers(const ordered_json& verdict, std::size_t log, Courses& courses) 
               {log, load.is_object() ? NumberOf(load.at("mass_kg")) : 0,
                load.is_object() ? NumberOf(load.at("mass_sd_kg")) : 0});
   const ordered_json& errors = verdict.at("after_moving");
+  const auto list = [&](const char* key) { return verdict.value(key, ordered_json::array()); };
+  const ordered_json moves = list("moving_share"), units = list("torque_units");
   for (std::size_t j = 0; j < errors.size(); ++j)
-    courses.Add(kErrorName + std::to_string(j + 1), "N m", {log, NumberOf(errors[j]), 0});
+    if (j >= moves.size() || NumberOf(moves[j]) > 0)  // a joint that rests has no error
+      courses.Add(kErrorName + std::to_string(j + 1), j < units.size() ? units[j].get<std::string>() : "N m",
+                  {log, NumberOf(errors[j]), 0});
 }
 
 void FindChanges(const Course& course, std::vector<Change>& changes) {
@@ -137,7 +141,10 @@ History HistoryOf(const std::vector<Entry>& verdicts, const std::vector<Entry>& 
   for (const Entry& e : verdicts) {
     try {
       const ordered_json verdict = ordered_json::parse(e.json);
-      if (verdict.at("verdict") == "failed") continue;
+      if (verdict.at("verdict") == "failed") {
+        ++history.failed;
+        continue;
+      }
       const std::size_t log = history.entry.size();
       history.terms.push_back(TermsOf(verdict));
       history.entry.push_back(e);
@@ -173,6 +180,7 @@ std::string HistoryText(const History& history) {
   std::string text;
   if (!history.entry.empty()) text = report::Text(t) + (history.change.empty() ? "nothing changed\n" : "changed:\n");
   for (const Change& c : history.change) text += "  " + Words(history, c) + "\n";
+  if (history.failed > 0) text += fmt::format("without a verdict: {} logs\n", history.failed);
   if (!history.event.empty()) text += "the drive:\n";
   for (const Event& e : history.event) text += "  " + e.date + ": " + e.what + "\n";
   return text;
@@ -180,6 +188,7 @@ std::string HistoryText(const History& history) {
 
 ordered_json HistoryJson(const History& history) {
   ordered_json json{{"logs", ordered_json::array()},
+                    {"failed", history.failed},
                     {"courses", ordered_json::array()},
                     {"changes", ordered_json::array()},
                     {"drive", ordered_json::array()}};

@@ -35,6 +35,7 @@ struct Event {
 
 struct History {
   std::vector<Entry> entry;        // without those that failed
+  int failed = 0;                  // so many
   std::vector<std::string> terms;  // of each entry: what was confirmed
   std::vector<Course> course;      // declared parameters, payload, error of each joint on the held-out log
   std::vector<Change> change;      // by log

@@ -100,7 +100,8 @@ void Keep(const fs::path& database, Kind kind, const std::vector<Entry>& entries
   store.Do("CREATE TABLE IF NOT EXISTS " + sheet.name + " (arm TEXT NOT NULL, date TEXT NOT NULL, " + sheet.hash +
            " TEXT NOT NULL, json TEXT NOT NULL, PRIMARY KEY (" + sheet.key + "))");
   for (const Entry& e : entries)
-    store.Do("INSERT OR REPLACE INTO " + sheet.name + " (arm, date, " + sheet.hash + ", json) VALUES (?, ?, ?, ?)",
+    store.Do(std::string("INSERT OR ") + (e.failed ? "IGNORE" : "REPLACE") + " INTO " + sheet.name + " (arm, date, " +
+                 sheet.hash + ", json) VALUES (?, ?, ?, ?)",
              {e.arm, e.date, e.hash, e.json});
   store.Do("COMMIT");
 }

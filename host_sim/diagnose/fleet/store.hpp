@@ -14,7 +14,8 @@ struct Entry {
   std::string date;  // of the log, the change of the table or the reading: "2026-03-01T12:00:00Z"
   // SHA-256 of the held-out log of a verdict, or its name where it cannot be read. CRC of the table of the others.
   std::string hash;
-  std::string json;  // as the verb's --json writes it; a table has its words, too
+  std::string json;     // as the verb's --json writes it; a table has its words, too
+  bool failed = false;  // a run that failed: an entry that is there stays
 };
 
 // All of them or none, on the disk when the call returns. A verdict of the same arm and log is replaced, another entry

@@ -37,7 +37,7 @@ std::string Remedy(const Exogeneity& e) {
   return lower + ", which needs qref in the log and a [control] table in the robot file";
 }
 
-// Sums of one joint over the samples that `counts` says.
+// Of one joint over the samples that `counts` says; NaN: there are none.
 template <class Counts>
 double RootMean(const std::vector<Predicted>& logs, const std::vector<Eigen::MatrixXd>& value, int joint,
                 const Counts& counts) {
@@ -46,7 +46,7 @@ double RootMean(const std::vector<Predicted>& logs, const std::vector<Eigen::Mat
   for (std::size_t l = 0; l < logs.size(); ++l)
     for (int k = 0; k < logs[l].log->samples(); ++k)
       if (counts(*logs[l].log, k)) sum += value[l](k, joint) * value[l](k, joint), ++count;
-  return count ? std::sqrt(sum / count) : 0;
+  return count ? std::sqrt(sum / count) : std::numeric_limits<double>::quiet_NaN();
 }
 
 // Over the joints that have the figure.
@@ -124,9 +124,14 @@ HeldOutError CompareHeldOut(const calibration::Dataset& test, const Eigen::Matri
 void PrintError(const HeldOutError& e, const codegen::Robot& robot, const std::string& of) {
   report::Table t{{"joint", "unit", "error rms", "moving", "moving / torque %", "NRMSE", "R2"}, {}, of};
   const auto add = [](std::vector<std::string>& row, const ErrorFigures& f, int j) {
-    for (const double v : {f.rms[j], f.rms_moving[j]}) row.push_back(fmt::format("{:.4g}", v));
-    row.push_back(fmt::format("{:.2f}", 100 * f.relative[j]));
-    for (const double v : {f.nrmse[j], f.r2()[j]}) row.push_back(std::isnan(v) ? "-" : fmt::format("{:.4f}", v));
+    const auto say = [&row](double v, int digits, char form) {
+      row.push_back(std::isnan(v) ? "-"
+                    : form == 'g' ? fmt::format("{:.{}g}", v, digits)
+                                  : fmt::format("{:.{}f}", v, digits));
+    };
+    for (const double v : {f.rms[j], f.rms_moving[j]}) say(v, 4, 'g');
+    say(100 * f.relative[j], 2, 'f');
+    for (const double v : {f.nrmse[j], f.r2()[j]}) say(v, 4, 'f');
   };
   const bool band = e.band_Hz > 0;
   if (band)

@@ -11,9 +11,9 @@
 
 namespace armcal::verdict {
 
-// Per joint [n]. rms: over scored samples; rms_moving, relative (error / torque): over those where the joint moves.
-// nrmse: rms(error) / std(torque) over every sample of the record, as the public benchmarks define it; R2 is one minus
-// its square.
+// Per joint [n]; NaN: the joint has no such samples. rms: over scored samples; rms_moving, relative (error / torque):
+// over those where the joint moves. nrmse: rms(error) / std(torque) over every sample of the record, as the public
+// benchmarks define it; R2 is one minus its square.
 struct ErrorFigures {
   Eigen::VectorXd rms, rms_moving, relative, nrmse;
   Eigen::VectorXd r2() const { return 1 - nrmse.array().square(); }

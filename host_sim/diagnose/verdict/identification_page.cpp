@@ -26,6 +26,7 @@ bool IsHeldOut(const ordered_json& json) { return json.contains("test"); }
 
 const ordered_json& ErrorOf(const ordered_json& json) { return json.at(IsHeldOut(json) ? "held_out" : "on_training"); }
 
+// NaN: the joint rests.
 std::vector<double> Percent(const ordered_json& json) {
   std::vector<double> out = Numbers(ErrorOf(json).at("relative_moving"));
   for (double& v : out) v *= 100;
@@ -38,7 +39,7 @@ void AddFit(report::Page& page, const ordered_json& json) {
   int joint = 0;
   for (const double v : Percent(json)) {
     ++joint;
-    if (v == 0) rest += fmt::format("{}{}", rest.empty() ? "" : ", ", joint);
+    if (!(v > 0)) rest += fmt::format("{}{}", rest.empty() ? "" : ", ", joint);
     else percent.push_back(v);
   }
   if (percent.empty()) percent = {0};
@@ -104,15 +105,17 @@ void AddColumns(report::Page& page, const ordered_json& json) {
 void WriteIdentificationPage(const std::filesystem::path& path, const ordered_json& json) {
   report::Page page("The identified model of " + json.at("robot").get<std::string>(),
                     "The declared model fitted to the training logs, weighted, with the prior.");
+  std::vector<double> drawn = Percent(json);
+  std::replace_if(
+      drawn.begin(), drawn.end(), [](double v) { return std::isnan(v); }, 0.0);
   page.Columns([&](report::Page& left) { AddFit(left, json); },
                [&](report::Page& right) {
-                 report::Bars bars{{"error over torque", "joint", "%", 460, 300}, {}, {""}, {Percent(json)}};
+                 report::Bars bars{{"error over torque", "joint", "%", 460, 300}, {}, {""}, {drawn}};
                  for (std::size_t j = 0; j < bars.value[0].size(); ++j)
                    bars.categories.push_back(std::to_string(j + 1));
                  right.Add(bars, "Where the joint moves.");
                });
-  const std::vector<double> percent = Percent(json);
-  const int worst = static_cast<int>(std::max_element(percent.begin(), percent.end()) - percent.begin()) + 1;
+  const int worst = static_cast<int>(std::max_element(drawn.begin(), drawn.end()) - drawn.begin()) + 1;
   const std::string log = IsHeldOut(json) ? json["test"] : json.at("train").at(0);
   const std::vector<ShownPrediction> predicted{
       {"predicted", "predicted", "left", report::Style::kLine, kPredictedColour}};

@@ -17,12 +17,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kReach = 100;         // prior of the refinement: this many standard deviations of the fit
-constexpr double kSpread = 10;         // starting points: that many
-constexpr double kDifference = 0.1;    // of a numeric derivative, standard deviations of the fit
-constexpr double kSeenEach_s = 0.02;   // positions are compared this often
-constexpr double kIndependent = 2;     // errors of one segment and joint count as this many: they are one smooth curve
-constexpr double kSearchStart = 0.25;  // share of a segment within which its start is looked for
+constexpr double kReach = 100;          // prior of the refinement: this many standard deviations of the fit
+constexpr double kSpread = 10;          // starting points: that many
+constexpr double kDifference = 0.1;     // of a numeric derivative, standard deviations of the fit
+constexpr double kSeenEach_s = 0.02;    // positions are compared this often
+constexpr double kSeenEachAtLeast = 2;  // comparisons of a segment
+constexpr double kIndependent = 2;      // errors of one segment and joint count as this many: they are one smooth curve
+constexpr double kSearchStart = 0.25;   // share of a segment within which its start is looked for
 constexpr int kParts[] = {24, 12, 6, 3, 2, 1};  // of a block: the lengths that are compared
 constexpr int kRounds = 2;                      // more, with the scale of the errors that are left
 constexpr int kMostSteps = 40;
@@ -31,6 +32,11 @@ constexpr double kSmallGain = 1e-4;  // of the sum of squares: the step was the 
 struct Segment {
   int log = 0, block = 0, first = 0, last = 0;
 };
+
+// The sample where part `k` of `parts` begins.
+int Part(Eigen::Index first, Eigen::Index last, Eigen::Index k, Eigen::Index parts) {
+  return static_cast<int>(first + (last - first) * k / parts);
+}
 
 class Shooting {
  public:
@@ -54,8 +60,8 @@ class Shooting {
       const double length = r.t[b.last] - r.t[b.first];
       const int parts = std::max(1, static_cast<int>(std::lround(length / segment_s)));
       for (int i = 0; i < parts; ++i)
-        out.push_back(WithGoodStart({b.log, b.block, b.first + (b.last - b.first) * i / parts,
-                                     b.first + (b.last - b.first) * (i + 1) / parts}));
+        out.push_back(
+            WithGoodStart({b.log, b.block, Part(b.first, b.last, i, parts), Part(b.first, b.last, i + 1, parts)}));
     }
     return out;
   }
@@ -199,8 +205,8 @@ class Shooting {
                              std::to_string(wanted_s) + " s (--period)");
       block_s_ = std::max(block_s_, all_s / count);
       for (int b = 0; b < count; ++b)
-        block_.push_back({static_cast<int>(l), static_cast<int>(block_.size()), (r.samples() - 1) * b / count,
-                          (r.samples() - 1) * (b + 1) / count});
+        block_.push_back({static_cast<int>(l), static_cast<int>(block_.size()), Part(0, r.samples() - 1, b, count),
+                          Part(0, r.samples() - 1, b + 1, count)});
     }
   }
 
@@ -289,6 +295,9 @@ Refined Refine(const codegen::Model& model, const std::vector<Training>& logs, c
           ": the arm of the fitted parameters runs away in every segment: open loop says nothing here");
     out.segment_s = best->segment_s;
   }
+  if (out.segment_s < kSeenEachAtLeast * kSeenEach_s)
+    throw io::InputError("--segment " + std::to_string(out.segment_s) + ": expected " +
+                         std::to_string(kSeenEachAtLeast * kSeenEach_s) + " s or more");
   const std::vector<Segment> segments = shooting.Cut(out.segment_s);
   if (!shooting.SetScale(segments, at_fit))
     throw io::InputError(logs[0].record.source + ": the arm of the fitted parameters runs away in segments of " +
@@ -312,7 +321,9 @@ Refined Refine(const codegen::Model& model, const std::vector<Training>& logs, c
   // The first scale was the fit's error, which gives the prior too much weight if the fit is poor.
   for (int round = 0; round < kRounds && shooting.SetScale(segments, best_w); ++round)
     shooting.Minimise(segments, weight, best_w);
-  out.agree = static_cast<int>(std::count_if(values.begin(), values.end(), [&](double v) { return v <= 1.01 * best; }));
+  if (std::isfinite(best))
+    out.agree =
+        static_cast<int>(std::count_if(values.begin(), values.end(), [&](double v) { return v <= 1.01 * best; }));
   out.x = shooting.X(best_w);
   out.drift = shooting.Drift(best_w);
   VectorXd e;

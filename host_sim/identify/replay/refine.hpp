@@ -39,7 +39,8 @@ struct Refined {
   Eigen::MatrixXd drift;    // [logs x n] torque zero at the end of a log minus that in its middle
   Eigen::VectorXd rms;      // [n] position error over the segments
   double segment_s = 0;
-  int segments = 0, tries = 0, agree = 0;  // agree: tries that end within 1 % of the smallest sum of squares
+  int segments = 0, tries = 0, agree = 0;  // agree: tries that end within 1 % of the smallest sum of squares;
+                                           // 0: all of them ran away
   struct Length {
     double segment_s, error;  // error: of left-out blocks, in standard deviations of the joint's position
   };

@@ -17,6 +17,11 @@ constexpr int kBrakeTicks = 40;    // current builds up before the brakes open
 constexpr int kPoses = 200;        // of which the lightest decides the gains
 constexpr double kMargin = 0.4;    // crossover x dead time, rad
 
+// Encoders count modulo 2^32.
+double CountsFrom(std::int32_t from, std::int32_t to) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) - static_cast<std::uint32_t>(from));
+}
+
 MotionLimits Limits(const codegen::Robot& robot) {
   const int n = robot.joints();
   MotionLimits limits{Eigen::VectorXd(n), Eigen::VectorXd(n)};
@@ -121,8 +126,8 @@ void SimulatedDrive::Tick() {
   for (int j = 0; j < n; ++j) {
     axis.push_back(firmware_->axis(j));
     const double scale = axis.back().counts_to_rad;
-    q[j] = scale * (static_cast<double>(sensors_.counts[j]) - axis.back().zero_counts);
-    qd[j] = have_previous_ ? scale * (sensors_.counts[j] - previous_counts_[j]) / arm_.tick_s() : 0;
+    q[j] = scale * CountsFrom(axis.back().zero_counts, sensors_.counts[j]);
+    qd[j] = have_previous_ ? scale * CountsFrom(previous_counts_[j], sensors_.counts[j]) / arm_.tick_s() : 0;
   }
   previous_counts_ = sensors_.counts;
   have_previous_ = true;

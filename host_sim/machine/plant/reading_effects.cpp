@@ -86,6 +86,8 @@ class Smoothing : public ReadingEffect {
   explicit Smoothing(const io::TomlReader& keys)
       : lag_s_(keys.Positive("lag_s")), stages_(static_cast<int>(keys.Integer("stages", 1, 2, 1))) {}
   double Pass(double torque, double tick_s, double, double) override {
+    if (!began_) held_[0] = held_[1] = torque;  // as if the torque had been so before
+    began_ = true;
     const double rest = std::exp(-tick_s / lag_s_);
     for (int i = 0; i < stages_; ++i) torque = held_[i] = torque + (held_[i] - torque) * rest;
     return torque;
@@ -96,6 +98,7 @@ class Smoothing : public ReadingEffect {
   double lag_s_;
   int stages_;
   double held_[2] = {0, 0};
+  bool began_ = false;
 };
 
 template <class Effect>

@@ -26,6 +26,7 @@ Entry Verdict(int log, double friction, double error, double payload = 0, const 
   j["declared_parameters"] = {{{"name", "Fc1"}, {"unit", "N*m"}, {"value", friction}, {"sd", sd}}};
   j["payload"] = payload == 0 ? ordered_json() : ordered_json{{"mass_kg", payload}, {"mass_sd_kg", 0.05}};
   j["after_moving"] = {error, 2.0};
+  j["moving_share"] = {0.9, 0.8};
   return {"arm", Date(log), "hash" + std::to_string(log), j.dump()};
 }
 
@@ -80,10 +81,20 @@ TEST(History, OfValuesThatAreAsUncertainAsTheyScatter_NamesNothing) {
   EXPECT_EQ(Changes(entries), Found());
 }
 
+TEST(History, OfALogInWhichAJointRests_TakesNoErrorOfIt) {
+  std::vector<Entry> entries = Months(6, [](int, double&, double&, double&, std::string&) {});
+  ordered_json rests = ordered_json::parse(entries[3].json);
+  rests["after_moving"][0] = 0, rests["moving_share"][0] = 0;
+  entries[3].json = rests.dump();
+  EXPECT_EQ(Changes(entries), Found());
+}
+
 TEST(History, OfAFailedVerdict_LeavesItOut_AndOfAnotherTextSaysSo) {
   std::vector<Entry> entries = Months(3, [](int, double&, double&, double&, std::string&) {});
   entries.push_back({"arm", Date(4), "x", R"({"verdict": "failed", "error": "no log"})"});
   EXPECT_EQ(HistoryOf(entries).entry.size(), 3U);
+  EXPECT_EQ(HistoryOf(entries).failed, 1);
+  EXPECT_NE(HistoryText(HistoryOf(entries)).find("without a verdict: 1 logs"), std::string::npos);
   entries.push_back({"arm", Date(5), "y", R"({"verdict": "none"})"});
   EXPECT_NE(ErrorOf([&] { HistoryOf(entries); }).find(Date(5)), std::string::npos);
 }
@@ -127,6 +138,15 @@ TEST_F(StoreTest, KeepsEntriesByArmAndDate_AndReplacesThoseOfTheSameLog) {
   EXPECT_EQ(entries[2].json, "{33}");
   EXPECT_EQ(ArmsOf(file_), (std::vector<std::string>{"a", "b"}));
   EXPECT_TRUE(EntriesOf(file_, Kind::kVerdict, "c").empty());
+}
+
+TEST_F(StoreTest, ARunThatFailed_DoesNotTakeThePlaceOfAVerdict) {
+  Keep(file_, Kind::kVerdict, {{"a", "2026-03", "h1", "{1}"}});
+  Keep(file_, Kind::kVerdict, {{"a", "2026-03", "h1", "{0}", true}, {"a", "2026-04", "h2", "{0}", true}});
+  ASSERT_EQ(EntriesOf(file_, Kind::kVerdict, "a").size(), 2U);
+  EXPECT_EQ(EntriesOf(file_, Kind::kVerdict, "a")[0].json, "{1}");
+  Keep(file_, Kind::kVerdict, {{"a", "2026-04", "h2", "{2}"}});
+  EXPECT_EQ(EntriesOf(file_, Kind::kVerdict, "a")[1].json, "{2}");
 }
 
 TEST_F(StoreTest, KindsAreApart_AndAnArmThatHasOneIsListed) {

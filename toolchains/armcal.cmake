@@ -97,8 +97,8 @@ function(armcal_need_eigen_once)
   endif()
   set_target_properties(armcal_eigen_once PROPERTIES ${armcal_for_modules} ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
 endfunction()
-set(armcal_shared_headers "${ARMCAL_TOP}/toolchains/eigen_once.hpp" <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <random>
-    <string> <vector>)
+set(armcal_shared_headers "${ARMCAL_TOP}/toolchains/eigen_once.hpp" <algorithm> <cmath> <filesystem> <fstream> <functional>
+    <map> <nlohmann/json.hpp> <random> <string> <vector>)
 
 # armcal_host_library(NAME SOURCES ... [LIBS ...]): a room of codegen/src or host_sim. C++20; includes from the top folder.
 function(armcal_host_library name)

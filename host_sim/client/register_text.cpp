@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "armcal/link/registers.hpp"
+#include "codegen/src/io/json.hpp"
 
 namespace armcal::client {
 
@@ -176,7 +177,7 @@ std::string RegisterJson() {
                              {"range", RangeText(r)}});
     if (r.range.given) json["items"].back()["low"] = r.range.low, json["items"].back()["high"] = r.range.high;
   }
-  return json.dump(2) + "\n";
+  return io::JsonText(json, 2) + "\n";
 }
 
 }  // namespace armcal::client

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "codegen/src/generator/load.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/diagnose/analysis/checked_logs.hpp"
 #include "host_sim/diagnose/analysis/diagnosed.hpp"
 #include "host_sim/diagnose/analysis/evaluated.hpp"
@@ -150,7 +151,7 @@ nb::object Diagnose(const codegen::Model& model, nb::handle train, nb::handle te
 
 }  // namespace
 
-nb::object ToDict(const ordered_json& json) { return nb::module_::import_("json").attr("loads")(json.dump()); }
+nb::object ToDict(const ordered_json& json) { return nb::module_::import_("json").attr("loads")(io::JsonText(json)); }
 
 void BindAnalyses(nb::module_& m) {
   const char* const common =

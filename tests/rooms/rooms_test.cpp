@@ -52,7 +52,7 @@ const Edges kEdges = {
     {"host_sim/data/bags",     {kCode + "io", kHost + "data/files"}},
     {"host_sim/data/logs",     {kCode + "io", kHost + "data/files", kHost + "data/bags"}},
     {"host_sim/data/trajectory", {kCode + "io", kHost + "data/files"}},
-    {"host_sim/data/report",   {kHost + "data/files"}},
+    {"host_sim/data/report",   {kCode + "io", kHost + "data/files"}},
 
     // Identify: parameters from logs, and the motions that show them.
     {"host_sim/identify/search", {kCode + "io"}},  // minimises functions of numbers; the only room that sees pagmo

@@ -7,6 +7,7 @@
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/generator/load.hpp"
 #include "codegen/src/io/atomic_write.hpp"
+#include "codegen/src/io/json.hpp"
 
 namespace armcal::codegen {
 namespace {
@@ -62,7 +63,7 @@ void Generate(const GenerateOptions& o) {
   const nlohmann::ordered_json json{{"robot", model.robot().name}, {"schema", files.schema},
                                     {"folder", folder.string()},   {"multiplications", c.multiplications},
                                     {"additions", c.additions},    {"sincos", c.sincos}};
-  io::AtomicWrite(o.json, json.dump(1) + "\n");
+  io::AtomicWrite(o.json, io::JsonText(json, 1) + "\n");
 }
 
 }  // namespace armcal::codegen

@@ -8,6 +8,7 @@
 #include "codegen/src/generator/ceilings.hpp"
 #include "codegen/src/generator/dynamics.hpp"
 #include "codegen/src/generator/emit_text.hpp"
+#include "codegen/src/io/json.hpp"
 
 namespace armcal::codegen {
 
@@ -237,7 +238,7 @@ std::string Json(const Model& m, std::uint32_t schema, const Functions& f) {
                           {"process_noise", p.process_noise},
                           {"state", p.state},
                           {"group", p.group}});
-  return j.dump(1) + "\n";
+  return io::JsonText(j, 1) + "\n";
 }
 
 std::string ColumnsPage(const Model& m) {

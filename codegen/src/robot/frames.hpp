@@ -17,6 +17,14 @@ inline Eigen::Matrix3d Turn(double angle_rad, const Eigen::Vector3d& axis) {
   return R.unaryExpr([](double v) { return std::abs(v - std::round(v)) < 1e-12 ? std::round(v) + 0.0 : v; });
 }
 
+// The shortest turn that brings z to this direction; half a turn about x if that is -z.
+inline Eigen::Matrix3d TurnFromZ(const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(direction);
+  const double angle = std::atan2(across.norm(), direction.z());
+  const Eigen::Vector3d axis = across.norm() > 0 ? Eigen::Vector3d(across.normalized()) : Eigen::Vector3d::UnitX();
+  return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+}
+
 // Fixed-axis roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll).
 inline Eigen::Matrix3d RollPitchYaw(const Eigen::Vector3d& rpy_rad) {
   return Turn(rpy_rad[2], Eigen::Vector3d::UnitZ()) * Turn(rpy_rad[1], Eigen::Vector3d::UnitY()) *

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 
 namespace armcal::bags {
 
@@ -110,12 +111,8 @@ class JsonWalk {
 
 void ReadJson(Bytes message, bool named, Flat& out) {
   out.Clear();
-  Json json;
-  try {
-    json = Json::parse(message);
-  } catch (const Json::exception&) {
-    throw io::InputError("a message is no JSON");
-  }
+  const Json json = io::ParseJson(message);
+  if (json.is_discarded()) throw io::InputError("a message is no JSON");
   JsonWalk(named, out).Message(json);
 }
 

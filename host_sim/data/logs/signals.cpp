@@ -129,8 +129,9 @@ Samples InGap(const VectorXd& t, const Eigen::MatrixXd& q, Index last, Index mis
   Samples out{VectorXd(missing), {}};
   for (Index i = 0; i < missing; ++i)
     out.t[i] = t[last] + (t[last + 1] - t[last]) * static_cast<double>(i + 1) / static_cast<double>(missing + 1);
-  out.q = powers(out.t) *
-          powers(t.segment(first, end - first)).colPivHouseholderQr().solve(q.middleRows(first, end - first));
+  out.q = powers(out.t) * powers(t.segment(first, end - first))
+                              .colPivHouseholderQr()
+                              .solve(Eigen::MatrixXd(q.middleRows(first, end - first)));
   return out;
 }
 

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "codegen/src/io/json.hpp"
 #include "host_sim/data/report/assets.hpp"
 #include "host_sim/data/report/thin.hpp"
 
@@ -19,7 +20,7 @@ namespace {
 // A JSON string that cannot end the script element around it.
 std::string Quoted(const std::string& text) {
   std::string safe;
-  for (const char c : nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)) {
+  for (const char c : io::JsonText(text)) {
     if (c == '<') safe += "\\u003c";
     else safe += c;
   }

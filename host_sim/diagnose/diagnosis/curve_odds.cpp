@@ -36,8 +36,8 @@ CurveOdds::CurveOdds(const MatrixXd& S, const VectorXd& g, int inner) {
     const MatrixXd root = factor.matrixL();
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(root.transpose() * S * root));
     const VectorXd u = eigen.eigenvectors().transpose() * (root.transpose() * g);
-    priors_.push_back(
-        {factor.solve(MatrixXd::Identity(g.size(), g.size())), eigen.eigenvalues().cwiseMax(0), u.cwiseAbs2()});
+    priors_.push_back({factor.solve(MatrixXd(MatrixXd::Identity(g.size(), g.size()))), eigen.eigenvalues().cwiseMax(0),
+                       u.cwiseAbs2()});
   }
   const Prior& any = priors_[0];
   for (Eigen::Index i = 0; i < any.seen.size(); ++i)

@@ -155,7 +155,7 @@ Projection Metric::Project(const Columns& c) const {
 
 Gain Metric::Try(const Projection& p) const {
   Gain gain = SolveGain(factor_, p);
-  gain.z = z_ - factor_.solve(p.B * gain.amplitude);
+  gain.z = z_ - factor_.solve(VectorXd(p.B * gain.amplitude));
   return gain;
 }
 
@@ -202,7 +202,7 @@ VectorXd Metric::FoldGains(const Columns& c, int blocks, int folds, const Matrix
   for (int f = 0; f < folds; ++f) {
     const MatrixXd others = total - gram[f] + ridge;
     const VectorXd others_right = total_right - right[f], with = others.ldlt().solve(others_right),
-                   without = others.topLeftCorner(d, d).ldlt().solve(others_right.head(d));
+                   without = others.topLeftCorner(d, d).ldlt().solve(VectorXd(others_right.head(d)));
     for (int j = 0; j < n; ++j) {
       const VectorXd own = q_map_[j] * without, extended_own = map[j] * with;
       for (const auto& [begin, end] : fold_rows[f][j]) {
@@ -237,7 +237,7 @@ double Metric::RefittedDeviance(const Columns& c, std::vector<NoiseModel>* all_n
   if (k > 0) {
     const Projection p = Project(c);
     x.tail(k) = SolveGain(factor_, p).amplitude;
-    x.head(d) -= factor_.solve(p.B * x.tail(k));
+    x.head(d) -= factor_.solve(VectorXd(p.B * x.tail(k)));
   }
   std::vector<NoiseModel> noise(c.joints.size());
   const auto refit_noise = [&] {

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <regex>
 
 #include "host_sim/identify/calibration/table_ceilings.hpp"
 
@@ -18,25 +17,36 @@ namespace {
 // The line with each quoted value, a path seen from `folder`, as it is seen from `other`; empty: from anywhere.
 std::string WithPaths(const std::string& line, const std::filesystem::path& folder,
                       const std::filesystem::path& other) {
-  static const std::regex value("=\\s*[\"']([^\"']+)[\"']");
-  std::string out, rest = line;
-  for (std::smatch found; std::regex_search(rest, found, value); rest = found.suffix().str()) {
-    const std::filesystem::path path = std::filesystem::absolute(folder / found[1].str());
+  std::string out;
+  std::size_t done = 0;
+  for (std::size_t equals; (equals = line.find('=', done)) != std::string::npos;) {
+    const std::size_t open = line.find_first_not_of(" \t", equals + 1);
+    const bool quoted = open != std::string::npos && (line[open] == '"' || line[open] == '\'');
+    const std::size_t close = quoted ? line.find(line[open], open + 1) : std::string::npos;
+    if (close == std::string::npos || close == open + 1) {
+      out += line.substr(done, equals + 1 - done);
+      done = equals + 1;
+      continue;
+    }
+    const std::filesystem::path path = std::filesystem::absolute(folder / line.substr(open + 1, close - open - 1));
     const auto near = other.empty() ? path : path.lexically_proximate(std::filesystem::absolute(other));
-    out += found.prefix().str() + "= \"" + near.string() + "\"";
+    out += line.substr(done, equals - done) + "= \"" + near.string() + "\"";
+    done = close + 1;
   }
-  return out + rest;
+  return out + line.substr(done);
 }
 
 // The declared file as it is in `folder`: what it names beside itself is named from there.
 std::string Declared(const std::filesystem::path& path, const std::filesystem::path& folder) {
   std::ifstream in(path);
   std::string text;
-  const std::regex paths("^\\s*(urdf|packages)\\s*=.*"), table("^\\s*\\[.*"), packages("^\\s*\\[\\s*packages\\s*\\].*");
   bool in_packages = false;
   for (std::string line; std::getline(in, line);) {
-    if (std::regex_match(line, table)) in_packages = std::regex_match(line, packages);
-    if (in_packages || std::regex_match(line, paths)) line = WithPaths(line, path.parent_path(), folder);
+    std::string bare = line;
+    std::erase_if(bare, [](char c) { return c == ' ' || c == '\t'; });
+    if (bare.starts_with('[')) in_packages = bare.starts_with("[packages]");
+    const bool names_files = in_packages || bare.starts_with("urdf=") || bare.starts_with("packages=");
+    if (names_files) line = WithPaths(line, path.parent_path(), folder);
     text += line + "\n";
   }
   return text;

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/data/report/page.hpp"
 
 namespace armcal::fleet {
@@ -84,7 +85,7 @@ void FindChanges(const Course& course, std::vector<Change>& changes) {
 
 Event EventOf(const Entry& e, Kind kind) {
   try {
-    const ordered_json json = ordered_json::parse(e.json);
+    const ordered_json json = io::ParseJson(e.json);
     if (kind == Kind::kTable)
       return {e.date, fmt::format("table {} by armcal {}", e.hash, json.at("by").get<std::string>()), json};
     std::vector<std::string> joints;
@@ -97,7 +98,7 @@ Event EventOf(const Entry& e, Kind kind) {
                              : verdict == "misfit" ? fmt::format("joints that do not fit: {}", fmt::join(joints, ", "))
                                                    : "too early to tell";
     return {e.date, fmt::format("health under table {}: {}", e.hash, what), json};
-  } catch (const nlohmann::json::exception&) {
+  } catch (const nlohmann::ordered_json::exception&) {
     RefuseEntry(e, kind == Kind::kTable ? "a table of this version" : "a health reading of this version");
   }
 }
@@ -140,7 +141,7 @@ History HistoryOf(const std::vector<Entry>& verdicts, const std::vector<Entry>& 
   Courses courses;
   for (const Entry& e : verdicts) {
     try {
-      const ordered_json verdict = ordered_json::parse(e.json);
+      const ordered_json verdict = io::ParseJson(e.json);
       if (verdict.at("verdict") == "failed") {
         ++history.failed;
         continue;
@@ -153,7 +154,7 @@ History HistoryOf(const std::vector<Entry>& verdicts, const std::vector<Entry>& 
         history.change.push_back(
             {log, "found: " + OrNothing(history.terms[log]) + "; before: " + OrNothing(history.terms[log - 1]), "", NAN,
              NAN});
-    } catch (const nlohmann::json::exception&) {
+    } catch (const nlohmann::ordered_json::exception&) {
       RefuseEntry(e, "a verdict of this version: diagnose anew");
     }
   }

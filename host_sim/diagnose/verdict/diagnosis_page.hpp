@@ -10,7 +10,7 @@
 namespace armcal::verdict {
 
 // Verdict, error before and after, and what to do; then the curves, the causes, the parameters, what was not looked at.
-// json: as DiagnosisJson gives it. nlohmann::json::exception: it lacks something.
+// json: as DiagnosisJson gives it. nlohmann::ordered_json::exception: it lacks something.
 void AddDiagnosis(report::Page& page, const nlohmann::ordered_json& json);
 
 // The whole page. json: as `armcal diagnose --json` writes it.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/data/files/files.hpp"
 
 namespace armcal::verdict {
@@ -39,13 +40,15 @@ bool IsVerdict(const ordered_json& j) {
 
 }  // namespace
 
-std::string JointText(const ordered_json& joint) { return joint.is_string() ? joint.get<std::string>() : joint.dump(); }
+std::string JointText(const ordered_json& joint) {
+  return joint.is_string() ? joint.get<std::string>() : io::JsonText(joint);
+}
 
 ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed"}, {"error", why}}; }
 bool Failed(const ordered_json& verdict) { return verdict.at("verdict") == "failed"; }
 
 ordered_json ReadVerdict(const fs::path& path) {
-  ordered_json j = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
+  ordered_json j = io::ParseJson(files::ReadWholeFile(path));
   return IsVerdict(j) ? j : FailedVerdict(path.filename().string() + " holds no verdict");
 }
 

@@ -152,7 +152,7 @@ class TableFit {
   }
   // Posterior at the end: deviations of the bodies' table coordinates, covariance of x.
   void Posterior(const VectorXd& u, const MatrixXd& hessian, BarrierFit& fit) const {
-    const MatrixXd P = hessian.ldlt().solve(MatrixXd::Identity(free(), free()));
+    const MatrixXd P = hessian.ldlt().solve(MatrixXd(MatrixXd::Identity(free(), free())));
     const VectorXd t = Table(u);
     fit.bodies_sd = VectorXd::Zero(body_);
     MatrixXd spread = MatrixXd::Zero(start_.size(), free());  // d t / d u, then d y / d u

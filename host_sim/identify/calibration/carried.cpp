@@ -144,9 +144,9 @@ class LoadOfRun {
       for (int j = 0; j < n_; ++j) H += gram[static_cast<std::size_t>(j)] / out.variance[j];
       const Eigen::LLT<MatrixXd> factor(MatrixXd(L.transpose() * H * L + MatrixXd::Identity(size, size)));
       const MatrixXd weighted = right * out.variance.cwiseInverse().asDiagonal();
-      out.share = L * factor.solve(L.transpose() * weighted);
+      out.share = L * factor.solve(MatrixXd(L.transpose() * weighted));
       out.x = out.share.rowwise().sum();
-      out.covariance = L * factor.solve(L.transpose());
+      out.covariance = L * factor.solve(MatrixXd(L.transpose()));
       for (int j = 0; j < n_; ++j) {
         if (count[j] < kFewestRows) continue;
         double sum = 0, inflation = 0;

@@ -85,7 +85,7 @@ double Row::Left(const JointChannel& channel, Index& rows, VectorXd* best, const
   for (double& s : scale) s = s > 0 ? 1 / s : 0;
   MatrixXd H = scale.asDiagonal() * gram * scale.asDiagonal();
   H.diagonal().array() += kLeastPivot;
-  const VectorXd x = scale.asDiagonal() * Eigen::LDLT<MatrixXd>(H).solve(scale.asDiagonal() * right);
+  const VectorXd x = scale.asDiagonal() * Eigen::LDLT<MatrixXd>(H).solve(VectorXd(scale.asDiagonal() * right));
   if (best) *best = x;
   return std::max(1e-300, square - 2 * right.dot(x) + x.dot(gram * x));
 }

@@ -143,7 +143,7 @@ ColumnFitResult ColumnFit::Fit(const Motion& motion, const ColumnChange& change)
     MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
     scaled.diagonal().array() += kRidge;
     factor.compute(scaled);
-    out.x = scale.cwiseProduct(factor.solve(scale.cwiseProduct(g)));
+    out.x = scale.cwiseProduct(factor.solve(VectorXd(scale.cwiseProduct(g))));
     for (int j = 0; j < n; ++j) {
       const auto at = static_cast<std::size_t>(j);
       const VectorXd left = tau[at] - motion.A[at] * out.x(motion.column[at]);
@@ -153,7 +153,8 @@ ColumnFitResult ColumnFit::Fit(const Motion& motion, const ColumnChange& change)
   }
   for (int j = 0; j < n; ++j)
     if (out.spread[j] > 0 && !braked(j)) out.log_left += 2 * std::log(sigma[j] / out.spread[j]);
-  out.covariance = scale.asDiagonal() * factor.solve(MatrixXd::Identity(columns, columns)) * scale.asDiagonal();
+  out.covariance =
+      scale.asDiagonal() * factor.solve(MatrixXd(MatrixXd::Identity(columns, columns))) * scale.asDiagonal();
   return out;
 }
 

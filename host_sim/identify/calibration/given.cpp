@@ -4,19 +4,20 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "codegen/src/io/require_file.hpp"
 #include "codegen/src/robot/body.hpp"
+#include "host_sim/data/files/files.hpp"
 
 namespace armcal::calibration {
 
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 using Values = std::map<std::string, double>;
 
 // Takes values out of the map, so that what is left is what the model does not know.
@@ -153,8 +154,7 @@ Given GivenByTable(const codegen::Model& model, const TableFile& table, const st
 }
 
 Given GivenByJson(const codegen::Model& model, const std::filesystem::path& path) {
-  std::ifstream in(path);
-  const Json json = Json::parse(in, nullptr, false);
+  const Json json = io::ParseJson(files::ReadWholeFile(path));
   const bool known = json.is_object() && (json.contains("columns") || json.contains("parameters"));
   if (!known)
     throw io::InputError(path.string() + ": expected the JSON that armcal identify --json writes, or a table");

@@ -58,7 +58,7 @@ std::vector<int> HardlyDetermined(const codegen::Model& model, const Fit& fit) {
 }
 
 TableFile IdentifiedTable(const codegen::Model& model, const Fit& all, const PhysicalReadOut& bodies,
-                          const VectorXd& noise_density) {
+                          const Eigen::VectorXd& noise_density) {
   TableFile t = DefaultTable(model);
   t.note = "identified";
   const auto& robot = model.robot();

@@ -56,8 +56,8 @@ VectorXd SolveWithPrior(const Information& info, const VectorXd& weight, const P
     const MatrixXd L = CovarianceRoot(Pick(prior.covariance, active));
     const MatrixXd M = L.transpose() * Ha * L + MatrixXd::Identity(a, a);
     const Eigen::LLT<MatrixXd> factor(M);
-    step = L * factor.solve(L.transpose() * ga);
-    if (covariance) P = L * factor.solve(L.transpose());
+    step = L * factor.solve(VectorXd(L.transpose() * ga));
+    if (covariance) P = L * factor.solve(MatrixXd(L.transpose()));
   } else {
     VectorXd scale = Ha.diagonal().cwiseSqrt();
     for (int i = 0; i < a; ++i) scale[i] = scale[i] > 0 ? 1 / scale[i] : 0;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "codegen/src/io/faults.hpp"
+#include "codegen/src/robot/frames.hpp"
 #include "host_sim/identify/description/file_text.hpp"
 #include "host_sim/identify/description/moving_body.hpp"
 #include "host_sim/identify/description/xml_edits.hpp"
@@ -172,8 +173,7 @@ class GivenMjcf {
       R.col(2) = R.col(0).cross(R.col(1));
       return R;
     }
-    if (a.Has("zaxis"))
-      return Quaterniond::FromTwoVectors(Vector3d::UnitZ(), a.Vector("zaxis", Vector3d::UnitZ())).toRotationMatrix();
+    if (a.Has("zaxis")) return codegen::TurnFromZ(a.Vector("zaxis", Vector3d::UnitZ()));
     Matrix3d R = Matrix3d::Identity();
     if (!a.Has("euler")) return R;
     const Vector3d angle = a.Vector("euler", Vector3d::Zero());

@@ -70,9 +70,10 @@ Isometry3d BaseInFile(const DescribedArm& arm, const std::vector<FileJoint>& joi
       if (a.norm() > kSame_m && b.norm() > kSame_m) H += b.normalized() * a.normalized().transpose();
     }
   }
-  const Eigen::JacobiSVD<Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  const Matrix3d R = svd.matrixU() * Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Matrix3d U = svd.matrixU(), V = svd.matrixV();
+  const double sign = U.determinant() * V.determinant();
+  const Matrix3d R = U * Vector3d(1, 1, sign).asDiagonal() * V.transpose();
   // The translation that brings the lines of turning joints onto each other; the shortest one where they leave a
   // choice.
   Matrix3d A = Matrix3d::Zero();
@@ -84,8 +85,8 @@ Isometry3d BaseInFile(const DescribedArm& arm, const std::vector<FileJoint>& joi
   }
   Isometry3d base = Isometry3d::Identity();
   base.linear() = R;
-  Eigen::CompleteOrthogonalDecomposition<Matrix3d> solver;
-  base.translation() = solver.setThreshold(kParallel).compute(A).solve(b);
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+  base.translation() = solver.setThreshold(kParallel).compute(Eigen::MatrixXd(A)).solve(Eigen::VectorXd(b));
   for (std::size_t j = 0; j < own.size(); ++j) {
     const Vector3d axis = R * own[j].axis;
     const double angle = std::atan2(axis.cross(joint[j].axis).norm(), axis.dot(joint[j].axis));

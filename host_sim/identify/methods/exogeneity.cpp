@@ -70,7 +70,7 @@ VectorXd Autoregression(const VectorXd& e, const std::vector<Piece>& pieces) {
   for (int i = 0; i < kOrder; ++i)
     for (int k = 0; k < kOrder; ++k) R(i, k) = r[std::abs(i - k)];
   R.diagonal().array() += 1e-9 * r[0];
-  return R.ldlt().solve(r.tail(kOrder));
+  return R.ldlt().solve(VectorXd(r.tail(kOrder)));
 }
 
 // Rows minus what the model predicts of them; those with a whole past.

@@ -170,7 +170,7 @@ class LogFilter {
     }
     if (!state.allFinite()) return false;
     now.state = state;
-    now.P -= PH * S.solve(PH.transpose());
+    now.P -= PH * S.solve(MatrixXd(PH.transpose()));
     now.P = (0.5 * (now.P + now.P.transpose())).eval();
     return true;
   }

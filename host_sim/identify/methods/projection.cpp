@@ -116,7 +116,7 @@ double Projection::Evaluate(VectorXd& z, VectorXd* gradient, MatrixXd* hessian) 
   // Without a prior, a tiny one keeps directions that no row sees where they are.
   H.diagonal().array() += problem_.covariance.size() > 0 ? 1.0 : 1e-12 * H.diagonal().maxCoeff();
   const Eigen::LLT<MatrixXd> factor(H);
-  const VectorXd w = factor.solve(A.transpose() * target);
+  const VectorXd w = factor.solve(VectorXd(A.transpose() * target));
   z += L_ * w;
   const VectorXd residual = target - A * w;
   double cost = 0.5 * residual.squaredNorm();

@@ -118,7 +118,7 @@ bool Varies(const codegen::Model& model, int joint, int column) {
 }
 
 Eigen::VectorXd SmallestBodies(const codegen::Model& model, const Eigen::VectorXd& z) {
-  return model.base_map().completeOrthogonalDecomposition().solve(z.segment(model.front(), model.rigid()));
+  return model.base_map().completeOrthogonalDecomposition().solve(VectorXd(z.segment(model.front(), model.rigid())));
 }
 
 }  // namespace armcal::calibration

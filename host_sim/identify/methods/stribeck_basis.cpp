@@ -38,7 +38,7 @@ struct Law {
     MatrixXd B(kGrid + q.size(), q.size());
     for (Eigen::Index k = 0; k < q.size(); ++k) B.col(k).head(kGrid) = (-(grid / q[k]).array().square()).exp();
     B.bottomRows(q.size()) = 1e-4 * MatrixXd::Identity(q.size(), q.size());  // neighbours are alike: small weights win
-    weights = B.completeOrthogonalDecomposition().pseudoInverse().leftCols(kGrid);
+    weights = B.completeOrthogonalDecomposition().solve(MatrixXd(MatrixXd::Identity(B.rows(), kGrid)));
   }
   // c and its derivatives by log q_s and delta: [basis x 3].
   MatrixXd Shape(double q_s, double delta) const {
@@ -117,7 +117,7 @@ Reduced Reduce(const Problem& problem, const std::vector<Law>& laws) {
   H.diagonal().array() += floor;
   const Eigen::LDLT<MatrixXd> factor(H);
   const MatrixXd cross = A.transpose() * B, solved = factor.solve(cross);
-  const VectorXd v = factor.solve(A.transpose() * target);
+  const VectorXd v = factor.solve(VectorXd(A.transpose() * target));
   return {B.transpose() * B - cross.transpose() * solved, L * solved, B.transpose() * target - cross.transpose() * v,
           p0 + L * v};
 }

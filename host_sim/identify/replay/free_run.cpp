@@ -110,7 +110,7 @@ State StateFromFirst(const Record& log, int samples) {
     const double s = log.t[k] - middle_s;
     powers.row(k) << 1, s, s * s;
   }
-  const MatrixXd fit = powers.colPivHouseholderQr().solve(log.q.topRows(samples));
+  const MatrixXd fit = powers.colPivHouseholderQr().solve(MatrixXd(log.q.topRows(samples)));
   return {fit.row(0), fit.row(1)};
 }
 

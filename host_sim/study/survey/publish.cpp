@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "codegen/src/io/json.hpp"
 #include "host_sim/data/report/axis.hpp"
 #include "host_sim/data/report/page.hpp"
 
@@ -77,7 +78,7 @@ std::string Json(const Findings& findings, const Settings& settings) {
                    {"draws", settings.draws},
                    {"tables", tables},
                    {"goals", goals}};
-  return all.dump(1) + "\n";
+  return io::JsonText(all, 1) + "\n";
 }
 
 std::string Html(const Findings& findings, const Settings& settings) {

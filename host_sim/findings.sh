@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What the models of three measured arms lack: every figure and picture of docs/findings.md.
+# What the models of three measured arms lack: the tables and pictures of docs/findings.md about these arms.
 #   ARMCAL_DATA=FOLDER bash host_sim/findings.sh [OUT [PICTURES]]     default: build/findings, pictures beside the rest
 # FOLDER holds measured/emps, measured/kuka_kr300 and measured/kuka_lwr4. ARMCAL: the tool (default: build/host/armcal).
 set -euo pipefail

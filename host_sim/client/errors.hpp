@@ -18,6 +18,11 @@ struct SentError : LinkError {
   using LinkError::LinkError;
 };
 
+// Ctrl-C ended the work. The tool exits with 130, as a shell expects it.
+struct InterruptedError : LinkError {
+  using LinkError::LinkError;
+};
+
 // The drive refused. `status` is its reason, or kOk if it gave none. The tool exits with 4.
 struct RefusedError : std::runtime_error {
   RefusedError(const std::string& what, int exception_code, core::Status reason)

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/tool/process.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -68,7 +69,7 @@ int RunBench(const BenchOptions& o) {
   Background bench(words);
   std::string rest;
   const int code = bench.Wait(&rest);
-  const auto result = nlohmann::ordered_json::parse(bench.first_line() + rest, nullptr, false);
+  const auto result = io::ParseJson(bench.first_line() + rest);
   if (code != 0 || !result.is_object())
     throw io::InputError(fmt::format("{}: {}", program, WhyFailed(result, code, robot.name)));
   Print(result);

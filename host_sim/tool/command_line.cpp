@@ -46,16 +46,16 @@ std::string Unknown(const std::string& what, const std::string& word, const std:
 }
 
 // One line for the first word that is no verb or no option; empty: every word is known.
-std::string Misspelt(const CLI::App& app, const CLI::App* verb, int argc, const char* const* argv) {
+std::string Misspelt(const CLI::App& app, const CLI::App* verb, const std::vector<std::string>& words) {
   if (verb == nullptr) {
     std::vector<std::string> names;
     for (const CLI::App* known : Verbs(app)) names.push_back(known->get_name());
-    const std::string first = argv[1];
+    const std::string& first = words[0];
     return first.starts_with("-") ? Unknown("option", first.substr(0, first.find('=')), LongNames(app))
                                   : Unknown("verb", first, names);
   }
-  for (int k = 2; k < argc; ++k) {
-    const std::string word = argv[k];
+  for (std::size_t k = 1; k < words.size(); ++k) {
+    const std::string& word = words[k];
     if (word == "--") break;
     if (!word.starts_with("--")) continue;
     if (const std::string text = Unknown("option", word.substr(0, word.find('=')), LongNames(*verb)); !text.empty())
@@ -158,7 +158,7 @@ std::string VerbPage(const CLI::App& verb) {
   }
   page +=
       ".SH EXIT STATUS\n0: done. 2: wrong use or bad input. 3: no link to the drive. 4: the drive refused. 5: no "
-      "match (another table, other estimates). 6: incomplete. The description says where this verb uses a code "
+      "match (another table, other estimates). 6: incomplete. 130: Ctrl-C ended a recording. The description says where this verb uses a code "
       "otherwise.\n";
   return page + ".SH SEE ALSO\n.BR armcal (1)\n";
 }
@@ -202,13 +202,30 @@ std::string VersionText(std::uint32_t version) {
 }
 std::string Version() { return VersionText(ARMCAL_VERSION); }
 
-std::string WrongUse(const CLI::App& app, int argc, const char* const* argv, const CLI::ParseError& error) {
-  if (argc < 2) return "armcal: expected a verb; armcal --help lists them";
+std::vector<std::string> WordsOf(int argc, const char* const* argv) {
+  struct Renamed {
+    std::string_view verb, before, now;
+  };
+  static constexpr Renamed kRenamed[] = {
+      {"excite", "--seconds", "--search-seconds"}, {"excite", "--from", "--found"}, {"export", "--urdf", "--into"}};
+  std::vector<std::string> words(argv + 1, argv + argc);
+  for (std::size_t k = 1; k < words.size(); ++k)
+    for (const Renamed& one : kRenamed) {
+      const std::size_t length = words[k].find('=');
+      if (words[0] != one.verb || words[k].substr(0, length) != one.before) continue;
+      fmt::print(stderr, "armcal {}: {} is called {}\n", one.verb, one.before, one.now);
+      words[k].replace(0, one.before.size(), one.now);
+    }
+  return words;
+}
+
+std::string WrongUse(const CLI::App& app, const std::vector<std::string>& words, const CLI::ParseError& error) {
+  if (words.empty()) return "armcal: expected a verb; armcal --help lists them";
   const CLI::App* verb = nullptr;
   for (const CLI::App* known : Verbs(app))
-    if (known->get_name() == argv[1]) verb = known;
+    if (known->get_name() == words[0]) verb = known;
   const std::string program = verb == nullptr ? "armcal" : "armcal " + verb->get_name();
-  const std::string misspelt = Misspelt(app, verb, argc, argv);
+  const std::string misspelt = Misspelt(app, verb, words);
   if (!misspelt.empty()) return program + ": " + misspelt;
   std::string what = error.what();
   constexpr std::string_view kConvert = "Could not convert: ";
@@ -262,18 +279,24 @@ void AddPages(CLI::App& app, std::function<int()>& action) {
   auto* verb = app.add_subcommand("pages",
                                   "write manual pages and bash completion from the program's own definition\nexample: "
                                   "armcal pages --out build/pages && man build/pages/man1/armcal-excite.1");
-  auto folder = std::make_shared<std::string>();
+  auto folder = std::make_shared<std::string>(), json = std::make_shared<std::string>();
+  verb->add_option("--json", *json, "write the list of the files here");
   verb->add_option("--out", *folder, "folder to write: man1/armcal*.1, armcal (bash completion)")
       ->required()
       ->type_name(kFolder);
-  verb->callback([&app, &action, folder] {
-    action = [&app, folder] {
+  verb->callback([&app, &action, folder, json] {
+    action = [&app, folder, json] {
       const std::filesystem::path out = *folder;
+      nlohmann::ordered_json written = nlohmann::ordered_json::array();
+      const auto write = [&](const std::filesystem::path& path, const std::string& text) {
+        files::WriteWholeFile(path, text);
+        written.push_back(path.string());
+      };
       io::MakeFolder(out / "man1");
-      files::WriteWholeFile(out / "man1" / "armcal.1", TopPage(app));
-      for (const CLI::App* one : Verbs(app))
-        files::WriteWholeFile(out / "man1" / ("armcal-" + one->get_name() + ".1"), VerbPage(*one));
-      files::WriteWholeFile(out / "armcal", Completion(app));
+      write(out / "man1" / "armcal.1", TopPage(app));
+      for (const CLI::App* one : Verbs(app)) write(out / "man1" / ("armcal-" + one->get_name() + ".1"), VerbPage(*one));
+      write(out / "armcal", Completion(app));
+      WriteJson(*json, {{"files", written}});
       return static_cast<int>(kOk);
     };
   });

@@ -16,9 +16,13 @@ namespace armcal::tool {
 std::string VersionText(std::uint32_t version);
 std::string Version();
 
+// The words behind the program's name. Where an option has another name now, its former name is replaced by it, and a
+// line on stderr says so.
+std::vector<std::string> WordsOf(int argc, const char* const* argv);
+
 // One line about a command line that could not be read. The first word that is no verb or no option comes before all
 // other mistakes, with the nearest one that there is.
-std::string WrongUse(const CLI::App& app, int argc, const char* const* argv, const CLI::ParseError& error);
+std::string WrongUse(const CLI::App& app, const std::vector<std::string>& words, const CLI::ParseError& error);
 
 // What a value must be, for CLI::Option::check. Their messages say what was expected.
 CLI::Validator OneOf(const std::vector<std::string>& words);

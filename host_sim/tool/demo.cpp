@@ -11,6 +11,7 @@
 
 #include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
@@ -31,11 +32,11 @@ using Eigen::VectorXd;
 using nlohmann::ordered_json;
 
 struct DemoOptions {
-  std::string scenario = "stribeck", out = "build/demo";
+  std::string scenario = "stribeck", out = "build/demo", json;
   int excite_s = 60, excite_starts = 40;
 };
 
-ordered_json ReadJson(const std::string& path) { return ordered_json::parse(files::ReadWholeFile(path)); }
+ordered_json ReadJson(const std::string& path) { return io::ParseJson(files::ReadWholeFile(path)); }
 
 // Whether a confirmed term can be part of a committed model at all.
 bool Flashable(const diagnosis::Finding& finding) {
@@ -134,10 +135,10 @@ class Demo {
     Stage("excite: trajectories within the limits");
     // A fixed number of searches: the run follows from its seeds, not from how busy the machine is.
     const std::string searches = std::to_string(o_.excite_starts), most_s = std::to_string(o_.excite_s);
-    Verb({"excite", "--robot", robot_, "--purpose", "train", "--seed", "1", "--starts", searches, "--seconds", most_s,
-          "--out", File("train.csv")});
-    Verb({"excite", "--robot", robot_, "--purpose", "test", "--seed", "2", "--starts", searches, "--seconds", most_s,
-          "--out", File("test.csv")});
+    Verb({"excite", "--robot", robot_, "--purpose", "train", "--seed", "1", "--starts", searches, "--search-seconds",
+          most_s, "--out", File("train.csv")});
+    Verb({"excite", "--robot", robot_, "--purpose", "test", "--seed", "2", "--starts", searches, "--search-seconds",
+          most_s, "--out", File("test.csv")});
     Stage("start the simulated drive; flash the CAD table over Modbus");
     StartDrive(robot_, "truth_1.bin");
     Flash("table_cad.toml", robot_, "flash_cad.json");
@@ -219,6 +220,7 @@ class Demo {
     result["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     AddOutcome(result);
     WriteJson(File("result.json"), result);
+    WriteJson(o_.json, result);
     WriteDemoPage(File("report.html"), result);
     fmt::print("{}\nresult: {}\nreport: {}\n", DemoText(result), File("result.json"), File("report.html"));
     return result["closed"].get<bool>() ? kOk : kPartial;
@@ -295,6 +297,7 @@ void AddDemo(CLI::App& app, Action& action) {
           "searches of each trajectory; if the time is enough for all, the result is the same on every computer")
       ->check(Between(1, 1000))
       ->capture_default_str();
+  verb->add_option("--json", o->json, "write a copy of the folder's result.json here");
   verb->callback([o, &action] { action = [o] { return Demo(*o).Run(); }; });
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host_sim/data/report/axis.hpp"
+#include "host_sim/data/report/colour.hpp"
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/verdict_file.hpp"
 
@@ -22,13 +23,13 @@ std::string Cell(const ordered_json& r, const char* key, int j, double factor = 
 
 report::Table ErrorTable(const ordered_json& r) {
   report::Table t{{"joint", "held-out log before", "after", "floor of the plant", "on the drive: CAD table",
-                   "identified", "with the effect"},
+                   "identified", "with the effect", "loop closed"},
                   {},
                   "RMS of measured minus model torque where the joint moves, N m"};
   for (int j = 0; j < static_cast<int>(r.at("before").size()); ++j)
     t.rows.push_back({std::to_string(j + 1), Cell(r, "before_moving", j), Cell(r, "after_moving", j),
                       Cell(r, "plant_floor", j), Cell(r, "drive_cad", j), Cell(r, "drive_before", j),
-                      Cell(r, "drive_after", j)});
+                      Cell(r, "drive_after", j), r.at("joints").at(j).at("closed").get<bool>() ? "yes" : "no"});
   return t;
 }
 
@@ -49,8 +50,13 @@ std::string Truth(const ordered_json& r) {
   return out.empty() ? "nothing" : out;
 }
 
-std::string Outcome(const ordered_json& r) {
-  std::string out = r.at("closed").get<bool>() ? "the loop is closed" : "the loop is NOT closed";
+const char* LoopText(const ordered_json& r) {
+  return r.at("closed").get<bool>() ? "the loop is closed" : "the loop is NOT closed";
+}
+
+// Of the loop, and of each effect and joint that stayed open. loop: the words about the loop.
+std::string Outcome(const ordered_json& r, const std::string& loop) {
+  std::string out = loop;
   for (const auto& e : r.at("effects"))
     out += fmt::format("; {} on joint {}: {}", e.at("kind").get<std::string>(), verdict::JointText(e.at("joint")),
                        e.at("became").get<std::string>());
@@ -92,7 +98,9 @@ report::Bars DriveBars(const ordered_json& r) {
 std::string DemoText(const ordered_json& r) {
   std::string out = fmt::format(
       "\nfound by armcal:    {}\nin the simulation:  {}  (read after the verdict was written)\n", Verdict(r), Truth(r));
-  out += fmt::format("outcome:             {}\n", Outcome(r));
+  out += fmt::format("outcome:             {}\n",
+                     Outcome(r, report::Coloured(LoopText(r), r.at("closed").get<bool>() ? report::Colour::kGreen
+                                                                                         : report::Colour::kYellow)));
   out += fmt::format("brought to the drive: {}; table CRC {}, read back {}\n\n", r.at("path").get<std::string>(),
                      r.at("table_crc").get<std::string>(), r.at("readback_ok").get<bool>() ? "equal" : "DIFFERENT");
   out += report::Text(ErrorTable(r)) + "\n" + report::Text(TrackingTable(r));
@@ -107,7 +115,7 @@ void WriteDemoPage(const std::filesystem::path& path, const ordered_json& r) {
   page.Columns(
       [&](report::Page& left) {
         left.Box(closed ? report::Tone::kGood : report::Tone::kWarning, "armcal found: " + Verdict(r),
-                 Outcome(r) + ". In the simulation there was: " + Truth(r) +
+                 Outcome(r, LoopText(r)) + ". In the simulation there was: " + Truth(r) +
                      ". No program but the drive read that before the verdict was written.");
         left.Text("How it came to the drive: " + r.at("path").get<std::string>() + ".");
       },

@@ -13,6 +13,7 @@
 #include "armcal/core/words.hpp"
 #include "armcal/link/seal.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
@@ -181,7 +182,7 @@ int RunGet(const DeviceOptions& o, ordered_json&) {
   const Named named = Find(o.name);
   client::DriveClient drive = ConnectTo(o.connect);
   const ordered_json value = ReadRegister(drive, named);
-  fmt::print("{} = {}{}{}\n", o.name, value.dump(), *named.r->unit ? " " : "", named.r->unit);
+  fmt::print("{} = {}{}{}\n", o.name, io::JsonText(value), *named.r->unit ? " " : "", named.r->unit);
   WriteJson(o.json, {{"name", o.name}, {"value", value}, {"unit", named.r->unit}, {"meaning", named.r->meaning}});
   return kOk;
 }
@@ -224,7 +225,7 @@ int RunSet(const DeviceOptions& o, ordered_json&) {
   if (words.size() == 1) drive.WriteSingle(at, words[0]);
   else drive.Write(at, words);
   const ordered_json value = ReadRegister(drive, named);
-  fmt::print("{} was set to {}, reads {}\n", o.name, o.value, value.dump());
+  fmt::print("{} was set to {}, reads {}\n", o.name, o.value, io::JsonText(value));
   WriteJson(o.json, {{"name", o.name}, {"set", o.value}, {"reads", value}});
   return kOk;
 }
@@ -265,7 +266,7 @@ int RunMap(const DeviceOptions& o) {
                            : o.markdown ? client::RegisterMarkdown()
                                         : client::RegisterJson();
   if (o.json.empty() || o.csv || o.markdown) fmt::print("{}", text);
-  if (!o.json.empty()) WriteJson(o.json, ordered_json::parse(client::RegisterJson()));
+  if (!o.json.empty()) WriteJson(o.json, io::ParseJson(client::RegisterJson()));
   return kOk;
 }
 

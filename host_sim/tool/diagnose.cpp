@@ -5,9 +5,7 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
-#include "codegen/src/io/watch.hpp"
 #include "host_sim/data/files/files.hpp"
-#include "host_sim/data/report/progress.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/words.hpp"
@@ -16,6 +14,7 @@
 #include "host_sim/tool/diagnose.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
+#include "host_sim/tool/watched.hpp"
 
 namespace armcal::tool {
 
@@ -64,8 +63,7 @@ std::unique_ptr<analysis::Diagnosed> RunDiagnosis(const DiagnoseOptions& o) {
       throw io::InputError("--test " + o.test + ": expected another log than those of --train");
   const LogReader read(model, o.format);
   const std::vector<logs::Log> train = read.Raw(o.train);
-  report::Progress line("diagnose");
-  const io::Watch watch([&line](double share) { line.Set(share); });
+  Watched line("diagnose");
   const auto say = [&line](const std::string& text) { line.Clear(), SayAside(text); };
   auto run = std::make_unique<analysis::Diagnosed>(std::move(declared), std::move(catalogue), train, o.how, say);
   line.Clear();

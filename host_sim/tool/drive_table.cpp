@@ -6,6 +6,7 @@
 #include "armcal/core/words.hpp"
 #include "armcal/link/event_log.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/client/register_text.hpp"
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
@@ -64,7 +65,7 @@ std::string OfAnotherDrive(const TableOptions& o, client::DriveClient& drive, co
 int RunBackup(const TableOptions& o, ordered_json&) {
   client::DriveClient drive = ConnectTo(o.connect);
   const ordered_json backup = Backup(drive);
-  files::WriteWholeFile(o.file, backup.dump(1) + "\n");
+  files::WriteWholeFile(o.file, io::JsonText(backup, 1) + "\n");
   fmt::print("{}: {} registers, CRC {}, written to {}\n", drive.name(), backup["words"].size(),
              backup["table_crc"].get<std::string>(), o.file);
   WriteJson(o.json, {{"file", o.file}, {"table_crc", backup["table_crc"]}, {"registers", backup["words"].size()}});
@@ -116,7 +117,7 @@ int RunDiff(const TableOptions& o, ordered_json&) {
                was = k < words.size() ? ordered_json(words[k]) : ordered_json();
     if (is == was) continue;
     differ.push_back({{"word", k}, {"drive", is}, {"file", was}});
-    if (!layout) fmt::print("word {}: drive {}, file {}\n", k, is.dump(), was.dump());
+    if (!layout) fmt::print("word {}: drive {}, file {}\n", k, io::JsonText(is), io::JsonText(was));
   }
   ordered_json said = {{"same", differ.empty()}, {"differ", differ}, {"another_drive", !other.empty()}};
   if (layout) {

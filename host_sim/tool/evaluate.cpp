@@ -6,6 +6,7 @@
 #include "host_sim/tool/given.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
+#include "host_sim/tool/watched.hpp"
 
 namespace armcal::tool {
 namespace {
@@ -22,8 +23,11 @@ int RunEvaluate(const EvaluateOptions& o) {
   const codegen::Model model = GivenModel(o.given);
   const calibration::Given given = ReadGiven(o.given, model);
   const LogReader read(model, o.format, o.cutoff_Hz);
+  Watched line("evaluate");
   const std::vector<calibration::Dataset> logs = read.All(o.logs);
+  io::SetDone(0.5);
   const analysis::Evaluated result = analysis::Evaluate(model, given, logs, o.band_Hz);
+  line.Clear();
   for (std::size_t k = 0; k < logs.size(); ++k) verdict::PrintError(result.each[k], model.robot(), logs[k].source);
   if (result.together)
     verdict::PrintError(*result.together, model.robot(), fmt::format("all {} logs as one record", logs.size()));

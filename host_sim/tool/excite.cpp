@@ -10,6 +10,7 @@
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/interrupt.hpp"
 #include "host_sim/tool/verb.hpp"
+#include "host_sim/tool/watched.hpp"
 
 namespace armcal::tool {
 namespace {
@@ -36,14 +37,12 @@ void PrintClearance(const collision::Clearance& clearance, const collision::Near
 
 // Ctrl-C ends the search early, with the best motion so far.
 analysis::Excited Search(const codegen::Model& model, const analysis::ExciteOptions& how) {
-  const bool told = isatty(STDERR_FILENO);
-  const auto tell = [](int starts, const char* name, double figure) {
-    fmt::print(stderr, "\r{} searches, {} {:.4g}  ", starts, name, figure);
+  Watched line("excite");
+  const auto tell = [&line](int starts, const char* name, double figure) {
+    line.Note(fmt::format("{} searches, {} {:.4g}", starts, name, figure));
   };
   const InterruptGuard guard;
-  analysis::Excited found(model, how, &InterruptGuard::interrupted(), told ? analysis::Excited::Tell(tell) : nullptr);
-  if (told) fmt::print(stderr, "\n");
-  return found;
+  return analysis::Excited(model, how, &InterruptGuard::interrupted(), tell);
 }
 
 // What was asked to be accurate: one line a parameter, over one period.
@@ -159,7 +158,7 @@ void AddExcite(CLI::App& app, Action& action) {
                        "effects to tell apart: NAME, NAME:JOINT or NAME:JOINT-JOINT, ..., names as in docs/effects.md")
           ->delimiter(',')
           ->excludes(criterion);
-  verb->add_option("--from", o->how.from, "with --separate: verdict (diagnose --json) with what was found of them")
+  verb->add_option("--found", o->how.from, "with --separate: verdict (diagnose --json) with what was found of them")
       ->needs(separate);
   verb->add_option("--search", o->how.search, "gradient, or the survey's genetic algorithm")
       ->check(OneOf(analysis::kSearches))
@@ -167,7 +166,7 @@ void AddExcite(CLI::App& app, Action& action) {
   verb->add_option("--harmonics", o->how.harmonics, "terms of the Fourier series; other curves have twice as many")
       ->check(Within(analysis::kHarmonics))
       ->capture_default_str();
-  verb->add_option("--seconds", o->how.seconds, "time for the search; Ctrl-C ends it early")
+  verb->add_option("--search-seconds", o->how.seconds, "time for the search; Ctrl-C ends it early")
       ->check(Within(analysis::kSeconds))
       ->capture_default_str();
   verb->add_option("--starts", o->how.starts, "searches at most; with time enough the result follows from the seed")

@@ -66,7 +66,7 @@ void AddExport(CLI::App& app, Action& action) {
   auto o = std::make_shared<ExportOptions>();
   AddGivenOptions(*verb, o->given);
   verb->add_option("--format", o->format, "urdf, sdf, mjcf, yaml or c")->required();
-  verb->add_option("--into,--urdf", o->into,
+  verb->add_option("--into", o->into,
                    "a URDF, SDF or MJCF of this arm to write into (urdf: default the one that the robot file names)");
   verb->add_flag("--merge", o->merge, "urdf, mjcf: a moving link gets the whole body, the links fixed to it get none");
   verb->add_option("-o,--out", o->out, "file to write")->required();

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <ctime>
 
+#include "codegen/src/io/json.hpp"
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/client/table_flash.hpp"
 #include "host_sim/diagnose/fleet/store.hpp"
@@ -48,7 +49,7 @@ void KeepOfDrive(const FleetOptions& o, client::DriveClient& drive, fleet::Kind 
   json["serial_number"] = id.serial_number, json["schema"] = client::CrcText(id.schema);
   const std::string date = o.date.empty() ? Utc(std::time(nullptr)) : o.date,
                     crc = client::CrcText(drive.ReadStatus().active_crc);
-  fleet::Keep(o.database, kind, {{o.arm, date, crc, json.dump()}});
+  fleet::Keep(o.database, kind, {{o.arm, date, crc, io::JsonText(json)}});
   fmt::print("kept in {}: {}\n", o.database, kind == fleet::Kind::kTable ? "a table" : "a health reading");
 }
 
@@ -61,7 +62,7 @@ void KeepVerdicts(const FleetOptions& o, const verdict::Verdicts& verdicts,
   for (const auto& [arm, verdict] : verdicts) {
     const auto named = log.find(arm);
     const std::string path = named != log.end() ? named->second : verdict.value("test", std::string());
-    fleet::Entry e{arm, o.date, path.empty() ? arm : path, verdict.dump(),  // the name where the log is not here
+    fleet::Entry e{arm, o.date, path.empty() ? arm : path, io::JsonText(verdict),  // the name where the log is not here
                    verdict::Failed(verdict)};
     if (std::filesystem::exists(path)) {  // a file, or a bag's folder
       e.hash = files::FileHash(path);

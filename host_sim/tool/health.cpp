@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include "host_sim/client/residual_reader.hpp"
+#include "host_sim/data/report/colour.hpp"
 #include "host_sim/diagnose/health/joint_health.hpp"
 #include "host_sim/diagnose/health/shapes.hpp"
 #include "host_sim/tool/connect.hpp"
@@ -52,7 +53,10 @@ std::string TermText(const health::Term& t) {
 }
 
 std::string Sentence(const JointHealth& h) {
-  std::string text = fmt::format("joint {} {}", h.joint, VerdictText(h.verdict));
+  const bool fits = h.verdict == health::Verdict::kFits || h.verdict == health::Verdict::kTooEarly;
+  std::string text =
+      fmt::format("joint {} {}", h.joint,
+                  report::Coloured(VerdictText(h.verdict), fits ? report::Colour::kGreen : report::Colour::kYellow));
   if (h.verdict == health::Verdict::kTooEarly)
     return text + fmt::format(": {:.0f} samples in motion since the table was adopted, an answer needs {:.0f} more",
                               h.rows, h.missing_rows);

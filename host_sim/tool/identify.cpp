@@ -1,14 +1,18 @@
 // tool - armcal identify: fits parameters to logs, by the weighted fit, by another method, or with a payload.
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/analysis/identified.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/identification_page.hpp"
+#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/diagnose/verdict/json_values.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 #include "host_sim/identify/calibration/payload.hpp"
 #include "host_sim/identify/calibration/table_ceilings.hpp"
@@ -17,6 +21,7 @@
 #include "host_sim/identify/methods/method.hpp"
 #include "host_sim/tool/logs.hpp"
 #include "host_sim/tool/verb.hpp"
+#include "host_sim/tool/watched.hpp"
 
 namespace armcal::tool {
 
@@ -285,7 +290,7 @@ int RunLoad(const PayloadOptions& o, const codegen::Model& model, const LogReade
     fmt::print("written: {}\n", o.payload_out);
   }
   if (!o.ros_out.empty()) {
-    files::WriteWholeFile(o.ros_out, RosInertia(load).dump() + "\n");
+    files::WriteWholeFile(o.ros_out, io::JsonText(RosInertia(load)) + "\n");
     fmt::print("written: {}\n", o.ros_out);
   }
   WriteJson(o.json, json);
@@ -323,16 +328,27 @@ struct IdentifyOptions {
 
 std::string Significant(double v) { return fmt::format("{:.5g}", v); }
 
+// What the data tell; what the prior tells is named below the table, and --json has its values.
 void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
-  report::Table t{{"parameter", "unit", "value", "sd", "posterior / prior", ""}, {}};
+  report::Table t{{"parameter", "unit", "value", "sd", "posterior / prior"}, {}};
+  std::vector<std::string> from_prior;
+  nlohmann::ordered_json units;
+  verdict::AddRobot(units, model.robot());
   for (const int c : fit.active) {
     if (c >= model.columns()) continue;
     const double ratio = fit.ratio(c);
-    t.rows.push_back({model.column_name(c), model.column_unit(c), Significant(fit.x[c]), Significant(fit.sd[c]),
-                      model.robot().has_prior ? fmt::format("{:.3f}", ratio) : "-",
-                      ratio > calibration::kFromPrior ? "prior" : ""});
+    if (ratio > calibration::kFromPrior) {
+      from_prior.push_back(model.column_name(c));
+      continue;
+    }
+    t.rows.push_back({model.column_name(c), verdict::ColumnUnit(units, model.column_name(c), model.column_unit(c)),
+                      Significant(fit.x[c]), Significant(fit.sd[c]),
+                      model.robot().has_prior ? fmt::format("{:.3f}", ratio) : "-"});
   }
   fmt::print("{}", report::Text(t));
+  if (!from_prior.empty())
+    fmt::print("{} more rest mostly on the prior (posterior / prior above {}): {}\n", from_prior.size(),
+               calibration::kFromPrior, fmt::join(from_prior, ", "));
 }
 
 int RunIdentify(const IdentifyOptions& o) {
@@ -356,9 +372,14 @@ int RunIdentify(const IdentifyOptions& o) {
   if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
   const LogReader read(model, o.format, o.cutoff_Hz);
+  Watched line("identify");
   const std::vector<calibration::Dataset> train = read.All(o.train);
+  io::SetDone(0.3);
+  line.Clear();
   read.PrintUntold(train);
   analysis::Identified found(model, train);
+  io::SetDone(0.6);
+  line.Clear();
   PrintColumns(model, found.all);
   const calibration::Exogeneity& exogeneity = found.exogeneity;
   fmt::print("{}", verdict::ExogeneityText(exogeneity, analysis::kLacksTerm));
@@ -368,6 +389,8 @@ int RunIdentify(const IdentifyOptions& o) {
   }
   if (model.robot().has_prior) {
     found.ReadOut(train, o.force);
+    io::SetDone(0.8);
+    line.Clear();
     fmt::print(
         "standard parameters: {} of {} rest mostly on the prior (posterior / prior sd above {}); bodies physical: {}\n",
         found.read.FromPrior(), found.read.table.row.size(), calibration::kFromPrior,
@@ -383,6 +406,7 @@ int RunIdentify(const IdentifyOptions& o) {
   if (!o.test.empty()) {
     const calibration::Dataset test = read.One(o.test);
     const analysis::Identified::OnLog held_out = found.Compare(test, true, o.band_Hz);
+    line.Clear();
     verdict::PrintError(held_out.error, model.robot(), "held out: " + o.test);
     json["test"] = o.test;
     json.update(held_out.json);

@@ -6,6 +6,7 @@
 #include <exception>
 
 #include "host_sim/client/errors.hpp"
+#include "host_sim/data/report/colour.hpp"
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/verb.hpp"
 
@@ -21,6 +22,7 @@ void KeepFreedMemory() {
 
 int Main(int argc, char** argv) {
   KeepFreedMemory();
+  const std::vector<std::string> words = WordsOf(argc, argv);
   CLI::App app{
       "armcal: estimate the dynamic parameters of an arm, find what its model lacks, flash the table that mends it"};
   app.require_subcommand(1);
@@ -52,16 +54,19 @@ int Main(int argc, char** argv) {
   AddBench(app, action);
   AddSurvey(app, action);
   AddPages(app, action);
+  for (CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; }))
+    if (!verb->get_name().empty()) verb->set_version_flag("--version", Version());
   try {
-    app.parse(argc, argv);
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them from the back
     CheckOutputs(app);
     return action();
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e), kOk;  // --help, --version
-    std::fprintf(stderr, "%s\n", WrongUse(app, argc, argv, e).c_str());
+    std::fprintf(stderr, "%s\n", WrongUse(app, words, e).c_str());
     return kBadInput;
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "armcal: %s\n", e.what());
+    const std::string who = report::Coloured("armcal:", report::Colour::kRed, stderr);
+    std::fprintf(stderr, "%s %s\n", who.c_str(), e.what());
     return ExitCodeOf(e);
   }
 }
@@ -69,6 +74,7 @@ int Main(int argc, char** argv) {
 }  // namespace
 
 int ExitCodeOf(const std::exception& error) {
+  if (dynamic_cast<const client::InterruptedError*>(&error) != nullptr) return kInterrupted;
   if (dynamic_cast<const client::LinkError*>(&error) != nullptr) return kLink;
   if (dynamic_cast<const client::RefusedError*>(&error) != nullptr) return kRefused;
   if (dynamic_cast<const client::VerifyError*>(&error) != nullptr) return kMismatch;

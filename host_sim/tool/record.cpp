@@ -5,11 +5,13 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "host_sim/client/errors.hpp"
 #include "host_sim/client/recording.hpp"
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/data/logs/log.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
 #include "host_sim/tool/command_line.hpp"
 #include "host_sim/tool/connect.hpp"
 #include "host_sim/tool/interrupt.hpp"
@@ -46,6 +48,17 @@ std::string PartialPath(const std::string& path) {
   return path.substr(0, dot) + ".partial" + path.substr(dot);
 }
 
+// As Record. client::InterruptedError: Ctrl-C came before there was a log.
+client::Recording RecordOrSayWhy(client::DriveClient& drive, const client::RecordOptions& o,
+                                 const codegen::Robot& robot) {
+  try {
+    return Record(drive, o, robot);
+  } catch (const client::LinkError& error) {
+    if (*o.interrupted) throw client::InterruptedError(error.what());
+    throw;
+  }
+}
+
 int RunRecord(const client::RecordOptions& o) {
   const codegen::Model model = LoadModel(o.robot);
   const codegen::Robot& robot = model.robot();
@@ -56,7 +69,7 @@ int RunRecord(const client::RecordOptions& o) {
   client::RecordOptions options = o;
   options.schema = codegen::Schema(model);
   options.interrupted = &InterruptGuard::interrupted();
-  const client::Recording recording = Record(drive, options, robot);
+  const client::Recording recording = RecordOrSayWhy(drive, options, robot);
   const bool partial = !recording.cut.empty();
   const std::string out = partial ? PartialPath(o.out) : o.out,
                     samples_out = partial ? PartialPath(o.samples) : o.samples;
@@ -84,7 +97,7 @@ int RunRecord(const client::RecordOptions& o) {
     tracking = RmsOf(
         log, [&](Eigen::Index k, int j) { return log.q(k, j) - log.qref(k, j); }, always);
     json["tracking_rms_rad"] = verdict::ToList(tracking);
-    table.header.push_back("tracking error rms / mrad (mm)");
+    table.header.insert(table.header.end(), {"tracking error rms", "unit"});
   }
   const auto v_min = [&](int j) { return robot.joint[j].v_min_radps; };
   VectorXd residual;
@@ -96,7 +109,7 @@ int RunRecord(const client::RecordOptions& o) {
         [&](Eigen::Index k, int j) { return std::abs(played.qd(k, j)) > v_min(j); });
     json["drive_residual_rms_Nm"] = verdict::ToList(residual);
     json["generation"] = samples.generations.empty() ? 0 : samples.generations.back();
-    table.header.push_back("measured - committed model / N m");
+    table.header.insert(table.header.end(), {"measured - committed model", "unit"});
   }
   for (int j = 0; j < n; ++j) {
     int moving = 0;
@@ -104,8 +117,12 @@ int RunRecord(const client::RecordOptions& o) {
       moving += std::abs(log.q(k, j) - log.q(k - 1, j)) > v_min(j) * (log.t[k] - log.t[k - 1]);
     table.rows.push_back(
         {std::to_string(j + 1), fmt::format("{:.0f}", 100.0 * moving / static_cast<double>(log.samples()))});
-    if (tracking.size() > 0) table.rows.back().push_back(fmt::format("{:.3f}", 1e3 * tracking[j]));
-    if (residual.size() > 0) table.rows.back().push_back(fmt::format("{:.3f}", residual[j]));
+    std::vector<std::string>& row = table.rows.back();
+    const codegen::Joint& joint = robot.joint[static_cast<std::size_t>(j)];
+    if (tracking.size() > 0)
+      row.insert(row.end(), {fmt::format("{:.3f}", 1e3 * tracking[j]), calibration::Slides(joint) ? "mm" : "mrad"});
+    if (residual.size() > 0)
+      row.insert(row.end(), {fmt::format("{:.3f}", residual[j]), calibration::TorqueUnit(joint)});
   }
   fmt::print("{}: {} samples, {:.1f} s, {}\n{}", out, log.samples(), log.t[log.samples() - 1],
              partial ? "a part of the recording" : "none lost", report::Text(table));
@@ -119,10 +136,11 @@ int RunRecord(const client::RecordOptions& o) {
     return kOk;
   }
   json["error"] = recording.cut;
-  json["exit_code"] = static_cast<int>(kPartial);
+  const int code = *options.interrupted ? kInterrupted : kPartial;
+  json["exit_code"] = code;
   WriteJson(o.json, json);
   fmt::print(stderr, "armcal: {}; the longest part without a gap is in {}\n", recording.cut, out);
-  return kPartial;
+  return code;
 }
 
 }  // namespace

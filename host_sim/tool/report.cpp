@@ -1,6 +1,7 @@
 // tool - armcal report: makes the page of a result again, from its JSON.
 #include <fmt/core.h>
 
+#include "codegen/src/io/json.hpp"
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/identification_page.hpp"
 #include "host_sim/diagnose/verdict/summary.hpp"
@@ -27,8 +28,8 @@ WritePage PageOf(const ordered_json& json) {
   return nullptr;
 }
 
-int RunReport(const std::string& path, const std::string& out) {
-  const ordered_json json = ordered_json::parse(files::ReadWholeFile(path), nullptr, false);
+int RunReport(const std::string& path, const std::string& out, const std::string& json_out) {
+  const ordered_json json = io::ParseJson(files::ReadWholeFile(path));
   const WritePage write = PageOf(json);
   if (write == nullptr)
     throw io::InputError(path + ": expected the JSON of armcal diagnose, identify or demo, or of a batch's summary");
@@ -40,6 +41,7 @@ int RunReport(const std::string& path, const std::string& out) {
                                      path, what.substr(what.find("] ") + 2)));
   }
   fmt::print("report: {}\n", out);
+  WriteJson(json_out, {{"result", path}, {"page", out}});
   return kOk;
 }
 
@@ -47,17 +49,20 @@ int RunReport(const std::string& path, const std::string& out) {
 
 void AddReport(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand(
-      "report",
-      "make the page of a result again, from its JSON\nexample: armcal report verdict.json --out verdict.html");
+      "report", "make the page of a result again, from its JSON\nexample: armcal report verdict.json");
   struct Options {
-    std::string result, out;
+    std::string result, out, json;
   };
   auto o = std::make_shared<Options>();
   verb->add_option("result", o->result,
                    "what --json of diagnose or identify (without --method) wrote, or a demo's result.json")
       ->required();
-  verb->add_option("--out", o->out, "the page to write")->required();
-  verb->callback([o, &action] { action = [o] { return RunReport(o->result, o->out); }; });
+  verb->add_option("--out", o->out, "the page to write (default: beside the result, with the ending .html)");
+  verb->add_option("--json", o->json, "write the names of the result and of the page here");
+  verb->callback([o, &action] {
+    if (o->out.empty()) o->out = std::filesystem::path(o->result).replace_extension(".html").string();
+    action = [o] { return RunReport(o->result, o->out, o->json); };
+  });
 }
 
 }  // namespace armcal::tool

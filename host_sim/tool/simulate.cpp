@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct SimulateOptions {
-  std::string scenario = "any", robot = "er20_like", drive, storage = "build/drive.nor", truth_log, serial, key;
+  std::string scenario = "any", robot = "er20_like", drive, storage = "build/drive.nor", truth_log, serial, key, json;
   int port = kSimulatedPort, read_port = -1;
   bool real_time = false;
 };
@@ -52,6 +52,7 @@ int RunSimulate(const SimulateOptions& o) {
   if (!o.serial.empty()) words.insert(words.end(), {"--serial", o.serial});
   if (!o.key.empty()) words.insert(words.end(), {"--key", o.key});
   if (o.real_time) words.push_back("--real-time");
+  if (!o.json.empty()) words.insert(words.end(), {"--json", o.json});
   Become(words);
 }
 
@@ -76,6 +77,7 @@ void AddSimulate(CLI::App& app, Action& action) {
   verb->add_option("--truth-log", o->truth_log,
                    "what the torque sensors would read without noise, for the report's floor");
   verb->add_option("--key", o->key, "file with a key: the drive then takes only tables that are signed with it");
+  verb->add_option("--json", o->json, "write address, robot and schema here once the drive listens");
   verb->add_flag("--real-time", o->real_time, "run in real time (default: as fast as this computer can)");
   verb->callback([o, &action] { action = [o] { return RunSimulate(*o); }; });
 }

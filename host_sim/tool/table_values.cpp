@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "codegen/src/io/json.hpp"
+
 namespace armcal::tool {
 
 using nlohmann::ordered_json;
@@ -46,7 +48,7 @@ std::vector<ValueChange> ChangesOf(const calibration::TableFile& from, const cal
 std::string ValueText(const ordered_json& value) {
   return value.is_number_float() ? fmt::format("{:.9g}", value.get<double>())
          : value.is_string()     ? value.get<std::string>()
-                                 : value.dump();
+                                 : io::JsonText(value);
 }
 
 }  // namespace armcal::tool

@@ -9,12 +9,21 @@
 
 #include "codegen/src/generator/load.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/data/files/files.hpp"
 
 namespace armcal::tool {
 
-// 0 ok, 2 usage or bad input, 3 link, 4 refused by the drive, 5 verify mismatch, 6 partial.
-enum ExitCode : int { kOk = 0, kBadInput = 2, kLink = 3, kRefused = 4, kMismatch = 5, kPartial = 6 };
+// 0 ok, 2 usage or bad input, 3 link, 4 refused by the drive, 5 verify mismatch, 6 partial, 130 ended by Ctrl-C.
+enum ExitCode : int {
+  kOk = 0,
+  kBadInput = 2,
+  kLink = 3,
+  kRefused = 4,
+  kMismatch = 5,
+  kPartial = 6,
+  kInterrupted = 130
+};
 
 // The verb's work; its return value is the exit code. Set by the parsed subcommand, run by main.
 using Action = std::function<int()>;
@@ -55,7 +64,7 @@ using codegen::RobotPath;
 
 // Writes j to `path` if it is not empty; whole or not at all.
 inline void WriteJson(const std::string& path, const nlohmann::ordered_json& j) {
-  if (!path.empty()) files::WriteWholeFile(path, j.dump(1) + "\n");
+  if (!path.empty()) files::WriteWholeFile(path, io::JsonText(j, 1) + "\n");
 }
 
 // The exit code that main() makes of an exception.

@@ -21,7 +21,7 @@ usr=$work/unpacked/usr
 cd "$work"
 unset ARMCAL_HOME
 armcal() { "$usr/bin/armcal" "$@" >>"$work/log" 2>&1; }
-armcal excite --robot er20_like --starts 1 --seconds 1 --out "$work/motion.csv"
+armcal excite --robot er20_like --starts 1 --search-seconds 1 --out "$work/motion.csv"
 [[ -s $work/motion.csv ]]
 [[ -s $usr/share/man/man1/armcal-excite.1 && -s $usr/share/bash-completion/completions/armcal ]]
 [[ -s $usr/share/doc/armcal/README.md && -s $usr/share/doc/armcal/LICENSE ]]

@@ -23,14 +23,23 @@ way() {
   cmake --build "$build/$1" -j2 >>"$build/log" 2>&1
   echo "$1: $((SECONDS - start)) s"
 }
+# rules NAME: the user's own sources are compiled with the rules that equal bits rest on.
+rules() {
+  for flag in -ffp-contract=off -fno-fast-math -fno-math-errno; do
+    grep -q -- "FLAGS = .*$flag" "$build/$1/build.ninja" || { echo "$1: $flag is missing"; exit 1; }
+  done
+}
 way package -DWAY=package -DCMAKE_PREFIX_PATH="$build/prefix"
 "$build/package/consumer"
+rules package
 grep -q "$build/prefix/bin/armcal-generate" "$build/package/build.ninja"
 export ARMCAL_GENERATE=$generate UNITY=ON
 way fetch -DWAY=fetch -DARMCAL="$checkout"
 "$build/fetch/consumer"
+rules fetch
 way subdirectory -DWAY=subdirectory -DARMCAL="$checkout"
 "$build/subdirectory/consumer"
+rules subdirectory
 if ! command -v arm-none-eabi-g++ >/dev/null; then
   echo "arm-none-eabi-g++ is not there: the Cortex-M is left out"
   exit 0
@@ -38,6 +47,7 @@ fi
 # for_core NAME CORE OPTIONS...
 for_core() {
   way "$1" -DCMAKE_TOOLCHAIN_FILE="$checkout/toolchains/cortex-$2.cmake" "${@:3}"
+  rules "$1"
   grep -q "FLAGS = .*-mcpu=cortex-${2%f}" "$build/$1/build.ninja"
 }
 for_core fetch-m4f m4f -DWAY=fetch -DARMCAL="$checkout"

@@ -8,13 +8,13 @@
 
 namespace armcal::tests {
 
-// Runs the demo into a fresh folder; `scenario` is a name or a file. Returns result.json, null if the run failed. What
-// it compiles is kept for other tests, not in the user's cache.
-inline nlohmann::json RunDemo(const std::string& scenario, const fs::path& folder) {
+// Runs the demo into a fresh folder; `scenario` is a name or a file, `code` the exit code that it must have. Returns
+// result.json, null if the run failed. What it compiles is kept for other tests, not in the user's cache.
+inline nlohmann::json RunDemo(const std::string& scenario, const fs::path& folder, int code = 0) {
   setenv("XDG_CACHE_HOME", ARMCAL_E2E_FOLDER "/cache", 1);
   const Outcome o = Tool({"demo", "--scenario", scenario, "--out", folder.string(), "--excite-starts", "6"});
-  EXPECT_EQ(o.code, 0) << o.err << o.out;
-  if (o.code != 0) return {};
+  EXPECT_EQ(o.code, code) << o.err << o.out;
+  if (o.code != code) return {};
   return ReadJson(folder / "result.json");
 }
 

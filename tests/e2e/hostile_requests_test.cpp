@@ -130,7 +130,8 @@ TEST(RealTime, ARecordingOfATrajectory_EndsWithTheMotion) {
   const fs::path folder = FreshFolder("real_time");
   const RunningDrive running(folder, "none", {"--real-time"});
   const std::string path = (folder / "path.csv").string(), log = (folder / "log.csv").string();
-  ASSERT_EQ(Tool({"excite", "--robot", "er20_like", "--purpose", "test", "--seconds", "2", "--out", path}).code, 0);
+  ASSERT_EQ(Tool({"excite", "--robot", "er20_like", "--purpose", "test", "--search-seconds", "2", "--out", path}).code,
+            0);
   const Outcome o =
       Tool({"record", "--robot", "er20_like", "--connect", running.address(), "--trajectory", path, "--out", log});
   EXPECT_EQ(o.code, 0) << o.err;

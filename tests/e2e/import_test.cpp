@@ -22,7 +22,7 @@ class Import : public testing::Test {
     const std::string robot = Path(name + ".toml");
     o = Tool({"generate", "--robot", robot, "--out", Path("generated")});
     ASSERT_EQ(o.code, 0) << o.err << o.out;
-    o = Tool({"excite", "--robot", robot, "--seconds", "2", "--no-slow", "--out", Path("motion.csv")});
+    o = Tool({"excite", "--robot", robot, "--search-seconds", "2", "--no-slow", "--out", Path("motion.csv")});
     ASSERT_EQ(o.code, 0) << o.err << o.out;
     const UrdfArm truth(arm.truth, arm.moving, arm.joints, arm.drive, arm.held);
     logs::WriteLog(Path("train.csv"), truth.Run(40, 125, 13));

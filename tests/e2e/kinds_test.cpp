@@ -35,8 +35,8 @@ class Motions {
     for (const char* purpose : {"train", "test"}) {
       paths_.push_back((folder / (std::string(purpose) + ".csv")).string());
       const Outcome made =
-          Tool({"excite", "--robot", "er20_like", "--purpose", purpose, "--starts", std::to_string(starts), "--seconds",
-                "60", "--margin", "0.25", "--out", paths_.back()});
+          Tool({"excite", "--robot", "er20_like", "--purpose", purpose, "--starts", std::to_string(starts),
+                "--search-seconds", "60", "--margin", "0.25", "--out", paths_.back()});
       if (made.code != 0) throw std::runtime_error(made.err);
     }
     spline_.emplace(trajectory::ReadTrajectory(paths_[0], 6));

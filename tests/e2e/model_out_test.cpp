@@ -4,6 +4,7 @@
 #include <numbers>
 #include <random>
 #include <regex>
+#include <set>
 #include <sstream>
 
 #include "host_sim/data/logs/log.hpp"
@@ -84,6 +85,33 @@ TEST_F(ModelOut, OfATorqueThatIsReadLate_SaysByHowMuch) {
   EXPECT_NEAR(verdict_["terms"][0]["parameters"]["time_delay.d"].get<double>(), 0.004, 0.0008);
 }
 
+// All keys of a JSON, at any depth.
+void AddKeys(const nlohmann::json& json, std::set<std::string>& keys) {
+  for (const auto& [key, value] : json.items()) {
+    if (json.is_object()) keys.insert(key);
+    if (value.is_structured()) AddKeys(value, keys);
+  }
+}
+
+// Programs of users read these keys.
+TEST_F(ModelOut, Json_HasEveryKeyThatThePageOfDiagnosisLists) {
+  Diagnose("gain", [](Dataset& d) { d.tau.col(1) *= 1.25; }, [](Dataset& d) { d.tau.col(1) *= 1.25; });
+  std::set<std::string> keys;
+  AddKeys(verdict_, keys);
+  std::istringstream page(ReadText("docs/diagnosis.md"));
+  const std::regex name("`(?:terms\\[\\]\\.)?([a-zA-Z0-9_]+)`");
+  int listed = 0;
+  bool table = false;
+  for (std::string line; std::getline(page, line);) {
+    if (line.starts_with("| in the JSON |")) table = true;
+    else if (!line.starts_with("|")) table = false;
+    const std::string cell = line.substr(0, line.find('|', 1));
+    for (std::sregex_iterator it(cell.begin(), cell.end(), name), end; table && it != end; ++it, ++listed)
+      EXPECT_TRUE(keys.contains((*it)[1])) << (*it)[1];
+  }
+  EXPECT_GT(listed, 50);
+}
+
 TEST_F(ModelOut, OfATorqueThatStopsAtALimit_SaysWhere) {
   double limit = 0;
   const auto clamped = [&](Dataset& d) {
@@ -161,20 +189,20 @@ TEST_F(ModelOut, OfARipple_TheCommandThatSeparatesIt_TakesWhatWasFound) {
   EXPECT_NEAR(t.at("unknowns").at("k").get<double>(), 12, 0.1);
   std::string command;
   for (const auto& s : t.at("separate")) command = s.at("command").get<std::string>();
-  ASSERT_NE(command.find(" --from " + Path("verdict.json")), std::string::npos) << said_.out;
+  ASSERT_NE(command.find(" --found " + Path("verdict.json")), std::string::npos) << said_.out;
   std::vector<nlohmann::json> accuracy;
-  for (const std::string& shell : {command, std::regex_replace(command, std::regex(" --from [^ ]*"), "")}) {
+  for (const std::string& shell : {command, std::regex_replace(command, std::regex(" --found [^ ]*"), "")}) {
     std::string words = std::regex_replace(shell, std::regex("^armcal"), ARMCAL_TOOL);
     words = std::regex_replace(words, std::regex("separate.csv"), Path("separate.csv"));
     const Outcome o = RunProgram(
-        {"sh", "-c", words + " --no-slow --starts 1 --harmonics 10 --seconds 60 --json " + Path("excite.json")});
+        {"sh", "-c", words + " --no-slow --starts 1 --harmonics 10 --search-seconds 60 --json " + Path("excite.json")});
     ASSERT_EQ(o.code, 0) << o.err;
     accuracy.push_back(ReadJson(Path("excite.json")).at("accuracy"));
   }
   EXPECT_NE(accuracy[0], accuracy[1]);  // one search, one seed: only the ripple's k differs
   const std::string never = Path("never.csv");
   const auto refused = [&](const std::string& effects, const std::string& verdict, const std::string& named) {
-    ExpectOneLine(Tool({"excite", "--robot", "two_link", "--separate", effects, "--from", verdict, "--out", never}), 2,
+    ExpectOneLine(Tool({"excite", "--robot", "two_link", "--separate", effects, "--found", verdict, "--out", never}), 2,
                   named);
     EXPECT_FALSE(fs::exists(never));
   };

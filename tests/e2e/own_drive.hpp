@@ -33,7 +33,7 @@ class OwnDrive : public testing::Test {
   void Excited() {
     for (const auto& [purpose, seed] : {std::pair{"train", "1"}, {"test", "2"}}) {
       const Outcome o = Tool({"excite", "--robot", Robot(), "--purpose", purpose, "--seed", seed, "--starts", "6",
-                              "--seconds", "60", "--out", Path(std::string(purpose) + ".csv")});
+                              "--search-seconds", "60", "--out", Path(std::string(purpose) + ".csv")});
       ASSERT_EQ(o.code, 0) << o.err << o.out;
     }
   }

@@ -120,8 +120,8 @@ TEST_F(CompiledDrive, OfAScara_IsCompiledOnceAndItsEstimatesAreTheDrives) {
 
   setenv("CXX", "no-such-compiler", 1);
   const RunningDrive drive(folder_, Scenario("nothing.toml", 5), {"--robot", Robot()});
-  const Outcome excited = Tool(
-      {"excite", "--robot", Robot(), "--no-slow", "--starts", "2", "--seconds", "20", "--out", Path("motion.csv")});
+  const Outcome excited = Tool({"excite", "--robot", Robot(), "--no-slow", "--starts", "2", "--search-seconds", "20",
+                                "--out", Path("motion.csv")});
   ASSERT_EQ(excited.code, 0) << excited.err;
   ASSERT_NO_FATAL_FAILURE(Recorded(drive, "motion"));
   const Outcome fit = Tool({"identify", "--robot", Robot(), "--train", Path("motion_log.csv.gz"), "--json",

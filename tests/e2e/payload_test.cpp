@@ -23,8 +23,8 @@ class Payload : public testing::Test {
   std::string Record(const std::string& name, const std::string& scenario, const std::string& purpose) {
     const std::string trajectory = (folder_ / (name + "_path.csv")).string(),
                       log = (folder_ / (name + ".csv.gz")).string();
-    const Outcome made = Tool({"excite", "--robot", "er20_like", "--purpose", purpose, "--starts", "3", "--seconds",
-                               "60", "--out", trajectory});
+    const Outcome made = Tool({"excite", "--robot", "er20_like", "--purpose", purpose, "--starts", "3",
+                               "--search-seconds", "60", "--out", trajectory});
     EXPECT_EQ(made.code, 0) << made.err;
     fs::create_directories(folder_ / name);
     const RunningDrive drive(folder_ / name, Write(name + ".toml", scenario));

@@ -82,7 +82,7 @@ TEST_F(EarlyEnd, CtrlCWhileTheDrivePlays_StopsTheArm_AndKeepsThePart) {
   const pid_t child = StartRecord(drive_.port(), "run", 8000);
   UntilPlayed();
   kill(child, SIGINT);
-  ExpectOneLine(End(child), 6, "interrupted");
+  ExpectOneLine(End(child), 128 + SIGINT, "interrupted");
   EXPECT_FALSE(Enabled());
   EXPECT_EQ(Player()[0], static_cast<std::uint16_t>(client::PlayerState::kDisabled));
   EXPECT_FALSE(fs::exists(Path("run"))) << "a part has another name";
@@ -90,7 +90,7 @@ TEST_F(EarlyEnd, CtrlCWhileTheDrivePlays_StopsTheArm_AndKeepsThePart) {
   const auto json = ReadJson(Path("log.json"));
   EXPECT_TRUE(json.at("partial"));
   EXPECT_EQ(json.at("error"), "interrupted");
-  EXPECT_EQ(json.at("exit_code"), 6);
+  EXPECT_EQ(json.at("exit_code"), 128 + SIGINT);
   EXPECT_EQ(json.at("log"), Path("run.partial"));
   EXPECT_GE(json.at("samples"), 200);
 }
@@ -101,7 +101,7 @@ TEST_F(EarlyEnd, CtrlCWhileTheTrajectoryIsLoaded_DisablesTheArm_AndKeepsNothing)
   const pid_t child = StartRecord(drive_.port(), "run.csv", 20000);
   for (int k = 0; k < 1000000 && core::GetU32(&Player()[2]) == 0; ++k) std::this_thread::yield();
   kill(child, SIGINT);
-  ExpectOneLine(End(child), 3, "interrupted");
+  ExpectOneLine(End(child), 128 + SIGINT, "interrupted");
   EXPECT_FALSE(Enabled());
   EXPECT_FALSE(fs::exists(Path("run.csv")));
   EXPECT_FALSE(fs::exists(Path("run.partial.csv")));

@@ -122,8 +122,7 @@ TEST_F(Survey, ForgettingFollowsBetterThanKalman_TheBankBetterThanBoth) {
 }
 
 TEST_F(Survey, EveryTableAndFigureIsThere_EveryGoalIsMet) {
-  for (const char* table :
-       {"trajectories", "8", "10", "10 tier 2", "12", "(9)", "shipped prior", "figure 4", "slips"})
+  for (const char* table : {"trajectories", "8", "10", "10 tier 2", "12", "(9)", "shipped prior", "figure 4", "slips"})
     EXPECT_TRUE(run_->all.at("tables").contains(table)) << table;
   const std::string page = ReadText(run_->folder / "out.html");
   for (const char* figure : {"Figure 1", "Figure 2", "Figure 3", "Figure 4"})
@@ -157,8 +156,8 @@ TEST(Excite, WithEveryCurveAndCriterion_WritesATrajectoryWithinTheLimits) {
                                                    {"--search", "genetic"}};
   for (const auto& way : ways) {
     const fs::path json = folder / "out.json", csv = folder / "out.csv";
-    std::vector<std::string> words{"excite",    "--robot", "two_link",  "--out",  csv.string(),
-                                   "--seconds", "2",       "--no-slow", "--json", json.string()};
+    std::vector<std::string> words{"excite",           "--robot", "two_link",  "--out",  csv.string(),
+                                   "--search-seconds", "2",       "--no-slow", "--json", json.string()};
     words.insert(words.end(), way.begin(), way.end());
     const Outcome o = Tool(words);
     ASSERT_EQ(o.code, 0) << way[1] << ": " << o.err;

@@ -126,7 +126,7 @@ def through(armcal, folder, collections, name, seed):
     arm, bench, faults = THROUGH[name], Bench(armcal, folder, name), []
     bench.imported(arm, collections)
     for motion, number in (("train", 1), ("test", 2)):
-        bench.run("excite", "--robot", bench.robot, "--purpose", motion, "--seed", number, "--starts", 6, "--seconds", 60,
+        bench.run("excite", "--robot", bench.robot, "--purpose", motion, "--seed", number, "--starts", 6, "--search-seconds", 60,
                   "--out", bench.folder / f"{motion}.csv")
     logs = bench.logs("nothing", seed, "")
     noise = [float(value) for value in re.findall(r"^torque_noise_Nm? = (\S+)", bench.robot.read_text(), re.M)]

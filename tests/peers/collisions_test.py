@@ -204,14 +204,14 @@ def main():
             bare = re.sub("<collision.*?</collision>", "", (folder / f"{arm}.urdf").read_text())
             (folder / f"{arm}_bare.urdf").write_text(bare)
             (folder / f"{arm}_free.toml").write_text(text.replace(f'"{arm}.urdf"', f'"{arm}_bare.urdf"'))
-        tool("excite", "--robot", f"{arm}_free.toml", "--out", "free.csv", "--starts", STARTS, "--seconds", 600, "--seed", 1, "--json", "free.json")
+        tool("excite", "--robot", f"{arm}_free.toml", "--out", "free.csv", "--starts", STARTS, "--search-seconds", 600, "--seed", 1, "--json", "free.json")
         free[arm] = json.loads((folder / "free.json").read_text())["cond_period"]
 
     bad = 0
     for number in range(20):
         arm, with_cell, seed = list(arms)[number % 3], number % 2 == 0, 1 + number // 6
         words = ["--cell", "cell.toml"] if with_cell else []
-        tool("excite", "--robot", f"{arm}.toml", "--out", "motion.csv", "--step", "0.001", "--starts", STARTS, "--seconds", 600, "--seed", seed,
+        tool("excite", "--robot", f"{arm}.toml", "--out", "motion.csv", "--step", "0.001", "--starts", STARTS, "--search-seconds", 600, "--seed", seed,
              "--periods", 2, "--json", "excite.json", *words)
         report = json.loads((folder / "excite.json").read_text())
         smallest, collide, samples = judged(arms[arm], folder / "motion.csv", report, with_cell)

@@ -143,7 +143,7 @@ def recorded(armcal, folder):
         port = probe.getsockname()[1]
     run = lambda *words: subprocess.run([armcal, *map(str, words)], check=True, capture_output=True)
     for name, purpose in (("a", "train"), ("b", "test")):
-        run("excite", "--robot", "er20_like", "--purpose", purpose, "--starts", 4, "--seconds", 60, "--out", folder / f"{name}_motion.csv")
+        run("excite", "--robot", "er20_like", "--purpose", purpose, "--starts", 4, "--search-seconds", 60, "--out", folder / f"{name}_motion.csv")
     drive = subprocess.Popen([armcal, "simulate", "--scenario", "ripple", "--port", str(port), "--storage", str(folder / "drive.nor")],
                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:

@@ -31,7 +31,7 @@ def check_excite(program, folder):
             (str(folder / "boxes.toml"), f"--cell {cell} --clearance 0.03 --starts 1 --no-slow",
              dict(cell=cell, clearance=0.03, starts=1, no_slow=True)))):
         theirs, ours, report = (folder / f"{name}{number}" for name in ("theirs.csv", "ours.csv", "report.json"))
-        subprocess.run([program, "excite", "--robot", robot, *words.split(), "--seconds", "600", "--out", theirs, "--json", report],
+        subprocess.run([program, "excite", "--robot", robot, *words.split(), "--search-seconds", "600", "--out", theirs, "--json", report],
                        check=True, capture_output=True)
         shares = []
         found = armcal.excite(armcal.Robot(robot), **options, seconds=600, out=ours, progress=shares.append)

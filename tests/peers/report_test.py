@@ -187,6 +187,28 @@ def check_hostile_names(browser, program, folder):
         assert opened.complaints == [], opened.complaints
 
 
+def check_other_pages(browser, program, folder):
+    """The pages of identify and of diagnose --splits: they open without a complaint, and their charts show values."""
+    runs = [folder / f"run{k}.csv" for k in range(3)]
+    for k, run in enumerate(runs):
+        write_log(run, 10 + k)
+    pages = {"identified": ["identify", "--train", runs[0], "--test", runs[1]], "splits": ["diagnose", "--splits", *runs, "--out", folder / "splits"]}
+    for name, words in pages.items():
+        page = folder / f"{name}.html"
+        subprocess.run([program, *words, "--robot", "two_link", "--report", page], check=True, stdout=subprocess.DEVNULL)
+        assert page.stat().st_size <= MOST_BYTES, (name, page.stat().st_size)
+        for how in ({}, {"size": NARROW}, {"scheme": "dark"}, {"javascript": False}):
+            with Opened(browser, page, **how) as opened:
+                assert opened.page.locator("svg:visible, canvas:visible").count() >= 1, (name, how)
+                if "javascript" not in how:
+                    assert opened.page.evaluate("document.documentElement.scrollWidth") <= (NARROW[0] if "size" in how else 1400), name
+                for chart in opened.page.locator(".live .panel:visible").all():
+                    chart.scroll_into_view_if_needed()
+                    pointer_on(opened.page, chart, 0.5)
+                    assert re.search(r"at .+ \d", chart.locator(".head").inner_text()), (name, how)
+                assert opened.complaints == [], (name, how, opened.complaints)
+
+
 def make_page(program, folder, robot, page):
     subprocess.run([program, "diagnose", "--robot", robot, "--train", folder / "train.csv", "--test", folder / "test.csv",
                     "--report", page], check=True, stdout=subprocess.DEVNULL)
@@ -204,6 +226,7 @@ def main():
         check_live(browser, page, log)
         check_layouts(browser, page)
         check_hostile_names(browser, program, folder)
+        check_other_pages(browser, program, folder)
         pictures(browser, page, folder, "report")
     print(f"report: {page.stat().st_size} bytes; zoom, hover, dark, print, narrow and no JavaScript hold")
 

@@ -59,7 +59,7 @@ Motor ReadMotor(const io::TomlReader& in, bool prismatic) {
     motor.Report("gear_ratio", prismatic ? "motor radians per metre, not zero" : "a ratio, not zero");
   m.current_A_per_lsb = motor.Positive("current_A_per_lsb");
   m.torque_constant_NmpA = motor.Positive("torque_constant_NmpA");
-  m.torque_constant_tolerance = motor.Number("torque_constant_tolerance", 0);
+  m.torque_constant_tolerance = motor.NotNegative("torque_constant_tolerance", 0);
   m.rotor_inertia_kgm2 = motor.NotNegative("rotor_inertia_kgm2", 0);
   return m;
 }
@@ -108,6 +108,7 @@ void ReadDrive(const io::TomlReader& in, Joint& j, const std::string& unlimited)
     if (in.Has(key)) j.wide.erase(name);
   }
   j.has_motor = in.Has("motor");
+  if (!j.has_motor && in.Has("encoder")) in.Report("encoder", "motor beside it");
   j.motor = j.has_motor ? ReadMotor(in, prismatic) : OnTheJoint(j.kinematics.type, j.torque_limit_Nm);
   if (!j.has_motor) return;
   if (in.Table("motor").Has("rotor_inertia_kgm2")) j.wide.erase("Ia");
@@ -120,28 +121,28 @@ CeilingSettings ReadCeilings(const io::TomlReader& in, int joints) {
   const auto each = [&](std::string_view key, std::vector<double>& values) {
     if (!in.Has(key)) return;
     values = in.Numbers(key, static_cast<std::size_t>(joints));
-    for (const double v : values)
-      if (!(v > 0)) in.Fail(key, "numbers above zero, one a joint");
+    if (std::any_of(values.begin(), values.end(), [](double v) { return v <= 0; }))
+      in.Report(key, "numbers above zero, one a joint");
   };
   const auto range = [](const io::TomlReader& from, std::string_view key, std::array<double, 2>& values) {
     if (!from.Has(key)) return;
     const auto given = from.Numbers(key, 2);
-    if (!(given[0] <= given[1])) from.Fail(key, "[lowest, highest]");
+    if (given[0] > given[1]) from.Report(key, "[lowest, highest]");
     values = {given[0], given[1]};
   };
   each("torque_Nm", c.torque_Nm);
   each("friction_Nm", c.friction_Nm);
   each("noise_Nm", c.noise_Nm);
   range(in, "torque_scale", c.torque_scale);
-  if (!(c.torque_scale[0] > 0)) in.Fail("torque_scale", "[lowest, highest] above zero");
+  if (c.torque_scale[0] <= 0) in.Report("torque_scale", "[lowest, highest] above zero");
   range(in, "temperature_degC", c.temperature_degC);
   c.feed_share = in.NotNegative("feed_share", c.feed_share);
   c.least_fade_ms = in.Positive("least_fade_ms", c.least_fade_ms);
   c.longest_fade_ms = in.Positive("longest_fade_ms", c.longest_fade_ms);
   if (c.longest_fade_ms < c.least_fade_ms || c.longest_fade_ms > 1e6)
-    in.Fail("longest_fade_ms", "least_fade_ms to 1000000");
+    in.Report("longest_fade_ms", "least_fade_ms to 1000000");
   c.least_forgetting = in.Positive("least_forgetting", c.least_forgetting);
-  if (c.least_forgetting > 1) in.Fail("least_forgetting", "a number above 0 and not above 1");
+  if (c.least_forgetting > 1) in.Report("least_forgetting", "a number above 0 and not above 1");
   if (!in.Has("parameter")) return c;
   const io::TomlReader parameter = in.Table("parameter");
   for (const auto& [key, value] : parameter.table()) range(parameter, key.str(), c.parameter[std::string(key.str())]);
@@ -162,6 +163,7 @@ Joint ReadJoint(const io::TomlReader& in, bool has_prior) {
   j.kinematics.a_m = in.Number("a_m");
   j.kinematics.d_m = in.Number("d_m") + (prismatic ? in.Number("offset_m", 0) : 0);
   j.kinematics.theta_rad = in.Number("offset_deg", 0) * kRadPerDeg;
+  if (!prismatic && in.Has("offset_m")) in.Report("offset_m", "a joint that slides; one that turns has offset_deg");
   for (const char* key : {"a_m", "d_m"})
     if (std::abs(in.Number(key)) > kLongest) in.Report(key, "metres (millimetres?)");
   ReadDrive(in, j, "");
@@ -238,7 +240,7 @@ Shape ReadCapsule(const io::TomlReader& in, const UrdfChain* chain, int joints) 
   for (const char* key : {"from_m", "to_m", "radius_m"})
     if (std::max({from.norm(), to.norm(), shape.size_m[0]}) > kLongest) in.Report(key, "metres (millimetres?)");
   shape.xyz_m = Components((from + to) / 2);
-  shape.rotation = RowMajor(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), to - from).toRotationMatrix());
+  shape.rotation = RowMajor(TurnFromZ(to - from));
   return Moved(frame, shape);
 }
 
@@ -375,8 +377,8 @@ void ReadHead(const io::TomlReader& in, Robot& r) {
   in.AllowOnly(
       {"name",           "title",        "source",       "gravity_mps2", "dh",      "sign_law", "sign_width_radps",
        "sign_width_mps", "tick_rate_Hz", "sample_ticks", "prior",        "control", "joint",    "effect",
-       "coupling",       "base_frame",   "tool_frame",   "identified",   "urdf",    "tip",      "fixed",
-       "parameters",     "payload",      "ceilings",     "packages",     "capsule"});
+       "coupling",       "base_frame",   "tool_frame",   "urdf",         "tip",     "fixed",    "parameters",
+       "payload",        "ceilings",     "packages",     "capsule"});
   r.name = in.Text("name");
   if (in.Has("name") && (r.name.empty() || !std::islower(static_cast<unsigned char>(r.name[0])) ||
                          r.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos))
@@ -451,8 +453,8 @@ Robot ReadRobot(const std::filesystem::path& path) {
     const io::TomlReader coupling = in.Table("coupling");
     coupling.AllowOnly({"matrix"});
     r.coupling = coupling.Numbers("matrix", n * n);
-    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    if (static_cast<int>(r.coupling.size()) == n * n && !Rows::Map(r.coupling.data(), n, n).fullPivLu().isInvertible())
+    if (static_cast<int>(r.coupling.size()) == n * n &&
+        !Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(Eigen::MatrixXd::Map(r.coupling.data(), n, n)).isInvertible())
       coupling.Report("matrix", "a matrix that has an inverse");
   }
   if (in.Has("base_frame")) root = ReadFrame(in.Table("base_frame"));
@@ -476,6 +478,7 @@ Robot ReadRobot(const std::filesystem::path& path) {
     const io::TomlReader control = in.Table("control");
     control.AllowOnly({"structure", "rate_Hz", "kp_Nmprad", "kd_Nmsprad"});
     r.control.structure = control.Text("structure");
+    if (r.control.structure != "pd_feedforward") control.Report("structure", "\"pd_feedforward\"");
     r.control.rate_Hz = control.Positive("rate_Hz");
     r.control.kp_Nmprad = control.Numbers("kp_Nmprad", n);
     r.control.kd_Nmsprad = control.Numbers("kd_Nmsprad", n);

@@ -105,12 +105,14 @@ class MapReader {
       const std::string key = rule.key == "tau" ? torque : std::string(rule.key);
       const toml::table* table = root_[key].as_table();
       if (table == nullptr) {
-        if (rule.required)
+        if (rule.required || root_.contains(key))
           Fail(key, std::string(root_.contains(key) ? "" : "missing, ") +
                         "expected a table, as in { column = \"a{}\", unit = \"" +
                         std::string(DefaultUnit(rule.dimension)) + "\" }");
         continue;
       }
+      if (table->contains("optional") && !(*table)["optional"].is_boolean())
+        Fail(key + ".optional", "expected true or false");
       const bool optional = (*table)["optional"].value_or(false);
       if (optional && rule.required) Fail(key + ".optional", "this quantity is always needed");
       map.quantities.push_back(

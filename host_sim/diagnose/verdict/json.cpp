@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/diagnose/diagnosis/determined.hpp"
 #include "host_sim/diagnose/verdict/curves.hpp"
@@ -252,7 +253,7 @@ std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::ve
   std::vector<codegen::EffectUse> out;
   if (path.empty()) return out;
   try {
-    const auto verdict = nlohmann::json::parse(files::ReadWholeFile(path));
+    const ordered_json verdict = io::ParseJson(files::ReadWholeFile(path));
     for (const auto& term : verdict.at("terms")) {
       codegen::EffectUse use;
       use.effect = term.at("record").get<std::string>();
@@ -260,7 +261,7 @@ std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::ve
       use.nonlinear = term.at("unknowns").get<std::map<std::string, double>>();
       if (!use.nonlinear.empty() && IsAmong(use, effects)) out.push_back(use);
     }
-  } catch (const nlohmann::json::exception&) {
+  } catch (const nlohmann::ordered_json::exception&) {
     throw io::InputError(path + ": expected a verdict that armcal diagnose --json wrote");
   }
   if (out.empty())
@@ -275,7 +276,8 @@ diagnosis::KnownTerm ReadKnownTerm(const ordered_json& term, const codegen::Cata
   const auto number = [](const ordered_json& j) { return j.is_number() ? j.get<double>() : 0; };  // null: not finite
   try {
     const auto record = catalogue.find(term.at("record").get<std::string>());
-    if (record == catalogue.end()) throw io::InputError(term["record"].dump() + ": expected a record of the catalogue");
+    if (record == catalogue.end())
+      throw io::InputError(io::JsonText(term["record"]) + ": expected a record of the catalogue");
     out.record = &record->second;
     for (const int joint : term.at("joints")) out.joints.push_back(joint - 1);
     out.eta = term.at("eta").get<std::vector<double>>();
@@ -288,7 +290,7 @@ diagnosis::KnownTerm ReadKnownTerm(const ordered_json& term, const codegen::Cata
     for (Eigen::Index r = 0; r < size; ++r)
       for (Eigen::Index c = 0; c < size; ++c)
         covariance(r, c) = number(rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)));
-  } catch (const nlohmann::json::exception&) {
+  } catch (const nlohmann::ordered_json::exception&) {
     throw io::InputError("expected a verdict with eta, amplitude and covariance of each term: diagnose anew");
   }
   return out;

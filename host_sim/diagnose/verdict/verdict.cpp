@@ -80,7 +80,7 @@ std::string DiagnosisText(const DiagnosisView& v) {
     const Term& t = v.finding->terms[k];
     out += fmt::format("  {}, joint {}{}: {}\n", t.record->kind, JointName(t), Remark(t), t.record->title);
     out += fmt::format("    {}\n", Sentence(v, k));
-    if (t.in_fit) out += fmt::format("    {}\n", Parameters(t));
+    if (t.in_fit) out += fmt::format("    {}\n", Parameters(t, v.model->robot()));
     if (const std::string marked = t.in_fit ? diagnosis::MarkText(t) : ""; !marked.empty())
       out += fmt::format("    do not use alone: {}\n", marked);
     if (!t.confirmed)

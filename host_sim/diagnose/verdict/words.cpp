@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/diagnose/verdict/json_values.hpp"
 #include "host_sim/identify/calibration/log_check.hpp"
 #include "host_sim/identify/excitation/target.hpp"
 
@@ -111,14 +113,19 @@ std::string EffectWord(const std::string& record, const std::vector<int>& joints
   return record + (joints.empty() ? "" : ":") + JointNumbers(joints);
 }
 
-std::string Parameters(const Term& t) {
+std::string Parameters(const Term& t, const codegen::Robot& robot) {
   constexpr std::size_t kShown = 4;
   std::vector<std::string> out;
+  nlohmann::ordered_json units;
+  AddRobot(units, robot);
+  std::vector<int> joints = t.joints;
+  for (int& joint : joints) ++joint;
   for (std::size_t k = 0; k < t.eta.size(); ++k)
-    out.push_back(Value(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Eigen::Index>(k)], t.unknowns[k].unit));
+    out.push_back(Value(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Eigen::Index>(k)],
+                        UnitOn(units, joints, t.unknowns[k].unit)));
   for (std::size_t c = 0; c < std::min(kShown, t.columns.size()); ++c)
     out.push_back(Value(t.columns[c].name, t.amplitude[static_cast<Eigen::Index>(c)],
-                        t.sd[static_cast<Eigen::Index>(c)], t.columns[c].unit));
+                        t.sd[static_cast<Eigen::Index>(c)], UnitOn(units, joints, t.columns[c].unit)));
   if (t.columns.size() > kShown) out.push_back("...");
   return fmt::format("{}", fmt::join(out, ", "));
 }
@@ -177,7 +184,7 @@ std::vector<Separation> Separations(const Term& t, const diagnosis::Finding& fin
                       another = EffectWord(rival.record->name, rival.joints);
     if (excitation::CanSeparate(model.robot(), records, {one, another}, found)) {
       s.command = fmt::format("armcal excite --separate {},{}", one, another);
-      if (is_found(*t.record, t.joints) || is_found(*rival.record, rival.joints)) s.command += " --from " + verdict;
+      if (is_found(*t.record, t.joints) || is_found(*rival.record, rival.joints)) s.command += " --found " + verdict;
       s.command += fmt::format(" --robot {} --out separate.csv", robot);
     }
     out.push_back(s);

@@ -41,7 +41,7 @@ std::string EffectWord(const std::string& record, const std::vector<int>& joints
 std::string Remark(const diagnosis::Term& t);
 
 // "vs2 = 0.08 +- 0.002 rad/s, ..."; a curve's first coefficients only.
-std::string Parameters(const diagnosis::Term& t);
+std::string Parameters(const diagnosis::Term& t, const codegen::Robot& robot);
 
 // "512 (noise alone gains as much in one search of 10^99, accepted from 10^5)", "improves 5 of 5 blocks ...",
 // "presliding_dahl, joint 2 (score 480)".

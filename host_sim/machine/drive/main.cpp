@@ -1,15 +1,18 @@
 // drive - the program of the simulated drive. Its firmware is linked in, or loaded from a shared object.
 //   armcal-drive[-ROBOT] [--firmware FILE] --scenario FILE --robot FILE --storage FILE [--port N] [--read-port N]
-//     [--serial DEVICE] [--truth-log FILE] [--key FILE]
+//     [--serial DEVICE] [--truth-log FILE] [--key FILE] [--json FILE]
 //   armcal-drive-ROBOT --schema
 //     prints which model is linked in
 #include <dlfcn.h>
 
 #include <csignal>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "host_sim/client/key_file.hpp"
 #include "host_sim/machine/drive/simulated_drive.hpp"
 
@@ -36,7 +39,7 @@ std::unique_ptr<drive::Firmware> Load(const std::string& path, const std::uint8_
 
 int Main(int argc, char** argv) {
   drive::DriveOptions o;
-  std::string firmware;
+  std::string firmware, json;
   std::optional<client::Key> key;
   bool schema = false;
   const auto value = [&](int& i) -> std::string {
@@ -53,6 +56,7 @@ int Main(int argc, char** argv) {
     else if (!std::strcmp(argv[i], "--serial")) o.serial = value(i);
     else if (!std::strcmp(argv[i], "--key")) key = client::ReadKey(value(i));
     else if (!std::strcmp(argv[i], "--firmware")) firmware = value(i);
+    else if (!std::strcmp(argv[i], "--json")) json = value(i);
     else if (!std::strcmp(argv[i], "--real-time")) o.real_time = true;
     else if (!std::strcmp(argv[i], "--schema")) schema = true;
     else throw io::InputError(std::string(argv[i]) + ": no such option of the simulated drive");
@@ -65,9 +69,15 @@ int Main(int argc, char** argv) {
   drive::SimulatedDrive drive(o, std::move(loaded));
   drive.Run(quit, [&](const drive::Firmware& f) {
     const std::string read = f.read_port() == 0 ? "" : ", reading alone on port " + std::to_string(f.read_port());
-    std::printf("drive: %s, schema %08X%s, listening on %s:%d\n", f.name(), static_cast<unsigned>(f.schema()),
-                read.c_str(), o.address.c_str(), f.port());
+    char schema_text[9];
+    std::snprintf(schema_text, sizeof schema_text, "%08X", static_cast<unsigned>(f.schema()));
+    const std::string address = o.address + ":" + std::to_string(f.port());
+    std::printf("drive: %s, schema %s%s, listening on %s\n", f.name(), schema_text, read.c_str(), address.c_str());
     std::fflush(stdout);
+    if (json.empty()) return;
+    const nlohmann::ordered_json said{
+        {"robot", f.name()}, {"schema", schema_text}, {"address", address}, {"read_port", f.read_port()}};
+    io::AtomicWrite(json, io::JsonText(said, 1) + "\n");
   });
   return 0;
 }

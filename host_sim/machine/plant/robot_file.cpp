@@ -32,7 +32,7 @@ void ReadMotor(const io::TomlReader& keys, JointData& joint) {
   joint.has_motor = true;
   const io::TomlReader encoder = keys.Table("encoder"), motor = keys.Table("motor");
   joint.counts_per_turn = encoder.Positive("counts_per_turn");
-  joint.zero_counts = encoder.Integer("zero_counts", INT32_MIN, INT32_MAX, 0);
+  joint.zero_counts = encoder.Integer("zero_counts", INT32_MIN, UINT32_MAX, 0);
   joint.gear_ratio = motor.Number("gear_ratio");
   if (joint.gear_ratio == 0) motor.Fail("gear_ratio", "a signed ratio, not 0");
   joint.current_A_per_lsb = motor.Positive("current_A_per_lsb");

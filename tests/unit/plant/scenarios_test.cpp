@@ -73,7 +73,10 @@ TEST(ShippedScenarios, HaveEffectsAboutAsLargeAsTheNoise) {
     for (const Undeclared& effect : scenario.undeclared()) {
       kinds.insert(effect.kind);
       everywhere = everywhere || effect.joint == "flange" || effect.joint == "base";
-      if (!everywhere) joints.insert(std::stoi(effect.joint) - 1);
+      if (everywhere) continue;
+      joints.insert(std::stoi(effect.joint) - 1);
+      if (effect.kind == "wrist_coupling")  // "5-6", and it acts on both
+        joints.insert(std::stoi(effect.joint.substr(effect.joint.find('-') + 1)) - 1);
     }
     EXPECT_TRUE(!everywhere || (size.maxCoeff() > 0.6 && size.maxCoeff() < 2))
         << entry.path() << " " << size.transpose();

@@ -11,7 +11,7 @@ import sys
 TOP, ARMCAL, SITE = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 SOURCE = SITE.with_name(SITE.name + ".source")
 PAGES = ["*.md", "docs/*.md", "port/*.md", "host_sim/scenarios/*.md"]
-OTHERS = ["docs/*.png", "docs/*.svg", "docs/rooms.dot", "docs/findings/*", "docs/report/*", "toolchains/budgets.toml"]
+OTHERS = ["docs/*.png", "docs/*.svg", "docs/rooms.dot", "docs/concepts/*", "docs/effects/*", "docs/findings/*", "docs/report/*", "toolchains/budgets.toml"]
 
 
 def run(*words, **more):

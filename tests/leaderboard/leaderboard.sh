@@ -4,13 +4,19 @@
 # PERCENT scales the number of cases of the judged set's report2. RIVAL: programs in the place of all in rivals/.
 # OUT_DIR/cases holds what a rival gets, OUT_DIR/truth the rest. Verdicts and scores have folders of their own. The table is
 # OUT_DIR/leaderboard.md and leaderboard.json.
-# Needs build/host (targets armcal, practice_robot, judged_set, judged_score); another build folder: ARMCAL_BUILD. pip installs the
-# rivals into build/peers/leaderboard.
+# Builds what it needs in build/host. With ARMCAL_BUILD it takes that build folder as it is (targets armcal, practice_robot,
+# judged_set, judged_score). pip installs the rivals into build/peers/leaderboard.
 set -euo pipefail
 
 here=$(realpath "$(dirname "${BASH_SOURCE[0]}")")
 root=$(realpath "$here/../..")
-export ARMCAL_BUILD=$(realpath "${ARMCAL_BUILD:-$root/build/host}")
+if [[ -z ${ARMCAL_BUILD:-} ]]; then
+  ARMCAL_BUILD=$root/build/host
+  bash "$root/toolchains/install.sh" host peers
+  (cd "$root" && cmake --preset host >/dev/null && cmake --build --preset host --target armcal practice_robot judged_set judged_score -j 2 >/dev/null)
+fi
+ARMCAL_BUILD=$(realpath "$ARMCAL_BUILD")
+export ARMCAL_BUILD
 seed=${1:-77} out=$(realpath -m "${2:-$root/build/leaderboard}") percent=${3:-2}
 rivals=("${@:4}")
 [[ ${#rivals[@]} -gt 0 ]] || rivals=("$here"/rivals/*)

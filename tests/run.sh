@@ -72,7 +72,7 @@ run_ctest() {
 
 configure_and_build() { cmake --preset "$1" && cmake --build --preset "$1" -j "$jobs" "${@:2}"; }
 
-step "host packages" toolchains/install.sh host || finish
+step "host packages" toolchains/install.sh host tests || finish
 
 if [[ $scope == peers ]]; then
   peers_programs() { python3 -m venv build/peers/venv && build/peers/venv/bin/pip install -q --disable-pip-version-check -r tests/peers/requirements.txt; }

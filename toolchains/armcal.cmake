@@ -29,6 +29,13 @@ target_link_libraries(armcal_host_rules INTERFACE armcal_rules)
 target_compile_options(armcal_host_rules INTERFACE -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow)
 target_include_directories(armcal_host_rules INTERFACE ${ARMCAL_TOP})
 target_compile_features(armcal_host_rules INTERFACE cxx_std_20)
+if(NOT CMAKE_CROSSCOMPILING)
+  # Headers that are compiled once need the same definitions in all rooms. The generator alone does without fmt.
+  find_package(tomlplusplus REQUIRED)
+  find_package(nlohmann_json REQUIRED)
+  find_package(fmt QUIET)
+  target_link_libraries(armcal_host_rules INTERFACE tomlplusplus::tomlplusplus nlohmann_json::nlohmann_json $<TARGET_NAME_IF_EXISTS:fmt::fmt>)
+endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   # The compiler looks for memory to free from 1 GB on, not from 128 MB on. It needs up to 0.6 GB more memory and about 15 % less time.
   target_compile_options(armcal_host_rules INTERFACE "SHELL:--param ggc-min-heapsize=1000000")
@@ -97,8 +104,12 @@ function(armcal_need_eigen_once)
   endif()
   set_target_properties(armcal_eigen_once PROPERTIES ${armcal_for_modules} ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
 endfunction()
-set(armcal_shared_headers "${ARMCAL_TOP}/toolchains/eigen_once.hpp" <algorithm> <cmath> <filesystem> <fstream> <functional>
-    <map> <nlohmann/json.hpp> <random> <string> <vector>)
+set(armcal_shared_headers "${ARMCAL_TOP}/toolchains/eigen_once.hpp" <Eigen/SparseCore> <algorithm> <array> <atomic> <chrono> <cmath> <filesystem>
+    <fstream> <functional> <map> <memory> <nlohmann/json.hpp> <numbers> <optional> <random> <set> <span> <sstream> <string> <thread>
+    <toml++/toml.h> <vector>)
+if(TARGET fmt::fmt)
+  list(APPEND armcal_shared_headers <fmt/format.h> <fmt/ranges.h>)
+endif()
 
 # armcal_host_library(NAME SOURCES ... [LIBS ...]): a room of codegen/src or host_sim. C++20; includes from the top folder.
 function(armcal_host_library name)

@@ -34,7 +34,6 @@ extern template void Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>::_s
                                                                                           Eigen::VectorXd&) const;
 extern template void Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>::_solve_impl(const Eigen::MatrixXd&,
                                                                                           Eigen::MatrixXd&) const;
-extern template class Eigen::JacobiSVD<Eigen::MatrixXd>;
 extern template class Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner>;
 extern template class Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 extern template Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>& Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>::compute(

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # toolchains - installs what armcal is built with, from Debian's own packages (Debian 12).
-#   toolchains/install.sh host    compiler, libraries and tests of the PC side
+#   toolchains/install.sh host    compiler and libraries of the PC side
+#   toolchains/install.sh tests   what its tests and the Debian package need besides
 #   toolchains/install.sh cross   compiler of the Cortex-M images
 #   toolchains/install.sh fuzz    clang with libFuzzer, for the long tests
 #   toolchains/install.sh fleet   Slurm and GNU parallel, for the long tests
@@ -10,10 +11,11 @@
 # Several may be named. Does nothing when all is there. Needs root or sudo only when something is missing.
 set -euo pipefail
 
-host_packages=(g++ cmake ninja-build pkg-config git ca-certificates
+host_packages=(g++ cmake ninja-build pkg-config ca-certificates
   libeigen3-dev liborocos-kdl-dev libmodbus-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev zlib1g-dev
-  libgtest-dev googletest dpkg-dev file mbpoll liburdfdom-dev libkdl-parser-dev libtinyxml2-dev libpagmo-dev libboost-dev
+  liburdfdom-dev libkdl-parser-dev libtinyxml2-dev libpagmo-dev libboost-dev
   libjs-dygraphs libssl-dev liblz4-dev libzstd-dev libsqlite3-dev libmatio-dev libfcl-dev libassimp-dev)
+tests_packages=(libgtest-dev googletest git dpkg-dev file mbpoll)
 cross_packages=(cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   qemu-system-arm python3)
 fuzz_packages=(clang libclang-rt-dev)
@@ -27,13 +29,14 @@ wanted=()
 for group in "${@:-none}"; do
   case $group in
     host) wanted+=("${host_packages[@]}") ;;
+    tests) wanted+=("${tests_packages[@]}") ;;
     cross) wanted+=("${cross_packages[@]}") ;;
     fuzz) wanted+=("${fuzz_packages[@]}") ;;
     fleet) wanted+=("${fleet_packages[@]}") ;;
     fresh) wanted+=("${fresh_packages[@]}") ;;
     peers) wanted+=("${peers_packages[@]}") ;;
     docs) wanted+=("${docs_packages[@]}") ;;
-    *) sed -n '2,10p' "$0" >&2; exit 2 ;;
+    *) sed -n '2,11p' "$0" >&2; exit 2 ;;
   esac
 done
 

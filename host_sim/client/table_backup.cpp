@@ -6,7 +6,6 @@
 #include "armcal/core/crc.hpp"
 #include "armcal/core/words.hpp"
 #include "codegen/src/io/input_error.hpp"
-#include "codegen/src/io/json.hpp"
 #include "host_sim/data/files/files.hpp"
 
 namespace armcal::client {
@@ -32,7 +31,7 @@ ordered_json BackupJson(std::span<const std::uint16_t> words, std::uint32_t sche
 }
 
 TableBackup ReadBackup(const std::string& path) {
-  const auto json = io::ParseJson(files::ReadWholeFile(path));
+  const auto json = files::ReadJsonFile(path);
   const auto bad = [&](const char* what) {
     return io::InputError(path + ": expected a file of armcal backup: " + what);
   };

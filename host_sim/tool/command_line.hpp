@@ -16,8 +16,8 @@ namespace armcal::tool {
 std::string VersionText(std::uint32_t version);
 std::string Version();
 
-// The words behind the program's name. Where an option has another name now, its former name is replaced by it, and a
-// line on stderr says so.
+// The words behind the program's name. A former name of an option is replaced by its present name, and a line on stderr
+// says so.
 std::vector<std::string> WordsOf(int argc, const char* const* argv);
 
 // One line about a command line that could not be read. The first word that is no verb or no option comes before all

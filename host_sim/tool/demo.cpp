@@ -11,7 +11,6 @@
 
 #include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
-#include "codegen/src/io/json.hpp"
 #include "host_sim/data/files/files.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/identify/calibration/table_file.hpp"
@@ -35,8 +34,6 @@ struct DemoOptions {
   std::string scenario = "stribeck", out = "build/demo", json;
   int excite_s = 60, excite_starts = 40;
 };
-
-ordered_json ReadJson(const std::string& path) { return io::ParseJson(files::ReadWholeFile(path)); }
 
 // Whether a confirmed term can be part of a committed model at all.
 bool Flashable(const diagnosis::Finding& finding) {
@@ -201,8 +198,9 @@ class Demo {
       if (!u.joint.empty() && u.joint.find_first_not_of("0123456789") == std::string::npos) joint = std::stoi(u.joint);
       result["undeclared"].push_back({{"kind", u.kind}, {"joint", joint}});
     }
-    const ordered_json cad = ReadJson(File("test_cad.json")), before = ReadJson(File("test_before.json")),
-                       after = ReadJson(File("test_after.json"));
+    const ordered_json cad = files::ReadJsonFile(File("test_cad.json")),
+                       before = files::ReadJsonFile(File("test_before.json")),
+                       after = files::ReadJsonFile(File("test_after.json"));
     result["plant_floor"] =
         verdict::ToList(PlantFloor(File("truth_1.bin"), run->test, before["first_tick"], before["decimation"]));
     const LogReader read(*run->model, {});
@@ -212,7 +210,8 @@ class Demo {
     result["drive_after"] = after["drive_residual_rms_Nm"];
     result["tracking_cad_rad"] = cad["tracking_rms_rad"], result["tracking_before_rad"] = before["tracking_rms_rad"],
     result["tracking_after_rad"] = after["tracking_rms_rad"];
-    const ordered_json flashed = ReadJson(File(final_flash)), estimate = ReadJson(File("estimate.json"));
+    const ordered_json flashed = files::ReadJsonFile(File(final_flash)),
+                       estimate = files::ReadJsonFile(File("estimate.json"));
     result["table_crc"] = flashed["table_crc"], result["readback_ok"] = flashed["readback_ok"];
     result["estimate_same_bits"] = estimate["same_bits"];
     result["path"] = path;

@@ -24,7 +24,8 @@ int RunEvaluate(const EvaluateOptions& o) {
   const calibration::Given given = ReadGiven(o.given, model);
   const LogReader read(model, o.format, o.cutoff_Hz);
   Watched line("evaluate");
-  const std::vector<calibration::Dataset> logs = read.All(o.logs);
+  const auto say = [&line](const std::string& text) { line.Clear(), SayAside(text); };
+  const std::vector<calibration::Dataset> logs = read.All(o.logs, say);
   io::SetDone(0.5);
   const analysis::Evaluated result = analysis::Evaluate(model, given, logs, o.band_Hz);
   line.Clear();

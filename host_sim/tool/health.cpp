@@ -53,10 +53,10 @@ std::string TermText(const health::Term& t) {
 }
 
 std::string Sentence(const JointHealth& h) {
-  const bool fits = h.verdict == health::Verdict::kFits || h.verdict == health::Verdict::kTooEarly;
-  std::string text =
-      fmt::format("joint {} {}", h.joint,
-                  report::Coloured(VerdictText(h.verdict), fits ? report::Colour::kGreen : report::Colour::kYellow));
+  std::string verdict = VerdictText(h.verdict);
+  if (h.verdict == health::Verdict::kFits) verdict = report::Coloured(verdict, report::Colour::kGreen);
+  else if (h.verdict != health::Verdict::kTooEarly) verdict = report::Coloured(verdict, report::Colour::kYellow);
+  std::string text = fmt::format("joint {} {}", h.joint, verdict);
   if (h.verdict == health::Verdict::kTooEarly)
     return text + fmt::format(": {:.0f} samples in motion since the table was adopted, an answer needs {:.0f} more",
                               h.rows, h.missing_rows);

@@ -332,8 +332,6 @@ std::string Significant(double v) { return fmt::format("{:.5g}", v); }
 void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
   report::Table t{{"parameter", "unit", "value", "sd", "posterior / prior"}, {}};
   std::vector<std::string> from_prior;
-  nlohmann::ordered_json units;
-  verdict::AddRobot(units, model.robot());
   for (const int c : fit.active) {
     if (c >= model.columns()) continue;
     const double ratio = fit.ratio(c);
@@ -341,13 +339,13 @@ void PrintColumns(const codegen::Model& model, const calibration::Fit& fit) {
       from_prior.push_back(model.column_name(c));
       continue;
     }
-    t.rows.push_back({model.column_name(c), verdict::ColumnUnit(units, model.column_name(c), model.column_unit(c)),
-                      Significant(fit.x[c]), Significant(fit.sd[c]),
-                      model.robot().has_prior ? fmt::format("{:.3f}", ratio) : "-"});
+    t.rows.push_back(
+        {model.column_name(c), verdict::ColumnUnit(model.robot(), model.column_name(c), model.column_unit(c)),
+         Significant(fit.x[c]), Significant(fit.sd[c]), model.robot().has_prior ? fmt::format("{:.3f}", ratio) : "-"});
   }
-  fmt::print("{}", report::Text(t));
+  if (!t.rows.empty()) fmt::print("{}", report::Text(t));
   if (!from_prior.empty())
-    fmt::print("{} more rest mostly on the prior (posterior / prior above {}): {}\n", from_prior.size(),
+    fmt::print("{} parameters rest mostly on the prior (posterior / prior above {}): {}\n", from_prior.size(),
                calibration::kFromPrior, fmt::join(from_prior, ", "));
 }
 
@@ -372,25 +370,27 @@ int RunIdentify(const IdentifyOptions& o) {
   if (!o.method.empty() && o.method != "auto") return RunMethod(method);
   const codegen::Model model = LoadModel(o.robot);
   const LogReader read(model, o.format, o.cutoff_Hz);
-  Watched line("identify");
-  const std::vector<calibration::Dataset> train = read.All(o.train);
+  std::optional<Watched> line(std::in_place, "identify");
+  const auto say = [&line](const std::string& text) { line->Clear(), SayAside(text); };
+  const std::vector<calibration::Dataset> train = read.All(o.train, say);
   io::SetDone(0.3);
-  line.Clear();
-  read.PrintUntold(train);
+  const std::vector<std::string> untold = analysis::Untold(model, train);
   analysis::Identified found(model, train);
   io::SetDone(0.6);
-  line.Clear();
+  line->Clear();
+  for (const std::string& text : untold) fmt::print("{}\n", text);
   PrintColumns(model, found.all);
   const calibration::Exogeneity& exogeneity = found.exogeneity;
   fmt::print("{}", verdict::ExogeneityText(exogeneity, analysis::kLacksTerm));
   if (o.method == "auto" && !exogeneity.passed() && exogeneity.instruments == calibration::kSimulatedLoop) {
     method.method = "instrumental_variable", method.exogeneity = verdict::ToJson(exogeneity);
+    line.reset();
     return RunMethod(method);
   }
   if (model.robot().has_prior) {
     found.ReadOut(train, o.force);
     io::SetDone(0.8);
-    line.Clear();
+    line->Clear();
     fmt::print(
         "standard parameters: {} of {} rest mostly on the prior (posterior / prior sd above {}); bodies physical: {}\n",
         found.read.FromPrior(), found.read.table.row.size(), calibration::kFromPrior,
@@ -404,15 +404,18 @@ int RunIdentify(const IdentifyOptions& o) {
   json.update(found.ToJson());
   if (!o.table.empty()) json["table_file"] = o.table;
   if (!o.test.empty()) {
-    const calibration::Dataset test = read.One(o.test);
+    const calibration::Dataset test = read.One(o.test, say);
     const analysis::Identified::OnLog held_out = found.Compare(test, true, o.band_Hz);
-    line.Clear();
+    const calibration::HeldOutMotion motion =
+        calibration::CompareMotion(model, found.all, calibration::Pointers(train), test);
+    line.reset();
     verdict::PrintError(held_out.error, model.robot(), "held out: " + o.test);
     json["test"] = o.test;
     json.update(held_out.json);
-    AddMotion(calibration::CompareMotion(model, found.all, calibration::Pointers(train), test), json);
+    AddMotion(motion, json);
   } else {
     json.update(found.Compare(train[0], false, o.band_Hz).json);
+    line.reset();
   }
   WriteJson(o.json, json);
   if (!o.report.empty()) {

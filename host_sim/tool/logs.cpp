@@ -20,8 +20,9 @@ std::vector<logs::Log> LogReader::Raw(const std::vector<std::string>& paths) con
   return out;
 }
 
-std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>& paths) const {
-  return analysis::CheckedLogs(model_, Raw(paths), cutoff_Hz_, SayAside);
+std::vector<calibration::Dataset> LogReader::All(const std::vector<std::string>& paths,
+                                                 const analysis::Say& say) const {
+  return analysis::CheckedLogs(model_, Raw(paths), cutoff_Hz_, say);
 }
 
 void LogReader::PrintUntold(const std::vector<calibration::Dataset>& data) const {

@@ -16,6 +16,9 @@ struct LogFormat {
   std::vector<std::string> messages;  // files *.msg, for types that a recording does not define
 };
 
+// A line on stderr.
+void SayAside(const std::string& line);
+
 class LogReader {
  public:
   // cutoff_Hz: of the derived speeds; 0: chosen for each log.
@@ -23,10 +26,13 @@ class LogReader {
       : model_(model), format_(std::move(format)), cutoff_Hz_(cutoff_Hz) {}
   logs::Log Raw(const std::string& path) const;
   std::vector<logs::Log> Raw(const std::vector<std::string>& paths) const;
-  // Throws io::InputError where a log cannot be one of this arm; what is worth a line goes to stderr.
-  calibration::Dataset One(const std::string& path) const { return All({path})[0]; }
+  // Throws io::InputError where a log cannot be one of this arm; what is worth a line goes to `say`.
+  calibration::Dataset One(const std::string& path, const analysis::Say& say = SayAside) const {
+    return All({path}, say)[0];
+  }
   // The same for several logs. What one of them lacks the others may have: a log that is too short is left out.
-  std::vector<calibration::Dataset> All(const std::vector<std::string>& paths) const;
+  std::vector<calibration::Dataset> All(const std::vector<std::string>& paths,
+                                        const analysis::Say& say = SayAside) const;
   // Says which faults of the columns nobody can see, where the robot file has no link data.
   void PrintUntold(const std::vector<calibration::Dataset>& data) const;
 
@@ -35,9 +41,6 @@ class LogReader {
   LogFormat format_;
   double cutoff_Hz_;
 };
-
-// A line on stderr.
-void SayAside(const std::string& line);
 
 // The channel map and the definitions given beside it.
 logs::ChannelMap MapOf(const LogFormat& format);

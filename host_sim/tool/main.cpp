@@ -24,7 +24,8 @@ int Main(int argc, char** argv) {
   KeepFreedMemory();
   const std::vector<std::string> words = WordsOf(argc, argv);
   CLI::App app{
-      "armcal: estimate the dynamic parameters of an arm, find what its model lacks, flash the table that mends it"};
+      "armcal: estimate the dynamic parameters of an arm, find what its model lacks, flash the table that mends it",
+      "armcal"};
   app.require_subcommand(1);
   app.set_version_flag("--version", Version());
   Action action;

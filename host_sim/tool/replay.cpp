@@ -101,11 +101,10 @@ void PrintRefined(const codegen::Model& model, const replay::Refined& r, const c
   fmt::print("refined on {} segments of {:.3g} s, {} starting points, {} of them end at the same sum of squares\n",
              r.segments, r.segment_s, r.tries, r.agree);
   report::Table t{{"parameter", "unit", "identified", "refined"}, {}};
-  nlohmann::ordered_json units;
-  verdict::AddRobot(units, model.robot());
   for (const int c : fit.active) {
     if (c >= model.columns()) continue;
-    t.rows.push_back({model.column_name(c), verdict::ColumnUnit(units, model.column_name(c), model.column_unit(c)),
+    t.rows.push_back({model.column_name(c),
+                      verdict::ColumnUnit(model.robot(), model.column_name(c), model.column_unit(c)),
                       fmt::format("{:.5g}", fit.x[c]), fmt::format("{:.5g}", r.x[c])});
   }
   fmt::print("{}", report::Text(t));

@@ -1,7 +1,6 @@
 // tool - armcal report: makes the page of a result again, from its JSON.
 #include <fmt/core.h>
 
-#include "codegen/src/io/json.hpp"
 #include "host_sim/diagnose/verdict/diagnosis_page.hpp"
 #include "host_sim/diagnose/verdict/identification_page.hpp"
 #include "host_sim/diagnose/verdict/summary.hpp"
@@ -29,7 +28,7 @@ WritePage PageOf(const ordered_json& json) {
 }
 
 int RunReport(const std::string& path, const std::string& out, const std::string& json_out) {
-  const ordered_json json = io::ParseJson(files::ReadWholeFile(path));
+  const ordered_json json = files::ReadJsonFile(path);
   const WritePage write = PageOf(json);
   if (write == nullptr)
     throw io::InputError(path + ": expected the JSON of armcal diagnose, identify or demo, or of a batch's summary");
@@ -61,6 +60,8 @@ void AddReport(CLI::App& app, Action& action) {
   verb->add_option("--json", o->json, "write the names of the result and of the page here");
   verb->callback([o, &action] {
     if (o->out.empty()) o->out = std::filesystem::path(o->result).replace_extension(".html").string();
+    if (o->out == o->result || o->out == o->json)
+      throw io::InputError(o->out + ": would be written over; give the page another name with --out");
     action = [o] { return RunReport(o->result, o->out, o->json); };
   });
 }

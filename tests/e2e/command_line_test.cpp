@@ -130,6 +130,7 @@ TEST(CommandLine, EveryVerb_HasJson_Version_AndAnExample) {
   for (const std::string& verb : verbs) {
     const std::string help = Tool({verb, "--help"}).out;
     EXPECT_NE(help.find("example: armcal " + verb), std::string::npos) << verb;
+    EXPECT_NE(help.find("Usage: armcal " + verb), std::string::npos) << verb;
     EXPECT_NE(help.find("--json"), std::string::npos) << verb;
     EXPECT_NE(page.find("`" + verb + "`"), std::string::npos) << verb << " is not in docs/commands.md";
     EXPECT_EQ(Tool({verb, "--version"}).out, version) << verb;

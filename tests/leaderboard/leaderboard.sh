@@ -2,7 +2,7 @@
 # leaderboard - makes cases, runs armcal and its rivals on them, scores all in the same way.
 #   tests/leaderboard/leaderboard.sh [SEED [OUT_DIR [PERCENT [RIVAL...]]]]
 # PERCENT scales the number of cases of the judged set's report2. RIVAL: programs in the place of all in rivals/.
-# OUT_DIR/cases holds what a rival gets, OUT_DIR/truth the rest. Verdicts and scores have folders of their own. The table is
+# OUT_DIR/cases holds what a rival gets, OUT_DIR/truth the rest. OUT_DIR/cases.tar.gz is what one may hand on. Verdicts and scores have folders of their own. The table is
 # OUT_DIR/leaderboard.md and leaderboard.json.
 # Builds what it needs in build/host. With ARMCAL_BUILD it takes that build folder as it is (targets armcal, practice_robot,
 # judged_set, judged_score). pip installs the rivals into build/peers/leaderboard.
@@ -12,7 +12,7 @@ here=$(realpath "$(dirname "${BASH_SOURCE[0]}")")
 root=$(realpath "$here/../..")
 if [[ -z ${ARMCAL_BUILD:-} ]]; then
   ARMCAL_BUILD=$root/build/host
-  bash "$root/toolchains/install.sh" host peers
+  bash "$root/toolchains/install.sh" host tests peers
   (cd "$root" && cmake --preset host >/dev/null && cmake --build --preset host --target armcal practice_robot judged_set judged_score -j 2 >/dev/null)
 fi
 ARMCAL_BUILD=$(realpath "$ARMCAL_BUILD")
@@ -43,6 +43,10 @@ for one in "$out"/cases/*; do
   "$ARMCAL_BUILD/tests/practice/practice_robot" "$one" "$out/robots" >"$robot"
   "$ARMCAL_BUILD/armcal" export --robot "$robot" --format mjcf -o "$one/arm.xml" >/dev/null
 done
+# What one may hand on: the cases without their truth, how to take part, and the licence.
+"$ARMCAL_BUILD/armcal" --version >"$out/version.txt"
+tar -czf "$out/cases.tar.gz" --transform "s,^,armcal_cases_$seed/," -C "$out" cases robots version.txt -C "$root" LICENSE -C docs leaderboard.md
+rm "$out/version.txt"
 # One core each, so that the seconds can be compared.
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 "$venv/bin/python" "$here/leaderboard.py" "$out" "$ARMCAL_BUILD/tests/judged/judged_score" "$seed" "${rivals[@]}"

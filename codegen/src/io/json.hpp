@@ -1,4 +1,4 @@
-// io - JSON from text and to text. The library's reader and writer are large; they are compiled here and nowhere else.
+// io - JSON from text and to text. The library's reader and writer are large; the rooms compile them here alone.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

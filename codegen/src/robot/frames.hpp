@@ -22,7 +22,7 @@ inline Eigen::Matrix3d TurnFromZ(const Eigen::Vector3d& direction) {
   const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(direction);
   const double angle = std::atan2(across.norm(), direction.z());
   const Eigen::Vector3d axis = across.norm() > 0 ? Eigen::Vector3d(across.normalized()) : Eigen::Vector3d::UnitX();
-  return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+  return Turn(angle, axis);
 }
 
 // Fixed-axis roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll).

@@ -1,7 +1,7 @@
 // robot - reads a robot file and checks every number.
 #include "codegen/src/robot/robot.hpp"
 
-#include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
@@ -478,7 +478,8 @@ Robot ReadRobot(const std::filesystem::path& path) {
     const io::TomlReader control = in.Table("control");
     control.AllowOnly({"structure", "rate_Hz", "kp_Nmprad", "kd_Nmsprad"});
     r.control.structure = control.Text("structure");
-    if (r.control.structure != "pd_feedforward") control.Report("structure", "\"pd_feedforward\"");
+    if (!r.control.structure.empty() && r.control.structure != "pd_feedforward")
+      control.Report("structure", "\"pd_feedforward\"");
     r.control.rate_Hz = control.Positive("rate_Hz");
     r.control.kp_Nmprad = control.Numbers("kp_Nmprad", n);
     r.control.kd_Nmsprad = control.Numbers("kd_Nmsprad", n);

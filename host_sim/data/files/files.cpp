@@ -9,11 +9,13 @@
 #include <iterator>
 #include <memory>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "armcal/core/sha256.hpp"
 #include "codegen/src/io/atomic_write.hpp"
 #include "codegen/src/io/input_error.hpp"
+#include "codegen/src/io/json.hpp"
 #include "codegen/src/io/require_file.hpp"
 
 namespace armcal::files {
@@ -95,6 +97,8 @@ std::string ReadWholeFile(const fs::path& path) {
   content.resize(used);
   return content;
 }
+
+nlohmann::ordered_json ReadJsonFile(const fs::path& path) { return io::ParseJson(ReadWholeFile(path)); }
 
 void WriteWholeFile(const fs::path& path, std::string_view text) {
   if (path.extension() == ".gz") io::AtomicWrite(path, Compressed(text));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 
@@ -10,6 +11,9 @@ namespace armcal::files {
 // The whole content; gzip is recognised by its content, not by the name. InputError: cannot be opened, is
 // cut short, or grows to more than 60 times its size and 16 MB.
 std::string ReadWholeFile(const std::filesystem::path& path);
+
+// The value in a JSON file; is_discarded() if it holds no JSON. Throws as ReadWholeFile.
+nlohmann::ordered_json ReadJsonFile(const std::filesystem::path& path);
 
 // Writes the text so that a reader sees the old file or the new one, never a part. A name that ends in ".gz" is
 // compressed; equal texts give equal bytes. Missing parent folders are made. InputError: cannot be written.

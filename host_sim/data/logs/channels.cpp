@@ -111,17 +111,18 @@ class MapReader {
                         std::string(DefaultUnit(rule.dimension)) + "\" }");
         continue;
       }
-      if (table->contains("optional") && !(*table)["optional"].is_boolean())
-        Fail(key + ".optional", "expected true or false");
       const bool optional = (*table)["optional"].value_or(false);
       if (optional && rule.required) Fail(key + ".optional", "this quantity is always needed");
       map.quantities.push_back(
           {std::string(rule.key), Channels(key, *table, rule.dimension), optional, Matrix(key, *table)});
     }
     // The torque that is not used must be right, too: the map is for both.
-    for (const std::string& other : {std::string("tau"), std::string(kLinkTorque)})
-      if (const toml::table* table = root_[other].as_table(); table != nullptr && other != torque)
-        Channels(other, *table, "torque"), Matrix(other, *table), map.unused = other;
+    for (const std::string& other : {std::string("tau"), std::string(kLinkTorque)}) {
+      if (other == torque || !root_.contains(other)) continue;
+      const toml::table* table = root_[other].as_table();
+      if (table == nullptr) Fail(other, "expected a table, as in { column = \"a{}\", unit = \"N*m\" }");
+      Channels(other, *table, "torque"), Matrix(other, *table), map.unused = other;
+    }
     CheckPower(map, torque);
     return map;
   }
@@ -212,6 +213,8 @@ class MapReader {
              "unknown key, expected column, unit, scale, offset, optional or matrix");
       }
     }
+    if (table.contains("optional") && !table["optional"].is_boolean())
+      Fail(key + ".optional", "expected true or false");
     if (table.contains("matrix") && (dimension == "time" || dimension == "temperature" || dimension == "flag"))
       Fail(key + ".matrix", "only positions, speeds, accelerations and torques take a matrix");
     const auto columns = PerJoint<std::string>(key, table, "column", "");

@@ -35,6 +35,11 @@ std::string Left(double past_s, double done) {
 
 }  // namespace
 
+void Progress::Note(const std::string& text) {
+  const std::lock_guard lock(note_mutex_);
+  note_ = text;
+}
+
 void Progress::Set(double done) {
   if (!terminal_) return;
   const int percent = static_cast<int>(100 * std::clamp(done, 0.0, 1.0) + 1e-9);
@@ -42,6 +47,7 @@ void Progress::Set(double done) {
   shown_percent_ = percent;
   constexpr int kWidth = 30;
   const int full = percent * kWidth / 100;
+  const std::lock_guard lock(note_mutex_);
   const double past_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   std::fprintf(out_, "\r%s [%s%s] %3d %%%s%s%s\033[K", task_.c_str(),
                std::string(static_cast<std::size_t>(full), '#').c_str(),

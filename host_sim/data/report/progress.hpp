@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <mutex>
 #include <string>
 
 namespace armcal::report {
@@ -19,13 +20,14 @@ class Progress {
 
   // done: 0 to 1. Cheap when nothing visible changes.
   void Set(double done);
-  // What stands behind the share from now on: the best figure so far, for instance.
-  void Note(const std::string& text) { note_ = text; }
+  // What stands behind the share from now on: the best figure so far, for instance. Any thread may call it.
+  void Note(const std::string& text);
   // Takes the line away, so that something else can be printed. The next Set shows it again.
   void Clear();
 
  private:
   std::string task_, note_;
+  std::mutex note_mutex_;
   std::FILE* out_;
   bool terminal_;
   int shown_percent_ = -1;

@@ -25,8 +25,9 @@ report::Live PanelsOf(const ordered_json& json, const std::vector<int>& shown, c
   report::Live live;
   for (const ordered_json& curves : json.at("curves")) {
     const int joint = curves.at("joint");
-    report::Panel panel{JointTitle(json, joint)};
-    panel.plot.text.title = JointTitle(json, joint);
+    const std::string title = JointTitle(json, joint);
+    report::Panel panel{title};
+    panel.plot.text.title = title;
     panel.shown = std::find(shown.begin(), shown.end(), joint) != shown.end();
     fill(panel.plot, curves, UnitOf(json, joint));
     live.panels.push_back(panel);

@@ -136,7 +136,7 @@ report::Bars BarsOfErrors(const ordered_json& json) {
   bars.colours = {kBeforeColour, kAfterColour};
   if (json.at("terms").empty())
     bars.series = {""}, bars.value.resize(1), bars.colours = {kAfterColour};  // both are one
-  for (std::size_t j = 0; j < bars.value[0].size(); ++j) bars.categories.push_back(std::to_string(j + 1));
+  bars.categories = BarNames(json);
   return bars;
 }
 

@@ -111,8 +111,7 @@ void WriteIdentificationPage(const std::filesystem::path& path, const ordered_js
   page.Columns([&](report::Page& left) { AddFit(left, json); },
                [&](report::Page& right) {
                  report::Bars bars{{"error over torque", "joint", "%", 460, 300}, {}, {""}, {drawn}};
-                 for (std::size_t j = 0; j < bars.value[0].size(); ++j)
-                   bars.categories.push_back(std::to_string(j + 1));
+                 bars.categories = BarNames(json);
                  right.Add(bars, "Where the joint moves.");
                });
   const int worst = static_cast<int>(std::max_element(drawn.begin(), drawn.end()) - drawn.begin()) + 1;

@@ -253,7 +253,7 @@ std::vector<codegen::EffectUse> ReadFound(const std::string& path, const std::ve
   std::vector<codegen::EffectUse> out;
   if (path.empty()) return out;
   try {
-    const ordered_json verdict = io::ParseJson(files::ReadWholeFile(path));
+    const ordered_json verdict = files::ReadJsonFile(path);
     for (const auto& term : verdict.at("terms")) {
       codegen::EffectUse use;
       use.effect = term.at("record").get<std::string>();

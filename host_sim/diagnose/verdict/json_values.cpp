@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "host_sim/data/report/axis.hpp"
+#include "host_sim/diagnose/verdict/json.hpp"
 
 namespace armcal::verdict {
 
@@ -18,6 +19,18 @@ namespace {
 
 bool Slides(const ordered_json& json, int joint) {
   return json.at("torque_units").at(static_cast<std::size_t>(joint) - 1) == "N";
+}
+
+ordered_json RobotJson(const codegen::Robot& robot) {
+  ordered_json json;
+  AddRobot(json, robot);
+  return json;
+}
+
+// Empty: the joint is called by its number.
+std::string OwnName(const ordered_json& json, int joint) {
+  const std::string own = json.at("joint_names").at(static_cast<std::size_t>(joint) - 1);
+  return own == fmt::format("joint {}", joint) || own == fmt::format("axis {}", joint) ? "" : own;
 }
 
 }  // namespace
@@ -40,9 +53,19 @@ std::string Interval95(double value, double sd) {
 }
 
 std::string JointTitle(const ordered_json& json, int joint) {
-  const std::string own = json.at("joint_names").at(static_cast<std::size_t>(joint) - 1);
-  const std::string plain = fmt::format("joint {}", joint);
-  return own.empty() || own == plain || own == fmt::format("axis {}", joint) ? plain : plain + ", " + own;
+  const std::string own = OwnName(json, joint), plain = fmt::format("joint {}", joint);
+  return own.empty() ? plain : plain + ", " + own;
+}
+
+std::vector<std::string> BarNames(const ordered_json& json) {
+  const auto joints = static_cast<int>(json.at("joint_names").size());
+  const std::size_t longest = 54 / static_cast<std::size_t>(std::max(1, joints));  // letters that fit below a bar
+  std::vector<std::string> names, numbers;
+  for (int joint = 1; joint <= joints; ++joint)
+    names.push_back(OwnName(json, joint)), numbers.push_back(std::to_string(joint));
+  const bool fit = std::all_of(names.begin(), names.end(),
+                               [&](const std::string& name) { return !name.empty() && name.size() <= longest; });
+  return fit ? names : numbers;
 }
 
 std::string UnitOn(const ordered_json& json, const std::vector<int>& joints, const std::string& unit) {
@@ -60,6 +83,15 @@ std::string ColumnUnit(const ordered_json& json, const std::string& name, const 
   const int joint = std::atoi(name.c_str() + digits);
   const bool known = joint >= 1 && joint <= static_cast<int>(json.at("torque_units").size());
   return of_joint && known ? UnitOn(json, {joint}, unit) : unit;
+}
+
+std::string UnitOn(const codegen::Robot& robot, std::vector<int> joints, const std::string& unit) {
+  for (int& joint : joints) ++joint;
+  return UnitOn(RobotJson(robot), joints, unit);
+}
+
+std::string ColumnUnit(const codegen::Robot& robot, const std::string& name, const std::string& unit) {
+  return ColumnUnit(RobotJson(robot), name, unit);
 }
 
 }  // namespace armcal::verdict

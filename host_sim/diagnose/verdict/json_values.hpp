@@ -18,10 +18,17 @@ std::string Interval95(double value, double sd);
 // "joint 2", or "joint 2, elbow" where the robot file has a name of its own. joint: from 1.
 std::string JointTitle(const nlohmann::ordered_json& json, int joint);
 
+// What stands below a joint's bar: its own name, or numbers from 1 where a name is too long for the place.
+std::vector<std::string> BarNames(const nlohmann::ordered_json& json);
+
 // A unit of a record as it is on these joints (from 1): "N*m" is "N" where all of them slide, and "rad" is "m".
 std::string UnitOn(const nlohmann::ordered_json& json, const std::vector<int>& joints, const std::string& unit);
 
 // The unit of a column of the model: "Fv2" belongs to joint 2. Bodies have the same units on all joints.
 std::string ColumnUnit(const nlohmann::ordered_json& json, const std::string& name, const std::string& unit);
+
+// The same for a robot. joints: from 0.
+std::string UnitOn(const codegen::Robot& robot, std::vector<int> joints, const std::string& unit);
+std::string ColumnUnit(const codegen::Robot& robot, const std::string& name, const std::string& unit);
 
 }  // namespace armcal::verdict

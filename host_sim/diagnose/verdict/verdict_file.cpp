@@ -48,7 +48,7 @@ ordered_json FailedVerdict(const std::string& why) { return {{"verdict", "failed
 bool Failed(const ordered_json& verdict) { return verdict.at("verdict") == "failed"; }
 
 ordered_json ReadVerdict(const fs::path& path) {
-  ordered_json j = io::ParseJson(files::ReadWholeFile(path));
+  ordered_json j = files::ReadJsonFile(path);
   return IsVerdict(j) ? j : FailedVerdict(path.filename().string() + " holds no verdict");
 }
 

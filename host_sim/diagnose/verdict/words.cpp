@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/diagnose/verdict/json_values.hpp"
 #include "host_sim/identify/calibration/log_check.hpp"
 #include "host_sim/identify/excitation/target.hpp"
@@ -116,16 +115,12 @@ std::string EffectWord(const std::string& record, const std::vector<int>& joints
 std::string Parameters(const Term& t, const codegen::Robot& robot) {
   constexpr std::size_t kShown = 4;
   std::vector<std::string> out;
-  nlohmann::ordered_json units;
-  AddRobot(units, robot);
-  std::vector<int> joints = t.joints;
-  for (int& joint : joints) ++joint;
   for (std::size_t k = 0; k < t.eta.size(); ++k)
     out.push_back(Value(t.unknowns[k].name, t.eta[k], t.eta_sd[static_cast<Eigen::Index>(k)],
-                        UnitOn(units, joints, t.unknowns[k].unit)));
+                        UnitOn(robot, t.joints, t.unknowns[k].unit)));
   for (std::size_t c = 0; c < std::min(kShown, t.columns.size()); ++c)
     out.push_back(Value(t.columns[c].name, t.amplitude[static_cast<Eigen::Index>(c)],
-                        t.sd[static_cast<Eigen::Index>(c)], UnitOn(units, joints, t.columns[c].unit)));
+                        t.sd[static_cast<Eigen::Index>(c)], UnitOn(robot, t.joints, t.columns[c].unit)));
   if (t.columns.size() > kShown) out.push_back("...");
   return fmt::format("{}", fmt::join(out, ", "));
 }

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "codegen/src/io/input_error.hpp"
-#include "codegen/src/io/json.hpp"
 #include "codegen/src/io/require_file.hpp"
 #include "codegen/src/robot/body.hpp"
 #include "host_sim/data/files/files.hpp"
@@ -154,7 +153,7 @@ Given GivenByTable(const codegen::Model& model, const TableFile& table, const st
 }
 
 Given GivenByJson(const codegen::Model& model, const std::filesystem::path& path) {
-  const Json json = io::ParseJson(files::ReadWholeFile(path));
+  const Json json = files::ReadJsonFile(path);
   const bool known = json.is_object() && (json.contains("columns") || json.contains("parameters"));
   if (!known)
     throw io::InputError(path.string() + ": expected the JSON that armcal identify --json writes, or a table");

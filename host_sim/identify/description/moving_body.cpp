@@ -70,7 +70,7 @@ Isometry3d BaseInFile(const DescribedArm& arm, const std::vector<FileJoint>& joi
       if (a.norm() > kSame_m && b.norm() > kSame_m) H += b.normalized() * a.normalized().transpose();
     }
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Matrix3d U = svd.matrixU(), V = svd.matrixV();
   const double sign = U.determinant() * V.determinant();
   const Matrix3d R = U * Vector3d(1, 1, sign).asDiagonal() * V.transpose();

@@ -299,7 +299,7 @@ Optimum Optimise(const Observation& observation, const OptimiseSettings& setting
     throw io::InputError(
         observation.model().robot().path +
         ": no motion within the joints' limits that shows every parameter was found; expected limits that allow one" +
-        (settings.clearance ? ", room in the cell, or more --seconds" : ""));
+        (settings.clearance ? ", room in the cell, or more time for the search (--search-seconds)" : ""));
   return best.found();
 }
 

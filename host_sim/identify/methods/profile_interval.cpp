@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include <Eigen/Cholesky>
 
@@ -20,7 +21,7 @@ namespace {
 constexpr double kTwoSided = 1.96;
 constexpr double kRise = 0.5 * kTwoSided * kTwoSided;  // of chi^2 / 2 at the ends of a 95 % interval
 constexpr double kNear = 1e-3;                         // of the cost, within which a minimum is found
-constexpr int kTrials = 80;                            // of the other eta, for one value of a coordinate
+constexpr int kTrials = 240;                           // of the other eta, for one value of a coordinate
 constexpr double kFirstMove = 0.05;                    // of an eta's range
 constexpr int kDoublings = 14;                         // of a walk's step, before a coordinate counts as unbounded
 constexpr int kHalvingsOfEnd = 12;
@@ -31,12 +32,11 @@ constexpr double kSame = 1.5;            // cells of a scan: starts that are nea
 constexpr double kGain = 0.01;           // of the cost: a minimum that is lower by less is no better
 constexpr double kApart = 0.02;          // of an eta's range: two minima that are nearer are one
 
-// The minimum of `cost` near `start` by Nelder and Mead's simplex, inside the unit cube.
+// The lowest point that one simplex of Nelder and Mead reaches from `start`, inside the unit cube. trials: counts on.
 template <class Cost>
-VectorXd SimplexMinimum(const VectorXd& start, const Cost& cost, double& least) {
+std::pair<double, VectorXd> OneSimplex(const VectorXd& start, const Cost& cost, int& trials) {
   const Eigen::Index d = start.size();
   std::vector<std::pair<double, VectorXd>> corner;
-  int trials = 0;
   const auto add = [&](VectorXd at) {
     at = at.cwiseMax(0).cwiseMin(1);
     ++trials;
@@ -68,9 +68,22 @@ VectorXd SimplexMinimum(const VectorXd& start, const Cost& cost, double& least) 
     }
     for (std::size_t i = 1; i < corner.size(); ++i) corner[i] = add(0.5 * (corner[i].second + corner.front().second));
   }
-  std::sort(corner.begin(), corner.end(), lower);
-  least = corner.front().first;
-  return corner.front().second;
+  return *std::min_element(corner.begin(), corner.end(), lower);
+}
+
+// The minimum of `cost` near `start`, inside the unit cube. In a narrow valley a simplex stops short of the minimum, so
+// a new one starts where the last one stopped, until that gains nothing.
+template <class Cost>
+VectorXd SimplexMinimum(const VectorXd& start, const Cost& cost, double& least) {
+  int trials = 0;
+  auto [reached, best] = OneSimplex(start, cost, trials);
+  for (double before = std::numeric_limits<double>::infinity(); before - reached > kNear && trials < kTrials;) {
+    before = reached;
+    const auto again = OneSimplex(best, cost, trials);
+    if (again.first < reached) std::tie(reached, best) = again;
+  }
+  least = reached;
+  return best;
 }
 
 // One group's part of the cost, the other joints' eta being fixed.

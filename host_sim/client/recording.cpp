@@ -43,8 +43,15 @@ Player ReadPlayer(DriveClient& drive) {
           core::GetU32(&w[6])};
 }
 
+bool IsInterrupted(const RecordOptions& o) { return o.interrupted != nullptr && *o.interrupted; }
+
 void ThrowIfInterrupted(const RecordOptions& o) {
-  if (o.interrupted != nullptr && *o.interrupted) throw LinkError("interrupted");
+  if (IsInterrupted(o)) throw InterruptedError("interrupted");
+}
+
+[[noreturn]] void KeepNothing(const RecordOptions& o, const std::string& why) {
+  if (IsInterrupted(o)) throw InterruptedError(why);
+  throw LinkError(why);
 }
 
 void Upload(DriveClient& drive, const RecordOptions& o, const trajectory::Trajectory& t) {
@@ -275,7 +282,7 @@ Recording Play(DriveClient& drive, const RecordOptions& o, const codegen::Robot&
     std::string why = error.what();
     if (!arm.TryRelease() && arm.enabled()) why += "; the arm may still be moving and enabled";
     const bool finished = player.state == PlayerState::kFinished;
-    if ((player.state != PlayerState::kPlaying && !finished) || recording.raw.ticks.empty()) throw LinkError(why);
+    if ((player.state != PlayerState::kPlaying && !finished) || recording.raw.ticks.empty()) KeepNothing(o, why);
     recording.cut = why;
     recording.played = {player.first_tick,
                         finished ? player.last_tick : recording.raw.ticks.back() + recording.raw.tick_step - 1};
@@ -367,7 +374,7 @@ Recording Record(DriveClient& drive, const RecordOptions& o, const codegen::Robo
     const auto played = std::count_if(recording.raw.ticks.begin(), recording.raw.ticks.end(), [&](std::uint32_t tick) {
       return Inside(tick, recording.raw.tick_step, recording.played);
     });
-    if (played < logs::kMinSamples) throw LinkError(recording.cut + "; nothing is kept");
+    if (played < logs::kMinSamples) KeepNothing(o, recording.cut + "; nothing is kept");
   }
   if (recording.packed) {
     Unpacked plain = Unpack(recording.raw, robot.joints());

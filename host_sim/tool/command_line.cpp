@@ -158,8 +158,9 @@ std::string VerbPage(const CLI::App& verb) {
   }
   page +=
       ".SH EXIT STATUS\n0: done. 2: wrong use or bad input. 3: no link to the drive. 4: the drive refused. 5: no "
-      "match (another table, other estimates). 6: incomplete. 130: Ctrl-C ended a recording. The description says where this verb uses a code "
-      "otherwise.\n";
+      "match (another table, other estimates). 6: incomplete. 130: Ctrl-C ended a recording. The description says "
+      "where "
+      "this verb uses a code otherwise.\n";
   return page + ".SH SEE ALSO\n.BR armcal (1)\n";
 }
 

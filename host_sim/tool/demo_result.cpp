@@ -54,9 +54,9 @@ const char* LoopText(const ordered_json& r) {
   return r.at("closed").get<bool>() ? "the loop is closed" : "the loop is NOT closed";
 }
 
-// Of the loop, and of each effect and joint that stayed open. loop: the words about the loop.
-std::string Outcome(const ordered_json& r, const std::string& loop) {
-  std::string out = loop;
+// What became of each effect, and which joints stayed open.
+std::string Details(const ordered_json& r) {
+  std::string out;
   for (const auto& e : r.at("effects"))
     out += fmt::format("; {} on joint {}: {}", e.at("kind").get<std::string>(), verdict::JointText(e.at("joint")),
                        e.at("became").get<std::string>());
@@ -98,9 +98,8 @@ report::Bars DriveBars(const ordered_json& r) {
 std::string DemoText(const ordered_json& r) {
   std::string out = fmt::format(
       "\nfound by armcal:    {}\nin the simulation:  {}  (read after the verdict was written)\n", Verdict(r), Truth(r));
-  out += fmt::format("outcome:             {}\n",
-                     Outcome(r, report::Coloured(LoopText(r), r.at("closed").get<bool>() ? report::Colour::kGreen
-                                                                                         : report::Colour::kYellow)));
+  const report::Ink ink = r.at("closed").get<bool>() ? report::Ink::kGreen : report::Ink::kYellow;
+  out += fmt::format("outcome:             {}{}\n", report::Coloured(LoopText(r), ink), Details(r));
   out += fmt::format("brought to the drive: {}; table CRC {}, read back {}\n\n", r.at("path").get<std::string>(),
                      r.at("table_crc").get<std::string>(), r.at("readback_ok").get<bool>() ? "equal" : "DIFFERENT");
   out += report::Text(ErrorTable(r)) + "\n" + report::Text(TrackingTable(r));
@@ -115,7 +114,7 @@ void WriteDemoPage(const std::filesystem::path& path, const ordered_json& r) {
   page.Columns(
       [&](report::Page& left) {
         left.Box(closed ? report::Tone::kGood : report::Tone::kWarning, "armcal found: " + Verdict(r),
-                 Outcome(r, LoopText(r)) + ". In the simulation there was: " + Truth(r) +
+                 LoopText(r) + Details(r) + ". In the simulation there was: " + Truth(r) +
                      ". No program but the drive read that before the verdict was written.");
         left.Text("How it came to the drive: " + r.at("path").get<std::string>() + ".");
       },

@@ -54,8 +54,8 @@ std::string TermText(const health::Term& t) {
 
 std::string Sentence(const JointHealth& h) {
   std::string verdict = VerdictText(h.verdict);
-  if (h.verdict == health::Verdict::kFits) verdict = report::Coloured(verdict, report::Colour::kGreen);
-  else if (h.verdict != health::Verdict::kTooEarly) verdict = report::Coloured(verdict, report::Colour::kYellow);
+  if (h.verdict == health::Verdict::kFits) verdict = report::Coloured(verdict, report::Ink::kGreen);
+  else if (h.verdict != health::Verdict::kTooEarly) verdict = report::Coloured(verdict, report::Ink::kYellow);
   std::string text = fmt::format("joint {} {}", h.joint, verdict);
   if (h.verdict == health::Verdict::kTooEarly)
     return text + fmt::format(": {:.0f} samples in motion since the table was adopted, an answer needs {:.0f} more",

@@ -11,7 +11,6 @@
 #include "host_sim/diagnose/analysis/identified.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
 #include "host_sim/diagnose/verdict/identification_page.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/diagnose/verdict/json_values.hpp"
 #include "host_sim/identify/calibration/information.hpp"
 #include "host_sim/identify/calibration/payload.hpp"

@@ -68,8 +68,9 @@ int RunLearning(const LearningOptions& o) {
 void AddLearning(CLI::App& app, Action& action) {
   auto* verb = app.add_subcommand(
       "learning",
-      "what the drive's estimators do; hold them, let them go on, or drop what they knew of a joint or of the bodies;\n"
-      "after a tool was changed, reset the bodies\nexample: armcal learning --connect 192.168.0.10:502 --reset bodies");
+      "what the drive's estimators do; hold them, let them go on, or drop what they knew of a joint or of the bodies\n"
+      "reset the bodies after a change of the tool\nexample: armcal learning --connect 192.168.0.10:502 --reset "
+      "bodies");
   auto o = std::make_shared<LearningOptions>();
   verb->add_option("--connect", o->connect, kConnectHelp)->required();
   auto* hold = verb->add_flag("--hold", o->hold, "samples no longer change the estimates");

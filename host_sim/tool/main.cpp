@@ -66,7 +66,7 @@ int Main(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", WrongUse(app, words, e).c_str());
     return kBadInput;
   } catch (const std::exception& e) {
-    const std::string who = report::Coloured("armcal:", report::Colour::kRed, stderr);
+    const std::string who = report::Coloured("armcal:", report::Ink::kRed, stderr);
     std::fprintf(stderr, "%s %s\n", who.c_str(), e.what());
     return ExitCodeOf(e);
   }

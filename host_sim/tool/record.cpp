@@ -5,7 +5,6 @@
 
 #include "codegen/src/generator/emit.hpp"
 #include "codegen/src/io/input_error.hpp"
-#include "host_sim/client/errors.hpp"
 #include "host_sim/client/recording.hpp"
 #include "host_sim/client/table_backup.hpp"
 #include "host_sim/data/logs/log.hpp"
@@ -48,17 +47,6 @@ std::string PartialPath(const std::string& path) {
   return path.substr(0, dot) + ".partial" + path.substr(dot);
 }
 
-// As Record. client::InterruptedError: Ctrl-C came before there was a log.
-client::Recording RecordOrSayWhy(client::DriveClient& drive, const client::RecordOptions& o,
-                                 const codegen::Robot& robot) {
-  try {
-    return Record(drive, o, robot);
-  } catch (const client::LinkError& error) {
-    if (*o.interrupted) throw client::InterruptedError(error.what());
-    throw;
-  }
-}
-
 int RunRecord(const client::RecordOptions& o) {
   const codegen::Model model = LoadModel(o.robot);
   const codegen::Robot& robot = model.robot();
@@ -69,7 +57,7 @@ int RunRecord(const client::RecordOptions& o) {
   client::RecordOptions options = o;
   options.schema = codegen::Schema(model);
   options.interrupted = &InterruptGuard::interrupted();
-  const client::Recording recording = RecordOrSayWhy(drive, options, robot);
+  const client::Recording recording = Record(drive, options, robot);
   const bool partial = !recording.cut.empty();
   const std::string out = partial ? PartialPath(o.out) : o.out,
                     samples_out = partial ? PartialPath(o.samples) : o.samples;

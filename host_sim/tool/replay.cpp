@@ -8,7 +8,6 @@
 #include "codegen/src/io/input_error.hpp"
 #include "host_sim/data/report/table.hpp"
 #include "host_sim/diagnose/verdict/figures.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
 #include "host_sim/diagnose/verdict/json_values.hpp"
 #include "host_sim/identify/calibration/log_check.hpp"
 #include "host_sim/identify/replay/position_error.hpp"

@@ -56,12 +56,14 @@ void AddReport(CLI::App& app, Action& action) {
   verb->add_option("result", o->result,
                    "what --json of diagnose or identify (without --method) wrote, or a demo's result.json")
       ->required();
-  verb->add_option("--out", o->out, "the page to write (default: beside the result, with the ending .html)");
+  auto* out =
+      verb->add_option("--out", o->out, "the page to write (default: beside the result, with the ending .html)");
   verb->add_option("--json", o->json, "write the names of the result and of the page here");
-  verb->callback([o, &action] {
-    if (o->out.empty()) o->out = std::filesystem::path(o->result).replace_extension(".html").string();
-    if (o->out == o->result || o->out == o->json)
-      throw io::InputError(o->out + ": would be written over; give the page another name with --out");
+  verb->callback([o, out, &action] {
+    if (o->out.empty()) {
+      o->out = std::filesystem::path(o->result).replace_extension(".html").string();
+      out->add_result(o->out);  // so that CheckOutputs sees it
+    }
     action = [o] { return RunReport(o->result, o->out, o->json); };
   });
 }

@@ -53,7 +53,7 @@ int RunSimulate(const SimulateOptions& o) {
   if (!o.key.empty()) words.insert(words.end(), {"--key", o.key});
   if (o.real_time) words.push_back("--real-time");
   if (!o.json.empty()) words.insert(words.end(), {"--json", o.json});
-  if (fs::is_regular_file(fs::symlink_status(o.json))) fs::remove(o.json);  // of an earlier run
+  RemoveEarlier(o.json);
   Become(words);
 }
 

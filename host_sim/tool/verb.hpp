@@ -14,15 +14,14 @@
 
 namespace armcal::tool {
 
-// 0 ok, 2 usage or bad input, 3 link, 4 refused by the drive, 5 verify mismatch, 6 partial, 130 ended by Ctrl-C.
 enum ExitCode : int {
   kOk = 0,
-  kBadInput = 2,
-  kLink = 3,
-  kRefused = 4,
-  kMismatch = 5,
-  kPartial = 6,
-  kInterrupted = 130
+  kBadInput = 2,       // wrong use, too
+  kLink = 3,           // no link to the drive
+  kRefused = 4,        // by the drive
+  kMismatch = 5,       // what was read back is not what was written
+  kPartial = 6,        // the result is incomplete
+  kInterrupted = 130,  // ended by Ctrl-C
 };
 
 // The verb's work; its return value is the exit code. Set by the parsed subcommand, run by main.
@@ -72,12 +71,17 @@ int ExitCodeOf(const std::exception& error);
 // A table was sent, and it is unknown what the drive made of it.
 bool WasSent(const std::exception& error);
 
+// The result of an earlier run goes before the work begins, so that none is left by a run that is killed.
+inline void RemoveEarlier(const std::filesystem::path& path) {
+  if (std::filesystem::is_regular_file(std::filesystem::symlink_status(path))) std::filesystem::remove(path);
+}
+
 // Runs a verb's work. If it fails, the JSON says so, with whatever `said` holds by then: what went wrong, and the exit
-// code. The JSON of an earlier run goes first, so that none is left by a run that is killed.
+// code. The JSON of an earlier run goes first.
 template <class Work>
 int Reported(const std::string& path, Work work,
              const nlohmann::ordered_json& said = nlohmann::ordered_json::object()) {
-  if (std::filesystem::is_regular_file(std::filesystem::symlink_status(path))) std::filesystem::remove(path);
+  RemoveEarlier(path);
   try {
     return work();
   } catch (const std::exception& error) {

@@ -103,26 +103,17 @@ class MapReader {
       Fail("torque", "expected \"tau\" or \"" + std::string(kLinkTorque) + "\", the torque to use");
     for (const Rule& rule : kRules) {
       const std::string key = rule.key == "tau" ? torque : std::string(rule.key);
-      const toml::table* table = root_[key].as_table();
-      if (table == nullptr) {
-        if (rule.required || root_.contains(key))
-          Fail(key, std::string(root_.contains(key) ? "" : "missing, ") +
-                        "expected a table, as in { column = \"a{}\", unit = \"" +
-                        std::string(DefaultUnit(rule.dimension)) + "\" }");
-        continue;
-      }
+      const toml::table* table = TableOf(key, rule.dimension, rule.required);
+      if (table == nullptr) continue;
       const bool optional = (*table)["optional"].value_or(false);
       if (optional && rule.required) Fail(key + ".optional", "this quantity is always needed");
       map.quantities.push_back(
           {std::string(rule.key), Channels(key, *table, rule.dimension), optional, Matrix(key, *table)});
     }
     // The torque that is not used must be right, too: the map is for both.
-    for (const std::string& other : {std::string("tau"), std::string(kLinkTorque)}) {
-      if (other == torque || !root_.contains(other)) continue;
-      const toml::table* table = root_[other].as_table();
-      if (table == nullptr) Fail(other, "expected a table, as in { column = \"a{}\", unit = \"N*m\" }");
-      Channels(other, *table, "torque"), Matrix(other, *table), map.unused = other;
-    }
+    for (const std::string& other : {std::string("tau"), std::string(kLinkTorque)})
+      if (const toml::table* table = other != torque ? TableOf(other, "torque", false) : nullptr; table != nullptr)
+        Channels(other, *table, "torque"), Matrix(other, *table), map.unused = other;
     CheckPower(map, torque);
     return map;
   }
@@ -130,6 +121,16 @@ class MapReader {
  private:
   [[noreturn]] void Fail(const std::string& key, const std::string& expected) const {
     throw io::InputError(file_ + ": " + key + ": " + expected);
+  }
+
+  // The table of a quantity; null: the map does without it.
+  const toml::table* TableOf(const std::string& key, std::string_view dimension, bool required) const {
+    const toml::table* table = root_[key].as_table();
+    if (table == nullptr && (required || root_.contains(key)))
+      Fail(key, std::string(root_.contains(key) ? "" : "missing, ") +
+                    "expected a table, as in { column = \"a{}\", unit = \"" + std::string(DefaultUnit(dimension)) +
+                    "\" }");
+    return table;
   }
 
   void CheckTopLevelKeys() const {

@@ -8,6 +8,21 @@
 
 namespace armcal::report {
 
+namespace {
+
+constexpr double kFirstGuess_s = 2;
+
+// " 12 s left", " 3 min left"; empty: it is too early to say.
+std::string Left(double past_s, double done) {
+  if (past_s < kFirstGuess_s || done <= 0 || done >= 1) return {};
+  const double left_s = past_s * (1 - done) / done;
+  const bool minutes = left_s >= 100;
+  return " " + std::to_string(static_cast<int>(std::ceil(minutes ? left_s / 60 : left_s))) +
+         (minutes ? " min left" : " s left");
+}
+
+}  // namespace
+
 Progress::Progress(std::string task, std::FILE* out)
     : task_(std::move(task)), out_(out), terminal_(isatty(fileno(out)) == 1) {}
 
@@ -19,21 +34,6 @@ void Progress::Clear() {
   std::fflush(out_);
   shown_percent_ = -1;
 }
-
-namespace {
-
-constexpr double kFirstGuess_s = 2;
-
-// " 12 s left", " 3 min left"; empty: it is too early to say.
-std::string Left(double past_s, double done) {
-  if (past_s < kFirstGuess_s || done <= 0 || done >= 1) return {};
-  const double left_s = past_s * (1 - done) / done;
-  const bool minutes = left_s >= 100;
-  return " " + std::to_string(std::lround(std::ceil(minutes ? left_s / 60 : left_s))) +
-         (minutes ? " min left" : " s left");
-}
-
-}  // namespace
 
 void Progress::Note(const std::string& text) {
   const std::lock_guard lock(note_mutex_);

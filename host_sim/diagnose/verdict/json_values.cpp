@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "host_sim/data/report/axis.hpp"
-#include "host_sim/diagnose/verdict/json.hpp"
+#include "host_sim/identify/calibration/log_check.hpp"
 
 namespace armcal::verdict {
 
@@ -21,10 +21,19 @@ bool Slides(const ordered_json& json, int joint) {
   return json.at("torque_units").at(static_cast<std::size_t>(joint) - 1) == "N";
 }
 
-ordered_json RobotJson(const codegen::Robot& robot) {
-  ordered_json json;
-  AddRobot(json, robot);
-  return json;
+// "N*m" is "N", and "rad" is "m".
+std::string UnitOfSlide(std::string unit) {
+  for (const auto& [turning, sliding] :
+       {std::pair<std::string, std::string>{"N*m", "N"}, {"kg*m^2", "kg"}, {"rad", "m"}})
+    if (const auto at = unit.find(turning); at != unit.npos) unit.replace(at, turning.size(), sliding);
+  return unit;
+}
+
+// The joint, from 1, that gives a column of this name its unit; 0: none of so many joints.
+int JointOf(const std::string& name, const std::string& unit, std::size_t joints) {
+  const bool of_joint = name.starts_with("Ia") || unit.find('N') != unit.npos || unit.find("rad") != unit.npos;
+  const int joint = std::atoi(name.c_str() + name.find_last_not_of("0123456789") + 1);
+  return of_joint && joint >= 1 && joint <= static_cast<int>(joints) ? joint : 0;
 }
 
 // Empty: the joint is called by its number.
@@ -70,28 +79,22 @@ std::vector<std::string> BarNames(const ordered_json& json) {
 
 std::string UnitOn(const ordered_json& json, const std::vector<int>& joints, const std::string& unit) {
   if (joints.empty() || !std::all_of(joints.begin(), joints.end(), [&](int j) { return Slides(json, j); })) return unit;
-  std::string out = unit;
-  for (const auto& [turning, sliding] :
-       {std::pair<std::string, std::string>{"N*m", "N"}, {"kg*m^2", "kg"}, {"rad", "m"}})
-    if (const auto at = out.find(turning); at != out.npos) out.replace(at, turning.size(), sliding);
-  return out;
+  return UnitOfSlide(unit);
 }
 
 std::string ColumnUnit(const ordered_json& json, const std::string& name, const std::string& unit) {
-  const auto digits = name.find_last_not_of("0123456789") + 1;
-  const bool of_joint = name.starts_with("Ia") || unit.find('N') != unit.npos || unit.find("rad") != unit.npos;
-  const int joint = std::atoi(name.c_str() + digits);
-  const bool known = joint >= 1 && joint <= static_cast<int>(json.at("torque_units").size());
-  return of_joint && known ? UnitOn(json, {joint}, unit) : unit;
+  const int joint = JointOf(name, unit, json.at("torque_units").size());
+  return joint > 0 ? UnitOn(json, {joint}, unit) : unit;
 }
 
-std::string UnitOn(const codegen::Robot& robot, std::vector<int> joints, const std::string& unit) {
-  for (int& joint : joints) ++joint;
-  return UnitOn(RobotJson(robot), joints, unit);
+std::string UnitOn(const codegen::Robot& robot, const std::vector<int>& joints, const std::string& unit) {
+  const auto slides = [&](int j) { return calibration::Slides(robot.joint[static_cast<std::size_t>(j)]); };
+  return !joints.empty() && std::all_of(joints.begin(), joints.end(), slides) ? UnitOfSlide(unit) : unit;
 }
 
 std::string ColumnUnit(const codegen::Robot& robot, const std::string& name, const std::string& unit) {
-  return ColumnUnit(RobotJson(robot), name, unit);
+  const int joint = JointOf(name, unit, robot.joint.size());
+  return joint > 0 ? UnitOn(robot, {joint - 1}, unit) : unit;
 }
 
 }  // namespace armcal::verdict

@@ -28,7 +28,7 @@ std::string UnitOn(const nlohmann::ordered_json& json, const std::vector<int>& j
 std::string ColumnUnit(const nlohmann::ordered_json& json, const std::string& name, const std::string& unit);
 
 // The same for a robot. joints: from 0.
-std::string UnitOn(const codegen::Robot& robot, std::vector<int> joints, const std::string& unit);
+std::string UnitOn(const codegen::Robot& robot, const std::vector<int>& joints, const std::string& unit);
 std::string ColumnUnit(const codegen::Robot& robot, const std::string& name, const std::string& unit);
 
 }  // namespace armcal::verdict
